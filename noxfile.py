@@ -1,7 +1,7 @@
 """Checks in other environments: the distributed files, other versions of Python, old libraries.
 
-`nox -l` lists the sessions. All except `audit` build the wheel, install it and run the tests in an empty folder, so
-that nothing can depend on the checkout. Arguments after `--` go to pytest.
+`nox -l` lists the sessions. All except `audit` build the wheel, install it and run the tests in an
+empty folder, so that nothing can depend on the checkout. Arguments after `--` go to pytest.
 """
 
 from __future__ import annotations
@@ -26,7 +26,9 @@ TOO_NEW = ("heyoka",)
 """Packages of the extra `test` whose oldest wheels need numpy 2."""
 
 KERNELS = ("Prescott", "Haswell", "SkylakeX")
-"""Kernels of OpenBLAS that differ in the order of their operations: SSE3, AVX2 with FMA, AVX-512."""
+"""Kernels of OpenBLAS that differ in the order of their operations: SSE3, AVX2 with FMA,
+AVX-512.
+"""
 PROCESSORS = ("generic", "x86-64-v3", "")
 """Processors for which Numba compiles: without and with FMA, and the machine's own."""
 BUSY_LOOPS = 4
@@ -38,7 +40,9 @@ nox.options.error_on_missing_interpreters = False
 
 @nox.session(python="3.11")
 def wheel(session: nox.Session) -> None:
-    """Build wheel and sdist, check them, and run every test against the installed wheel in an empty folder."""
+    """Build wheel and sdist, check them, and run every test against the installed wheel in an empty
+    folder.
+    """
     distributions = built(session)
     session.run("twine", "check", "--strict", *map(str, distributions))
     session.install("-c", str(ROOT / "constraints.txt"), f"{distributions[0]}[test]")
@@ -72,16 +76,21 @@ def oldest(session: nox.Session) -> None:
 
 @nox.session(python="3.11")
 def portable(session: nox.Session) -> None:
-    """Run every test with each order of floating-point operations, hash seed and order of tests, on a busy machine.
+    """Run every test with each order of floating-point operations, hash seed and order of tests, on
+    a busy machine.
 
-    The machine must have AVX-512 for the kernel SkylakeX. Each of the nine combinations compiles all kernels, and takes
-    three times as long as the tests alone.
+    The machine must have AVX-512 for the kernel SkylakeX. Each of the nine combinations compiles
+    all kernels, and takes three times as long as the tests alone.
     """
-    session.install("-c", str(ROOT / "constraints.txt"), f"{built(session)[0]}[test]", "pytest-randomly")
+    session.install(
+        "-c", str(ROOT / "constraints.txt"), f"{built(session)[0]}[test]", "pytest-randomly"
+    )
     busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(BUSY_LOOPS)]
     try:
         for kernel, processor in itertools.product(KERNELS, PROCESSORS):
-            session.log(f"OPENBLAS_CORETYPE={kernel} NUMBA_CPU_NAME={processor or '(this machine)'}")
+            session.log(
+                f"OPENBLAS_CORETYPE={kernel} NUMBA_CPU_NAME={processor or '(this machine)'}"
+            )
             session.env["OPENBLAS_CORETYPE"] = kernel
             session.env["NUMBA_CPU_NAME"] = processor or None
             session.env["PYTHONHASHSEED"] = "random"
@@ -97,7 +106,14 @@ def portable(session: nox.Session) -> None:
 def audit(session: nox.Session) -> None:
     """Check the versions in constraints.txt for known vulnerabilities."""
     session.install("pip-audit")
-    session.run("pip-audit", "--strict", "--no-deps", "--disable-pip", "--requirement", str(ROOT / "constraints.txt"))
+    session.run(
+        "pip-audit",
+        "--strict",
+        "--no-deps",
+        "--disable-pip",
+        "--requirement",
+        str(ROOT / "constraints.txt"),
+    )
 
 
 def built(session: nox.Session) -> tuple[Path, Path]:

@@ -1,4 +1,6 @@
-"""Common options of the scripts that compare strategies: scenario, model, range sensor, runs and seed."""
+"""Common options of the scripts that compare strategies: scenario, model, range sensor, runs and
+seed.
+"""
 
 from __future__ import annotations
 
@@ -15,9 +17,13 @@ def asked_scenario(
     description: str | None, arguments: Sequence[str] | None, *, runs: int, seed: int
 ) -> tuple[Scenario, int, int]:
     """Return the scenario, the number of runs and the seed of a command line."""
-    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=description, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("scenario", nargs="?", default="asteroid-1997")
-    parser.add_argument("--model", choices=[model.value for model in Model], default=Model.GUARANTEED.value)
+    parser.add_argument(
+        "--model", choices=[model.value for model in Model], default=Model.GUARANTEED.value
+    )
     parser.add_argument("--no-range-sensor", action="store_true")
     parser.add_argument("--runs", type=int, default=runs)
     parser.add_argument("--seed", type=int, default=seed)

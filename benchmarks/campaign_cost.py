@@ -1,7 +1,7 @@
 """Time of a campaign as a function of its runs, and of a run as a function of its sections.
 
-`python benchmarks/campaign_cost.py --out DIR` prints the fitted straight lines and the maximum deviation from them,
-and writes figure-campaign-cost.pdf and .png.
+`python benchmarks/campaign_cost.py --out DIR` prints the fitted straight lines and the maximum
+deviation from them, and writes figure-campaign-cost.pdf and .png.
 """
 
 from __future__ import annotations
@@ -15,7 +15,13 @@ from pathlib import Path
 import numpy as np
 
 from infoset.experiments import load_scenario
-from infoset.experiments.common.figure_style import CURVE_LOOKS, legend_below, letters, style, subplots
+from infoset.experiments.common.figure_style import (
+    CURVE_LOOKS,
+    legend_below,
+    letters,
+    style,
+    subplots,
+)
 from infoset.experiments.common.output import Output
 from infoset.guidance import NoiseKind
 from infoset.sim import Campaign, Scenario, simulate
@@ -53,7 +59,10 @@ def main() -> None:
             by_runs = [campaign_s(scenario, runs) for runs in RUNS]
             model = scenario.set_model
             by_sections = [
-                campaign_s(replace(scenario, **of_model(replace(model, sections=count))), 64 * BATCHES) / (64 * BATCHES)
+                campaign_s(
+                    replace(scenario, **of_model(replace(model, sections=count))), 64 * BATCHES
+                )
+                / (64 * BATCHES)
                 for count in SECTIONS
             ]
             for axes, ticks, values, name in (
@@ -63,10 +72,18 @@ def main() -> None:
                 rise, fixed = np.polyfit(ticks, values, 1)
                 line = fixed + rise * np.array(ticks)
                 off = float(np.abs(values / line - 1.0).max())
-                print(f"{noise.value}: {name}: {fixed:.3g} + {rise:.3g} n, within {off:.0%}: {np.round(values, 3)}")
-                axes.plot(ticks, values, linestyle="", marker="o", markersize=4.0, color=look["color"])
+                print(
+                    f"{noise.value}: {name}: {fixed:.3g} + {rise:.3g} n, within {off:.0%}: "
+                    f"{np.round(values, 3)}"
+                )
+                axes.plot(
+                    ticks, values, linestyle="", marker="o", markersize=4.0, color=look["color"]
+                )
                 axes.plot(ticks, line, label=f"{noise.value} noise", **look)
-        for axes, ticks, label in ((left, RUNS, "runs"), (right, SECTIONS, "sections at the start")):
+        for axes, ticks, label in (
+            (left, RUNS, "runs"),
+            (right, SECTIONS, "sections at the start"),
+        ):
             axes.set_xlim(0.0, 1.05 * ticks[-1])
             axes.set_ylim(bottom=0.0)
             axes.set_xlabel(label)

@@ -24,7 +24,9 @@ def pytest_configure(config: pytest.Config) -> None:
     config.stash[LINES] = []
 
 
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+def pytest_terminal_summary(
+    terminalreporter: pytest.TerminalReporter, config: pytest.Config
+) -> None:
     lines = config.stash[LINES]
     if lines:
         terminalreporter.section("targets")
@@ -36,7 +38,10 @@ def _checker(config: pytest.Config, at_least: bool) -> Check:
     def check(name: str, measured: float, target: float, unit: str) -> None:
         met = measured >= target if at_least else measured < target
         bound = ">=" if at_least else "<"
-        line = f"{'met   ' if met else 'MISSED'} {name}: {measured:.4g} {unit} (target {bound} {target:g} {unit})"
+        line = (
+            f"{'met   ' if met else 'MISSED'} {name}: {measured:.4g} {unit} (target {bound} "
+            f"{target:g} {unit})"
+        )
         config.stash[LINES].append(line)
         assert met or not config.getoption("--strict-targets"), line
 
@@ -55,7 +60,9 @@ def at_least(pytestconfig: pytest.Config) -> Check:
     return _checker(pytestconfig, at_least=True)
 
 
-@pytest.fixture(params=[NoiseKind.RANDOM, NoiseKind.GAME], ids=lambda kind: kind.value, scope="module")
+@pytest.fixture(
+    params=[NoiseKind.RANDOM, NoiseKind.GAME], ids=lambda kind: kind.value, scope="module"
+)
 def curve(request: pytest.FixtureRequest) -> Scenario:
     """The paper's scenario without a range sensor: curves 1 and 3 of its experiment."""
     return replace(load_scenario("asteroid-1997"), noise=request.param, range_sensor=None)

@@ -1,12 +1,14 @@
-"""Search for flights with a great Phi, and compare Phi with the maximum miss of exact sections over the same labels.
+"""Search for flights with a great Phi, and compare Phi with the maximum miss of exact sections over
+the same labels.
 
-    python -m benchmarks.great_phi                      # without and with the range sensor, 2000 engagements each
-    python -m benchmarks.great_phi --budget 400 --rate-error 1e-6
+    python -m benchmarks.great_phi                      # without and with the range sensor, 2000
+    engagements each python -m benchmarks.great_phi --budget 400 --rate-error 1e-6
 
-The search is that of `infoset adversary`, with Phi in place of the miss. For the flights with the maximum Phi, the
-section of 200 labels among those that leave in each step is computed at that step, and the impulses of the flight act
-on it until its range is zero. The maximum miss of these states, (10) in docs/guarantee.md for 200 labels a step, is
-less than the supremum over all labels, which Phi bounds.
+The search is that of `infoset adversary`, with Phi in place of the miss. For the flights with the
+maximum Phi, the section of 200 labels among those that leave in each step is computed at that step,
+and the impulses of the flight act on it until its range is zero. The maximum miss of these states,
+(10) in docs/guarantee.md for 200 labels a step, is less than the supremum over all labels, which
+Phi bounds.
 """
 
 from __future__ import annotations
@@ -56,7 +58,10 @@ class Watched:
         """Keep the set if labels leave after this step, and the impulse."""
         information = step.information.copy()
         self.impulses_m_s.append(float(step.impulse_m_s[0, 0]) if step.flying[0] else 0.0)
-        if information._state.lower_label[0] < information._min_label_next() and information._computes_phi[0]:
+        if (
+            information._state.lower_label[0] < information._min_label_next()
+            and information._computes_phi[0]
+        ):
             self.sets.append((step.step, information))
 
     def max_miss_m(self, scenario: Scenario) -> float:
@@ -74,18 +79,22 @@ class Watched:
                     continue
                 tau = label / law.closing_speed - step * law.step
                 misses = vertices[:, 1] + vertices[:, 0] * tau
-                minimum, most = misses.min(), misses.max()
+                minimum = misses.min()
+                most = misses.max()
                 for later, impulse in enumerate(self.impulses_m_s[step:]):
                     left_s = max(tau - later * law.step, 0.0)
                     doubt = abs(impulse) * law.impulse_error
-                    minimum, most = minimum - (impulse + doubt) * left_s, most - (impulse - doubt) * left_s
+                    minimum = minimum - (impulse + doubt) * left_s
+                    most = most - (impulse - doubt) * left_s
                 drift = 0.5 * law.disturbance * tau**2
                 maximum = max(maximum, most + drift, drift - minimum)
         return maximum * (1.0 + model.speed_error)
 
 
 def living_labels(information: InformationSet, nearest: float, farthest: float) -> Floats:
-    """Return `LABELS` labels between the ends of the living ones, whose ends are bisected from as many labels."""
+    """Return `LABELS` labels between the ends of the living ones, whose ends are bisected from as
+    many labels.
+    """
 
     def lives(label: float) -> bool:
         return len(information.section_at(label).polygons[0].polygon()) > 0
@@ -96,7 +105,8 @@ def living_labels(information: InformationSet, nearest: float, farthest: float) 
         return np.empty(0)
     ends = []
     for last, dead in ((living[0], living[0] - 1), (living[-1], living[-1] + 1)):
-        inside, outside = coarse[last], coarse[min(max(dead, 0), len(coarse) - 1)]
+        inside = coarse[last]
+        outside = coarse[min(max(dead, 0), len(coarse) - 1)]
         for _ in range(40):
             middle = 0.5 * (inside + outside)
             inside, outside = (middle, outside) if lives(middle) else (inside, middle)
@@ -104,18 +114,29 @@ def living_labels(information: InformationSet, nearest: float, farthest: float) 
     return np.linspace(ends[0], ends[1], LABELS)
 
 
-def great_flights(scenario: Scenario, budget: int, seed: int, shown: int) -> Iterator[tuple[float, float, float]]:
-    """Search, and yield Phi, the maximum miss of the exact sections and the miss of the best flights, m."""
-    search = PhiSearch(scenario, make_strategy(scenario.strategy), Objective.FIXED_TRUTH, seed, keep_set=True)
+def great_flights(
+    scenario: Scenario, budget: int, seed: int, shown: int
+) -> Iterator[tuple[float, float, float]]:
+    """Search, and yield Phi, the maximum miss of the exact sections and the miss of the best
+    flights, m.
+    """
+    search = PhiSearch(
+        scenario, make_strategy(scenario.strategy), Objective.FIXED_TRUTH, seed, keep_set=True
+    )
     with ThreadPoolExecutor(1) as pool:
         search.run(budget, pool, None)
     assert search.elite is not None
     for index in range(min(shown, len(search.elite))):
-        flight, watched = search.engagements(search.elite.take(slice(index, index + 1))), Watched()
+        flight = search.engagements(search.elite.take(slice(index, index + 1)))
+        watched = Watched()
         while flight.flying:
             flight.advance(watched.observe)
         results = flight.results(np.arange(1))
-        yield float(results.guaranteed_miss_m[0]), watched.max_miss_m(search.scenario), float(results.miss_m[0])
+        yield (
+            float(results.guaranteed_miss_m[0]),
+            watched.max_miss_m(search.scenario),
+            float(results.miss_m[0]),
+        )
 
 
 def guaranteed(scenario: Scenario, strategy: str) -> Scenario:
@@ -126,7 +147,9 @@ def guaranteed(scenario: Scenario, strategy: str) -> Scenario:
 
 def main() -> None:
     """Search with and without the range sensor."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--scenario", default="asteroid-1997")
     parser.add_argument("--budget", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=0)
@@ -135,13 +158,18 @@ def main() -> None:
     options = parser.parse_args()
     scenario = guaranteed(load_scenario(options.scenario), options.strategy)
     if options.rate_error is not None:
-        scenario = replace(scenario, rate_sensor=RateSensor(scenario.set_model.step_s, options.rate_error))
+        scenario = replace(
+            scenario, rate_sensor=RateSensor(scenario.set_model.step_s, options.rate_error)
+        )
     for sensor in (None, scenario.range_sensor):
-        sys.stdout.write(f"{options.strategy}, {'without' if sensor is None else 'with'} the range sensor\n")
+        sys.stdout.write(
+            f"{options.strategy}, {'without' if sensor is None else 'with'} the range sensor\n"
+        )
         measured = replace(scenario, range_sensor=sensor)
         for phi_m, exact_m, miss_m in great_flights(measured, options.budget, options.seed, SHOWN):
             sys.stdout.write(
-                f"Phi {phi_m:.3f} m, exact sections {exact_m:.3f} m, ratio {phi_m / exact_m:.4f}, miss {miss_m:.3f} m\n"
+                f"Phi {phi_m:.3f} m, exact sections {exact_m:.3f} m, ratio {phi_m / exact_m:.4f}, "
+                f"miss {miss_m:.3f} m\n"
             )
             sys.stdout.flush()
 

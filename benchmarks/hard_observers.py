@@ -1,11 +1,12 @@
-"""Steps of observers whose sets are small, flat or singular: processor times, and true states that the sets lost.
+"""Steps of observers whose sets are small, flat or singular: processor times, and true states that
+the sets lost.
 
     python -m benchmarks.hard_observers
 
-The errors of all steps are at their bounds. The first rows are the 1 000 random systems of the thorough tests. The last
-one has 600 systems of three and four states: some have singular or rounded matrices, flat initial sets, exact
-measurements, or units of the states from 1e-9 to 1e9. A lost state is beyond a facet normal . x <= offset, by a
-distance relative to the terms of normal . x.
+The errors of all steps are at their bounds. The first rows are the 1 000 random systems of the
+thorough tests. The last one has 600 systems of three and four states: some have singular or rounded
+matrices, flat initial sets, exact measurements, or units of the states from 1e-9 to 1e9. A lost
+state is beyond a facet normal . x <= offset, by a distance relative to the terms of normal . x.
 """
 
 from __future__ import annotations
@@ -28,16 +29,20 @@ def random_case(seed: int) -> Case:
     """Return a system of the thorough tests."""
     system = System(seed)
     coefficients, measured = system.simulated(STEPS)
-    states, pushes = [coefficients[: system.size]], coefficients[system.size :].reshape(STEPS - 1, -1)
+    states = [coefficients[: system.size]]
+    pushes = coefficients[system.size :].reshape(STEPS - 1, -1)
     for push in pushes:
         states.append(system.a @ states[-1] + push @ system.generators)
     return system.observer(), np.array(states), measured
 
 
 def degenerate_case(seed: int) -> Case:
-    """Return a system of three or four states that may be singular, flat, exact, or in different units."""
+    """Return a system of three or four states that may be singular, flat, exact, or in different
+    units.
+    """
     random = np.random.default_rng(seed + 100_000)
-    n, outputs = int(random.choice([3, 4])), int(random.integers(1, 4))
+    n = int(random.choice([3, 4]))
+    outputs = int(random.integers(1, 4))
     a = random.normal(size=(n, n)) * random.choice([0.3, 0.6])
     if seed % 4 == 0:
         a[-1] = 0.0
@@ -45,23 +50,36 @@ def degenerate_case(seed: int) -> Case:
         a = np.round(2.0 * a) / 2.0
     c = np.eye(outputs, n) if seed % 3 == 0 else random.normal(size=(outputs, n))
     generators = 0.1 * random.normal(size=(int(random.integers(0, 3)), n))
-    half, noise = random.choice([0.0, 0.5, 1.0], n), float(random.choice([0.0, 1e-6, 1e-3, 0.05, 0.5]))
+    half = random.choice([0.0, 0.5, 1.0], n)
+    noise = float(random.choice([0.0, 1e-6, 1e-3, 0.05, 0.5]))
     half = np.maximum(half, 0.5) if seed % 2 else half
     units = 10.0 ** random.integers(-9, 10, n) if seed % 7 < 3 else np.ones(n)
-    a, c, generators, half = a * units[:, None] / units, c / units, generators * units, half * units
-    start, disturbance = Zonotope.box(-half, half), Zonotope(np.zeros(n), generators)
-    states, measured = [random.choice([-1.0, 1.0], n) * half], []
+    a = a * units[:, None] / units
+    c = c / units
+    generators = generators * units
+    half = half * units
+    start = Zonotope.box(-half, half)
+    disturbance = Zonotope(np.zeros(n), generators)
+    states = [random.choice([-1.0, 1.0], n) * half]
+    measured = []
     for k in range(8):
         if k:
             states.append(a @ states[-1] + random.choice([-1.0, 1.0], len(generators)) @ generators)
         known = 1.0 if random.random() < 0.8 else np.nan
         measured.append(known * (c @ states[-1] + random.choice([-1.0, 1.0], outputs) * noise))
-    return LinearObserver(a, c, start, noise=noise, disturbance=disturbance), np.array(states), np.array(measured)
+    return (
+        LinearObserver(a, c, start, noise=noise, disturbance=disturbance),
+        np.array(states),
+        np.array(measured),
+    )
 
 
 def show(name: str, case_of: Callable[[int], Case], seeds: Iterable[int]) -> None:
     """Simulate the systems and print the row."""
-    times_ms, lost, emptied, count = list[float](), list[float](), 0, 0
+    times_ms = list[float]()
+    lost = list[float]()
+    emptied = 0
+    count = 0
     for seed in seeds:
         observer, states, measured = case_of(seed)
         count += 1
@@ -82,9 +100,10 @@ def show(name: str, case_of: Callable[[int], Case], seeds: Iterable[int]) -> Non
                 break
     ms = np.array(times_ms)
     print(
-        f"{count} systems {name}: median {np.median(ms):.2f}, 99 % {np.quantile(ms, 0.99):.1f}, greatest "
-        f"{ms.max():.0f} ms a step; {(ms > 50.0).sum()} of {len(ms)} steps over 50 ms; "
-        f"emptied {emptied}, lost {len(lost)}, by {max(lost, default=0.0):.1e} of the terms at most",
+        f"{count} systems {name}: median {np.median(ms):.2f}, 99 % {np.quantile(ms, 0.99):.1f}, "
+        f"greatest {ms.max():.0f} ms a step; {(ms > 50.0).sum()} of {len(ms)} steps over 50 ms; "
+        f"emptied {emptied}, lost {len(lost)}, by {max(lost, default=0.0):.1e} of the terms at "
+        "most",
         flush=True,
     )
 

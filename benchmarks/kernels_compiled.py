@@ -1,9 +1,10 @@
-"""Count the kernels that each command compiles on an empty cache, and the processor time that the cache saves.
+"""Count the kernels that each command compiles on an empty cache, and the processor time that the
+cache saves.
 
     python -m benchmarks.kernels_compiled [COMMAND ...]
 
-A specialisation is a kernel compiled for one set of argument types. The time is that of the first run minus that of the
-second one, the shorter of two such pairs.
+A specialisation is a kernel compiled for one set of argument types. The time is that of the first
+run minus that of the second one, the shorter of two such pairs.
 """
 
 from __future__ import annotations
@@ -53,14 +54,20 @@ finally:
 
 
 def run(command: str, cache: str) -> tuple[list[int], float]:
-    """Run a command; return the numbers of kernels and specialisations that it compiles, and its processor time, s."""
+    """Run a command; return the numbers of kernels and specialisations that it compiles, and its
+    processor time, s.
+    """
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     with tempfile.TemporaryDirectory() as folder:
         words = command.replace("DIR", str(Path(folder) / "out")).split()
         done = subprocess.run(
             [sys.executable, "-c", _COUNTED, *words, "--quiet"],
             cwd=folder,
-            env={**os.environ, "NUMBA_CACHE_DIR": cache, "PYTHONPATH": str(Path(__file__).parents[1])},
+            env={
+                **os.environ,
+                "NUMBA_CACHE_DIR": cache,
+                "PYTHONPATH": str(Path(__file__).parents[1]),
+            },
             capture_output=True,
             text=True,
             check=True,
@@ -72,7 +79,10 @@ def run(command: str, cache: str) -> tuple[list[int], float]:
 
 def main() -> None:
     """Print a row of a table for each command."""
-    sys.stdout.write("| command | kernels | specialisations | processor time to compile, s |\n|---|---|---|---|\n")
+    sys.stdout.write(
+        "| command | kernels | specialisations | processor time to compile, s |\n"
+        "|---|---|---|---|\n"
+    )
     for command in sys.argv[1:] or COMMANDS:
         spent_s = []
         for _ in range(2):

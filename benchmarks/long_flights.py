@@ -1,11 +1,13 @@
-"""Cost of long flights: time, vertices, sections and memory against the number of steps; table of docs/performance.md.
+"""Cost of long flights: time, vertices, sections and memory against the number of steps; table of
+docs/performance.md.
 
     python -m benchmarks.long_flights
     python -m benchmarks.long_flights --strategies symmetric-miss,patient,kalman
     python -m benchmarks.long_flights --rate-error 1e-7
 
-The flight is `dart-2022`, 4 h, with steps of 144, 14.4 and 1.44 s, one image at every step, and an engine of the same
-acceleration. Times are processor times of one thread, with the guaranteed miss, of one engagement in a batch of 40.
+The flight is `dart-2022`, 4 h, with steps of 144, 14.4 and 1.44 s, one image at every step, and an
+engine of the same acceleration. Times are processor times of one thread, with the guaranteed miss,
+of one engagement in a batch of 40.
 """
 
 from __future__ import annotations
@@ -38,8 +40,8 @@ class Cost:
     Parameters
     ----------
     step_us, arrival_ms : float
-        Processor time of a step of an engagement, microseconds, up to the first label that leaves; and of all that
-        follows, and of the margins of the true state, milliseconds.
+        Processor time of a step of an engagement, microseconds, up to the first label that leaves;
+        and of all that follows, and of the margins of the true state, milliseconds.
     mean_vertices, max_vertices : float
         Vertices of a section along one axis, mean over the flight and maximum.
     max_sections : int
@@ -49,7 +51,8 @@ class Cost:
     miss_m, guaranteed_miss_m : float
         Medians.
     sound : bool
-        Whether the set contained the true state in all runs, and no miss exceeded the guaranteed miss.
+        Whether the set contained the true state in all runs, and no miss exceeded the guaranteed
+        miss.
     """
 
     step_us: float
@@ -79,7 +82,8 @@ def of_steps(scenario: Scenario, steps: int) -> Scenario:
 def vertices(flight: Engagements) -> NDArray[np.int64]:
     """Return the numbers of vertices of all living sections."""
     state = flight._information._state
-    records, living = state.sections.chains.records.reshape(-1, 2), np.tile(state.living.ravel(), len(state.laws))
+    records = state.sections.chains.records.reshape(-1, 2)
+    living = np.tile(state.living.ravel(), len(state.laws))
     counts = (records["end"] - records["begin"])[: living.size]
     return np.asarray(counts.sum(axis=1)[living])
 
@@ -97,10 +101,13 @@ def cost(scenario: Scenario, steps: int) -> Cost:
         elapsed_s = time.process_time() - began_s
         if flight._information._state.some_left.any():
             break
-        spent_s, before = spent_s + elapsed_s, flight.step
+        spent_s = spent_s + elapsed_s
+        before = flight.step
         if flight.step % (steps // 50) == 0:
             counts = vertices(flight)
-            looks, means, maximum = looks + 1, means + counts.mean(), max(maximum, int(counts.max()))
+            looks = looks + 1
+            means = means + counts.mean()
+            maximum = max(maximum, int(counts.max()))
             sections = max(sections, int(flight._information.section_counts.max()))
     began_s = time.process_time() - elapsed_s
     while flight.flying:
@@ -128,23 +135,30 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--strategies", default="symmetric-miss")
     parser.add_argument("--scenario", default="dart-2022")
-    parser.add_argument("--rate-error", type=float, help="error of a rate sensor, rad/s; without one if absent")
+    parser.add_argument(
+        "--rate-error", type=float, help="error of a rate sensor, rad/s; without one if absent"
+    )
     options = parser.parse_args()
     sys.stdout.write(
-        "| strategy | steps | a step, us | arrival, ms | whole flight, us a step | vertices, mean / most | sections | "
-        "memory, MB | miss, m | guaranteed miss, m | sound |\n" + "|---" * 11 + "|\n"
+        "| strategy | steps | a step, us | arrival, ms | whole flight, us a step | vertices, "
+        "mean / most | sections | memory, MB | miss, m | guaranteed miss, m | sound |\n"
+        + "|---" * 11
+        + "|\n"
     )
     for strategy in options.strategies.split(","):
         scenario = replace(load_scenario(options.scenario), strategy=strategy)
         if options.rate_error is not None:
-            scenario = replace(scenario, rate_sensor=RateSensor(scenario.set_model.step_s, options.rate_error))
+            scenario = replace(
+                scenario, rate_sensor=RateSensor(scenario.set_model.step_s, options.rate_error)
+            )
         for steps in STEPS:
             of = cost(scenario, steps)
             whole = of.step_us + 1e3 * of.arrival_ms / steps
             sys.stdout.write(
                 f"| {strategy} | {steps} | {of.step_us:.1f} | {of.arrival_ms:.1f} | {whole:.1f} | "
-                f"{of.mean_vertices:.0f} / {of.max_vertices} | {of.max_sections} | {of.memory_mb:.1f} | "
-                f"{of.miss_m:.1f} | {of.guaranteed_miss_m:.1f} | {'yes' if of.sound else 'no'} |\n"
+                f"{of.mean_vertices:.0f} / {of.max_vertices} | {of.max_sections} | "
+                f"{of.memory_mb:.1f} | {of.miss_m:.1f} | {of.guaranteed_miss_m:.1f} | "
+                f"{'yes' if of.sound else 'no'} |\n"
             )
             sys.stdout.flush()
 

@@ -1,11 +1,13 @@
-"""Set-steps of observers: of the published one, ours and those of others, and of systems of three and four states.
+"""Set-steps of observers: of the published one, ours and those of others, and of systems of three
+and four states.
 
-``python -m benchmarks.observer_numbers [SYSTEMS]``, with the number of random systems, 80 by default. A set-step is a
-prediction and a measurement of one set. The errors of the published example are those of the bounds of the last set,
-against exact rational arithmetic; it is also computed with shapely's objects, and with zonoopt if it is installed. The
-excess of the other systems is that of the widths of the last set, which was reduced, over the exact ones, for the
-Clohessy-Wiltshire case and the first 80 systems. The true state must be inside at every step. A step of a random system
-is timed three times, and the least time counts.
+``python -m benchmarks.observer_numbers [SYSTEMS]``, with the number of random systems, 80 by
+default. A set-step is a prediction and a measurement of one set. The errors of the published
+example are those of the bounds of the last set, against exact rational arithmetic; it is also
+computed with shapely's objects, and with zonoopt if it is installed. The excess of the other
+systems is that of the widths of the last set, which was reduced, over the exact ones, for the
+Clohessy-Wiltshire case and the first 80 systems. The true state must be inside at every step. A
+step of a random system is timed three times, and the least time counts.
 """
 
 from __future__ import annotations
@@ -48,7 +50,9 @@ def main() -> None:
     measured = problem.measured
     assert measured is not None
     rows: list[tuple[str, float, float]] = []
-    notes = [f"target of the batch: at most {TARGET_BATCH_US} us; one run: at most the time of shapely"]
+    notes = [
+        f"target of the batch: at most {TARGET_BATCH_US} us; one run: at most the time of shapely"
+    ]
     for name, count, run in (
         (f"LinearObserver, batch of {RUNS}", RUNS, lambda: ours(problem, measured, RUNS)),
         ("LinearObserver, one run", 1, lambda: ours(problem, measured, None)),
@@ -64,23 +68,40 @@ def main() -> None:
             ("zonoopt, sets alone", False),
             ("zonoopt, sets and bounds", True),
         ):
-            rows.append((name, *timed(partial(with_zonoopt, zonoopt, problem, measured, bounds), len(measured))))
-    lines = [f"{name:36} {us:10.3f} us a set-step   error of the bounds {error:.2g}" for name, us, error in rows]
+            rows.append(
+                (
+                    name,
+                    *timed(
+                        partial(with_zonoopt, zonoopt, problem, measured, bounds), len(measured)
+                    ),
+                )
+            )
+    lines = [
+        f"{name:36} {us:10.3f} us a set-step   error of the bounds {error:.2g}"
+        for name, us, error in rows
+    ]
     print("\n".join([*lines, *notes]))
     print_many_states(int(sys.argv[1]) if len(sys.argv) > 1 else SYSTEMS)
 
 
 def print_many_states(count: int) -> None:
-    """Print the times of polytopes: relative motion on a circular orbit, and random systems of 30 steps."""
+    """Print the times of polytopes: relative motion on a circular orbit, and random systems of 30
+    steps.
+    """
     random_runs(range(8))  # compiles the kernels
-    print_row("Clohessy-Wiltshire, 500 steps", [steps_of(*clohessy_wiltshire(), 500, seed) for seed in range(3)])
+    print_row(
+        "Clohessy-Wiltshire, 500 steps",
+        [steps_of(*clohessy_wiltshire(), 500, seed) for seed in range(3)],
+    )
     for size in (3, 4):
         seeds = range(size - 3, count, 2)
         print_row(f"{len(seeds)} random systems of {size} states", random_runs(seeds))
 
 
 def random_runs(seeds: Iterable[int]) -> list[tuple[Floats, Floats]]:
-    """Return the times and the excess of random systems: the least times of three runs, so without interruptions."""
+    """Return the times and the excess of random systems: the least times of three runs, so without
+    interruptions.
+    """
     runs = []
     for one in map(System, seeds):
         arguments = one.a, one.c, one.generators, one.noise, 30, one.seed
@@ -93,27 +114,48 @@ def print_row(name: str, runs: list[tuple[Floats, Floats]]) -> None:
     """Print a row of the times and the excess of some runs."""
     ms = np.concatenate([times for times, _ in runs])
     excess = np.concatenate([more for _, more in runs])
-    spread = f"median {np.median(ms):6.2f}, 99 % {np.quantile(ms, 0.99):6.2f}, greatest {ms.max():6.2f} ms a step"
-    more = f"{excess.mean():.1%} too large, median {np.median(excess):.1%}, {excess.max():.1%} at most"
+    spread = (
+        f"median {np.median(ms):6.2f}, 99 % {np.quantile(ms, 0.99):6.2f}, greatest {ms.max():6.2f} "
+        "ms a step"
+    )
+    more = (
+        f"{excess.mean():.1%} too large, median {np.median(excess):.1%}, {excess.max():.1%} at most"
+    )
     print(f"{name:32} {spread}; widths {more}", flush=True)
 
 
 def clohessy_wiltshire() -> tuple[LinearObserver, Floats, Floats, Floats, float]:
-    """Return an observer of motion in a plane near a craft at 1.1e-3 rad/s: 30 s, 10 m and 1e-4 m/s^2."""
-    rate, pushed = 1.1e-3, np.zeros((6, 6))
+    """Return an observer of motion in a plane near a craft at 1.1e-3 rad/s: 30 s, 10 m and 1e-4
+    m/s^2.
+    """
+    rate = 1.1e-3
+    pushed = np.zeros((6, 6))
     pushed[:2, 2:4] = pushed[2:4, 4:] = np.eye(2)
     pushed[2, 0], pushed[2, 3], pushed[3, 2] = 3.0 * rate**2, 2.0 * rate, -2.0 * rate
-    moved, c = expm(30.0 * pushed), np.eye(2, 4)
-    a, generators, half = moved[:4, :4], 1e-4 * moved[:4, 4:].T, np.array([1e3, 1e3, 1.0, 1.0])
-    start, disturbance = Zonotope.box(-half, half), Zonotope(np.zeros(4), generators)
+    moved = expm(30.0 * pushed)
+    c = np.eye(2, 4)
+    a = moved[:4, :4]
+    generators = 1e-4 * moved[:4, 4:].T
+    half = np.array([1e3, 1e3, 1.0, 1.0])
+    start = Zonotope.box(-half, half)
+    disturbance = Zonotope(np.zeros(4), generators)
     return LinearObserver(a, c, start, noise=10.0, disturbance=disturbance), a, c, generators, 10.0
 
 
 def steps_of(
-    observer: LinearObserver, a: Floats, c: Floats, generators: Floats, noise: float, steps: int, seed: int
+    observer: LinearObserver,
+    a: Floats,
+    c: Floats,
+    generators: Floats,
+    noise: float,
+    steps: int,
+    seed: int,
 ) -> tuple[Floats, Floats]:
-    """Return the processor times of the steps, ms, and the relative excess of the widths at the last one."""
-    random, times = np.random.default_rng(seed), []
+    """Return the processor times of the steps, ms, and the relative excess of the widths at the
+    last one.
+    """
+    random = np.random.default_rng(seed)
+    times = []
     state = np.zeros(len(a))
     for k in range(steps):
         if k:
@@ -133,7 +175,8 @@ def steps_of(
 
 def timed(run: Callable[[], Floats], steps: int) -> tuple[float, float]:
     """Return the shortest processor time, us a step, and the maximum error of the bounds."""
-    best, bounds = np.inf, run()
+    best = np.inf
+    bounds = run()
     for _ in range(ROUNDS):
         start = time.process_time()
         bounds = run()
@@ -151,9 +194,15 @@ def ours(problem: ObserverProblem, measured: Floats, runs: int | None) -> Floats
 
 
 def with_shapely(problem: ObserverProblem, measured: Floats) -> Floats:
-    """Return the same with one shapely object a step: hulls of points, and intersections with strips."""
+    """Return the same with one shapely object a step: hulls of points, and intersections with
+    strips.
+    """
     assert isinstance(problem.disturbance_set, Zonotope)
-    w, (normal,), half = problem.disturbance_set.generators[0], np.array(problem.system.C), problem.noise.half_width[0]
+    w, (normal,), half = (
+        problem.disturbance_set.generators[0],
+        np.array(problem.system.C),
+        problem.noise.half_width[0],
+    )
     along = 100.0 * np.array([-normal[1], normal[0]])
     polygon = shapely.box(-3.0, -3.0, 3.0, 3.0)
     for k, (y,) in enumerate(measured):
@@ -168,7 +217,9 @@ def with_shapely(problem: ObserverProblem, measured: Floats) -> Floats:
 
 
 def with_zonoopt(zonoopt: Any, problem: ObserverProblem, measured: Floats, bounds: bool) -> Floats:
-    """Return the same with constrained zonotopes; with their bounds at every step, or at the last one alone."""
+    """Return the same with constrained zonotopes; with their bounds at every step, or at the last
+    one alone.
+    """
     sparse = importlib.import_module("scipy.sparse").csc_matrix
     assert isinstance(problem.disturbance_set, Zonotope)
 
@@ -176,11 +227,9 @@ def with_zonoopt(zonoopt: Any, problem: ObserverProblem, measured: Floats, bound
         return zonoopt.Zono(sparse(generators.T), np.array(centre))
 
     w = zonotope([0.0, 0.0], problem.disturbance_set.generators)
-    shape, a, c = (
-        zonotope([0.0, 0.0], 3.0 * np.eye(2)),
-        sparse(np.array(problem.system.A)),
-        sparse(np.array(problem.system.C)),
-    )
+    shape = zonotope([0.0, 0.0], 3.0 * np.eye(2))
+    a = sparse(np.array(problem.system.A))
+    c = sparse(np.array(problem.system.C))
     box = None
     for k, y in enumerate(measured):
         if k:

@@ -1,8 +1,9 @@
-"""Vertices of half-spaces, hulls of points, operations and zonotopes in three to six dimensions, and times of cddlib.
+"""Vertices of half-spaces, hulls of points, operations and zonotopes in three to six dimensions,
+and times of cddlib.
 
-``python -m benchmarks.polytope_numbers``. Both run in one process, in turn; the shortest of several rounds counts.
-cddlib computes with doubles (`pycddlib`, which pip builds from its source with Debian's `libcdd-dev` and `libgmp-dev`);
-without it only our times are printed.
+``python -m benchmarks.polytope_numbers``. Both run in one process, in turn; the shortest of several
+rounds counts. cddlib computes with doubles (`pycddlib`, which pip builds from its source with
+Debian's `libcdd-dev` and `libgmp-dev`); without it only our times are printed.
 """
 
 from __future__ import annotations
@@ -45,7 +46,10 @@ def main() -> None:
         line = f"{space}  {count:6}  {len(rows):6}"
         for ours, theirs in (
             (lambda p=points: Polytope.from_vertices(p), lambda p=points: facets_of(cdd, p)),
-            (lambda r=rows, b=limits: Polytope.from_constraints(r, b), lambda r=rows, b=limits: vertices_of(cdd, r, b)),
+            (
+                lambda r=rows, b=limits: Polytope.from_constraints(r, b),
+                lambda r=rows, b=limits: vertices_of(cdd, r, b),
+            ),
         ):
             mine, other = in_turn(ours, theirs if cdd else None)
             worst = max(worst, mine / other)
@@ -61,7 +65,9 @@ def print_operations() -> None:
     print("n  operation           | ms")
     for space in (3, 4):
         random = np.random.default_rng(space)
-        one, two = (Polytope.from_vertices(random.normal(size=(20, space)) * size) for size in (1.0, 0.8))
+        one, two = (
+            Polytope.from_vertices(random.normal(size=(20, space)) * size) for size in (1.0, 0.8)
+        )
         small = Polytope.from_vertices(0.1 * random.normal(size=(space + 1, space)))
         points = random.normal(size=(1000, space))
         operations: dict[str, Callable[[], object]] = {

@@ -1,11 +1,13 @@
-"""Print the radius of the orbit with which the nonlinear columns of Shorikov and Goranov (2021) were computed.
+"""Print the radius of the orbit with which the nonlinear columns of Shorikov and Goranov (2021)
+were computed.
 
     python benchmarks/published_radius.py
 
-Least squares on the printed differences, nonlinear minus linear. These hardly depend on the control, whose digits the
-paper rounds. Each difference is divided by the rounding of both numbers. The unknown is the inverse of the radius, to
-which the differences are nearly proportional. A first fit, with a loss that limits the effect of misprints, starts from
-9000 km; the second leaves out differences that are then off by more than five roundings.
+Least squares on the printed differences, nonlinear minus linear. These hardly depend on the
+control, whose digits the paper rounds. Each difference is divided by the rounding of both numbers.
+The unknown is the inverse of the radius, to which the differences are nearly proportional. A first
+fit, with a loss that limits the effect of misprints, starts from 9000 km; the second leaves out
+differences that are then off by more than five roundings.
 """
 
 from __future__ import annotations
@@ -18,7 +20,12 @@ from scipy.optimize import least_squares
 from infoset.arrays import Floats
 from infoset.experiments.common.hill_axes import to_paper
 from infoset.experiments.common.input_file import load_problem
-from infoset.experiments.reachability.published import PROBLEM, flown_controls, printed_tables, published_motion
+from infoset.experiments.reachability.published import (
+    PROBLEM,
+    flown_controls,
+    printed_tables,
+    published_motion,
+)
 from infoset.rendezvous.reachability import minimum_energy, solve
 
 ROUNDING = np.array([0.1, 0.1, 0.1, 0.01, 0.01, 0.01])
@@ -45,9 +52,13 @@ def main() -> None:
     fit = least_squares(lambda curvature_1_mm: residuals(curvature_1_mm)[kept], rough.x)
     radius_km = 1e3 / fit.x[0]
     relative = np.sqrt(2.0 * fit.cost / (kept.sum() - 1)) / np.linalg.norm(fit.jac) / fit.x[0]
-    sys.stdout.write(f"radius {radius_km:.2f} +- {radius_km * relative:.2f} km from {kept.sum()} differences\n")
+    sys.stdout.write(
+        f"radius {radius_km:.2f} +- {radius_km * relative:.2f} km from {kept.sum()} differences\n"
+    )
     ends = residuals(np.array([1.0 / 0.09]))
-    sys.stdout.write(f"radius 90 km: {int((np.abs(ends) <= 1.0).sum())} of {ends.size} within the rounding\n")
+    sys.stdout.write(
+        f"radius 90 km: {int((np.abs(ends) <= 1.0).sum())} of {ends.size} within the rounding\n"
+    )
     for index in np.flatnonzero(np.abs(ends) > 1.0):
         table, t, component = np.unravel_index(index, printed.shape)
         off = ends[index] * ROUNDING[component]

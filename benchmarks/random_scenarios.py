@@ -1,10 +1,12 @@
-"""Random scenarios of the guaranteed model: every sensor, fast and slow, near and far, with and without a Sun.
+"""Random scenarios of the guaranteed model: every sensor, fast and slow, near and far, with and
+without a Sun.
 
     from benchmarks.random_scenarios import camera_scenario, gravity_scenario, random_scenario
     scenario = random_scenario(7, rate_sensor=True)
     scenario = camera_scenario(7)
 
-The same number gives the same scenario. Every scenario is valid: it is written as a scenario file and read again.
+The same number gives the same scenario. Every scenario is valid: it is written as a scenario file
+and read again.
 """
 
 from __future__ import annotations
@@ -38,12 +40,15 @@ STRATEGIES = ("symmetric-miss", "patient")
 
 
 def random_scenario(number: int, *, rate_sensor: bool) -> Scenario:
-    """Return the random scenario with a number, with or without a rate sensor; about half have a range sensor.
+    """Return the random scenario with a number, with or without a rate sensor; about half have a
+    range sensor.
 
-    Speeds are 1 to 100 km/s, steps 0.01 to 10 s and 16 to 126 of them, angle errors 1e-6 to 1e-2 rad, sections 3 to
-    500.
+    Speeds are 1 to 100 km/s, steps 0.01 to 10 s and 16 to 126 of them, angle errors 1e-6 to 1e-2
+    rad, sections 3 to 500.
     """
-    generator = np.random.default_rng(np.random.SeedSequence(entropy=18, spawn_key=(number, int(rate_sensor))))
+    generator = np.random.default_rng(
+        np.random.SeedSequence(entropy=18, spawn_key=(number, int(rate_sensor)))
+    )
     while True:
         try:
             scenario = _drawn(generator, number, rate_sensor)
@@ -53,11 +58,12 @@ def random_scenario(number: int, *, rate_sensor: bool) -> Scenario:
 
 
 def gravity_scenario(number: int) -> Scenario:
-    """Return the random scenario with a number, in strong gravity of a planet, a star or a body between.
+    """Return the random scenario with a number, in strong gravity of a planet, a star or a body
+    between.
 
-    The range is 0.3 % to 90 % of the distance from the attractor, and the speed 0.5 to 100 times that of the orbit. In
-    a third of the scenarios the target starts near the attractor, and is up to 1000 times as fast. One of two is in
-    space.
+    The range is 0.3 % to 90 % of the distance from the attractor, and the speed 0.5 to 100 times
+    that of the orbit. In a third of the scenarios the target starts near the attractor, and is up
+    to 1000 times as fast. One of two is in space.
 
     Raises
     ------
@@ -70,17 +76,25 @@ def gravity_scenario(number: int) -> Scenario:
         return float(10.0 ** generator.uniform(minimum, maximum))
 
     scenario = random_scenario(number, rate_sensor=number % 8 == 5)
-    parameter, distance_m = power(13.5, 20.2), power(6.9, 11.2)
-    direction, elevation = generator.uniform(-np.pi, np.pi), generator.uniform(-1.5, 1.5)
-    range_m, speed = distance_m * power(-2.5, -0.05), power(-0.3, 2.0)
+    parameter = power(13.5, 20.2)
+    distance_m = power(6.9, 11.2)
+    direction = generator.uniform(-np.pi, np.pi)
+    elevation = generator.uniform(-1.5, 1.5)
+    range_m = distance_m * power(-2.5, -0.05)
+    speed = power(-0.3, 2.0)
     wide = range_m * power(-4.0, -2.0)
     if number % 3 == 0:
-        range_m, speed = distance_m * (1.0 - power(-3.0, -0.3)), power(1.0, 3.0)
-        direction, elevation = power(-4.0, -0.3), power(-4.0, -0.3)
+        range_m = distance_m * (1.0 - power(-3.0, -0.3))
+        speed = power(1.0, 3.0)
+        direction = power(-4.0, -0.3)
+        elevation = power(-4.0, -0.3)
         wide = (distance_m - range_m) * power(-4.0, -1.0)
     speed_m_s = min(float(np.sqrt(parameter / distance_m)) * speed, 3e5)
-    flight_s, fast = range_m / speed_m_s, speed_m_s * power(-4.0, -2.0)
-    step_s, axial, along = flight_s / float(generator.integers(30, 200)), power(-1.0, 0.0), power(-5.0, -1.5)
+    flight_s = range_m / speed_m_s
+    fast = speed_m_s * power(-4.0, -2.0)
+    step_s = flight_s / float(generator.integers(30, 200))
+    axial = power(-1.0, 0.0)
+    along = power(-5.0, -1.5)
     is_spatial = number % 2 == 1
     box = StateBox(
         z_m=(-wide, wide),
@@ -102,7 +116,8 @@ def gravity_scenario(number: int) -> Scenario:
         sections=min(scenario.set_model.sections, 29),
         fewest_sections=3,
     )
-    ranging, rates = scenario.range_sensor, scenario.rate_sensor
+    ranging = scenario.range_sensor
+    rates = scenario.rate_sensor
     scenario = replace(
         scenario,
         name=f"gravity-{number}",
@@ -113,17 +128,20 @@ def gravity_scenario(number: int) -> Scenario:
         range_sensor=None if ranging is None else replace(ranging, period_s=step_s),
         rate_sensor=None if rates is None else replace(rates, period_s=step_s),
         target=None,
-        thruster=Thruster(30.0 * impulse_m_s, 0.01 * impulse_m_s, impulse_m_s, execution_error_relative=0.01),
+        thruster=Thruster(
+            30.0 * impulse_m_s, 0.01 * impulse_m_s, impulse_m_s, execution_error_relative=0.01
+        ),
     )
     on_board_model(scenario)
     return scenario
 
 
 def camera_scenario(number: int) -> Scenario:
-    """Return the random scenario with a number, with a camera; two of three are in space, one in eight has rates.
+    """Return the random scenario with a number, with a camera; two of three are in space, one in
+    eight has rates.
 
-    The centroid error is a tenth of the range threshold, or less. The bias, the first and the last image, and the
-    probability of a lost image are random.
+    The centroid error is a tenth of the range threshold, or less. The bias, the first and the last
+    image, and the probability of a lost image are random.
     """
     generator = np.random.default_rng(np.random.SeedSequence(entropy=22, spawn_key=(number,)))
     scenario = random_scenario(number, rate_sensor=number % 8 == 5)
@@ -131,7 +149,8 @@ def camera_scenario(number: int) -> Scenario:
     def often(share: float) -> bool:
         return bool(generator.uniform() < share)
 
-    model, arrival_s = scenario.set_model, scenario.nominal_arrival_s
+    model = scenario.set_model
+    arrival_s = scenario.nominal_arrival_s
     centroid_m = 0.1 * model.range_threshold_m * float(10.0 ** -abs(generator.normal(0.0, 1.0)))
     last_s = arrival_s * float(10.0 ** generator.uniform(-2.5, -0.7)) if often(0.5) else 0.0
     first_s = last_s + (arrival_s - last_s) * float(generator.uniform(0.3, 1.1))
@@ -154,19 +173,28 @@ def camera_scenario(number: int) -> Scenario:
 
     dispersion = in_space(scenario.dispersion)
     # The box contains the dispersion, which is smaller than the box of z in some scenarios.
-    known = replace(in_space(model.bounds), y_m=(-model.bounds.z_m[1] * max(scale, 1.0), model.bounds.z_m[1]))
-    known = replace(known, vy_m_s=(-model.bounds.vz_m_s[1], model.bounds.vz_m_s[1] * max(scale, 1.0)))
+    known = replace(
+        in_space(model.bounds), y_m=(-model.bounds.z_m[1] * max(scale, 1.0), model.bounds.z_m[1])
+    )
+    known = replace(
+        known, vy_m_s=(-model.bounds.vz_m_s[1], model.bounds.vz_m_s[1] * max(scale, 1.0))
+    )
     thruster = replace(scenario.thruster, pointing_error_rad=float(generator.choice([0.0, 0.02])))
     spatial = replace(model, bounds=known, angle_sensor=sensor)
     return replace(scenario, **of_model(spatial), dispersion=dispersion, thruster=thruster)
 
 
 def scheduled(scenario: Scenario, number: int) -> Scenario:
-    """Return the scenario with a random delay of up to three steps, and a cut-off or up to five times of impulses."""
+    """Return the scenario with a random delay of up to three steps, and a cut-off or up to five
+    times of impulses.
+    """
     generator = np.random.default_rng(np.random.SeedSequence(entropy=23, spawn_key=(number,)))
-    arrival_s, step_s = scenario.nominal_arrival_s, scenario.set_model.step_s
+    arrival_s = scenario.nominal_arrival_s
+    step_s = scenario.set_model.step_s
     delay = int(generator.integers(4))
-    times_s = tuple(sorted(generator.uniform(0.02, 0.8, int(generator.integers(6))) * arrival_s, reverse=True))
+    times_s = tuple(
+        sorted(generator.uniform(0.02, 0.8, int(generator.integers(6))) * arrival_s, reverse=True)
+    )
     last_s = arrival_s * float(10.0 ** generator.uniform(-2.5, -0.5))
     thruster = replace(scenario.thruster, delay_steps=delay)
     schedules: tuple[dict[str, Any], ...] = {"impulses_s": times_s}, {"last_impulse_s": last_s}
@@ -185,11 +213,15 @@ def _drawn(generator: np.random.Generator, number: int, rate_sensor: bool) -> Sc
     def often(share: float) -> bool:
         return bool(generator.uniform() < share)
 
-    speed_m_s, steps, step_s = 1e3 * decades(0.0, 2.0), decades(1.2, 2.1), decades(-2.0, 1.0)
+    speed_m_s = 1e3 * decades(0.0, 2.0)
+    steps = decades(1.2, 2.1)
+    step_s = decades(-2.0, 1.0)
     flight_s = steps * step_s
     range_m = speed_m_s * flight_s
-    z_m, vz_m_s = range_m * decades(-4.0, -1.3), speed_m_s * decades(-5.5, -2.5)
-    spread, speed_error = decades(-2.5, -1.0), 0.0 if often(0.1) else decades(-5.0, -1.0)
+    z_m = range_m * decades(-4.0, -1.3)
+    vz_m_s = speed_m_s * decades(-5.5, -2.5)
+    spread = decades(-2.5, -1.0)
+    speed_error = 0.0 if often(0.1) else decades(-5.0, -1.0)
     bounds = StateBox(
         (-z_m, z_m),
         (range_m * (1.0 - spread), range_m * (1.0 + spread)),
@@ -221,10 +253,14 @@ def _drawn(generator: np.random.Generator, number: int, rate_sensor: bool) -> Sc
     )
     sun = None
     if often(0.6):
-        sun = Sun(SOLAR_PARAMETER_M3_S2, decades(10.3, 11.3), float(generator.uniform(0.0, 2.0 * np.pi)))
+        sun = Sun(
+            SOLAR_PARAMETER_M3_S2, decades(10.3, 11.3), float(generator.uniform(0.0, 2.0 * np.pi))
+        )
     dispersion = bounds
     if often(0.3):
-        dispersion = replace(bounds, z_m=(-0.5 * z_m, 0.5 * z_m), vz_m_s=(-0.5 * vz_m_s, 0.5 * vz_m_s))
+        dispersion = replace(
+            bounds, z_m=(-0.5 * z_m, 0.5 * z_m), vz_m_s=(-0.5 * vz_m_s, 0.5 * vz_m_s)
+        )
     rate_error_rad_s = error_rad / step_s * decades(-2.5, 0.5)
     kinds = [manoeuvre for manoeuvre in Manoeuvre if manoeuvre is not Manoeuvre.NONE]
     return Scenario(
@@ -234,13 +270,18 @@ def _drawn(generator: np.random.Generator, number: int, rate_sensor: bool) -> Sc
         nominal_range_m=range_m,
         dispersion=dispersion,
         **of_model(model),
-        range_sensor=RangeSensor(step_s * int(generator.integers(1, 5)), decades(-3.0, -0.5)) if often(0.5) else None,
+        range_sensor=RangeSensor(step_s * int(generator.integers(1, 5)), decades(-3.0, -0.5))
+        if often(0.5)
+        else None,
         thruster=thruster,
         strategy=STRATEGIES[int(generator.integers(len(STRATEGIES)))],
-        # Draws contain tie choices only with this noise; `soundness` uses them as additional random numbers.
+        # Draws contain tie choices only with this noise; `soundness` uses them as additional random
+        # numbers.
         noise=NoiseKind.GAME,
         tie=TieRule.RANDOM,
-        rate_sensor=RateSensor(step_s * int(generator.integers(1, 4)), rate_error_rad_s) if rate_sensor else None,
+        rate_sensor=RateSensor(step_s * int(generator.integers(1, 4)), rate_error_rad_s)
+        if rate_sensor
+        else None,
         target=(
             Target(kinds[int(generator.integers(len(kinds)))], disturbance_m_s2, 0.1 * flight_s)
             if disturbance_m_s2 > 0.0 and often(0.7)

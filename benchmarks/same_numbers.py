@@ -1,8 +1,10 @@
-"""Compare every number that the commands write, between two checkouts: `python -m benchmarks.same_numbers OLD NEW`.
+"""Compare every number that the commands write, between two checkouts: `python -m
+benchmarks.same_numbers OLD NEW`.
 
-Each command runs in both checkouts with ``--json``, with the built-in scenarios and problems and fixed seeds. The
-script prints the keys that only one checkout writes, and for each number that differs the largest relative difference.
-The exit code is 1 if a number differs by more than ``--tolerance``. Times (``elapsed_s``) and versions are left out.
+Each command runs in both checkouts with ``--json``, with the built-in scenarios and problems and
+fixed seeds. The script prints the keys that only one checkout writes, and for each number that
+differs the largest relative difference. The exit code is 1 if a number differs by more than
+``--tolerance``. Times (``elapsed_s``) and versions are left out.
 """
 
 from __future__ import annotations
@@ -28,8 +30,14 @@ COMMANDS = (
     "bound asteroid-1997 --model paper",
     "adversary --strategy symmetric-miss --budget 200 --model paper",
     "campaign --noise mixed --runs 400 --model paper --out DIR",
-    "sweep --vary angle_sensor.error_at_nominal_range_rad=0.5e-4:5e-4:3 --runs 50 --model paper --out DIR",
-    "reach rendezvous-2021 --select energy,l1,norms,peak,chebyshev,analytic,vertices,samples:5 --replan",
+    (
+        "sweep --vary angle_sensor.error_at_nominal_range_rad=0.5e-4:5e-4:3 --runs 50 --model "
+        "paper --out DIR"
+    ),
+    (
+        "reach rendezvous-2021 --select "
+        "energy,l1,norms,peak,chebyshev,analytic,vertices,samples:5 --replan"
+    ),
     "reach rendezvous-16-periods",
     "reach approach-cone",
     "pareto pareto-2008 --prefer x_m=0,z_m=50",
@@ -51,7 +59,9 @@ def numbers_of(checkout: Path, command: str) -> object:
     """Run a command in an empty folder and return what it writes as JSON."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "numbers.json"
-        arguments = [str(Path(folder) / "out") if word == "DIR" else word for word in command.split()]
+        arguments = [
+            str(Path(folder) / "out") if word == "DIR" else word for word in command.split()
+        ]
         line = [sys.executable, "-m", "infoset", *arguments, "--json", str(file), "--quiet"]
         done = subprocess.run(
             line,
@@ -67,13 +77,19 @@ def numbers_of(checkout: Path, command: str) -> object:
 
 
 def differences(old: object, new: object, path: str = "") -> Iterator[tuple[str, object, object]]:
-    """Yield the key path and both values of everything that differs; all items of a list have the same path."""
+    """Yield the key path and both values of everything that differs; all items of a list have the
+    same path.
+    """
     if isinstance(old, dict) and isinstance(new, dict):
         for key in (*old, *(key for key in new if key not in old)):
             if key in IGNORED:
                 continue
             if key not in old or key not in new:
-                yield f"{path}.{key}", "written" if key in old else "-", "written" if key in new else "-"
+                yield (
+                    f"{path}.{key}",
+                    "written" if key in old else "-",
+                    "written" if key in new else "-",
+                )
             else:
                 yield from differences(old[key], new[key], f"{path}.{key}")
     elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
@@ -84,7 +100,9 @@ def differences(old: object, new: object, path: str = "") -> Iterator[tuple[str,
 
 
 def relative(old: object, new: object) -> float:
-    """Return the relative difference of two numbers, and infinity for anything else that differs."""
+    """Return the relative difference of two numbers, and infinity for anything else that
+    differs.
+    """
     if isinstance(old, int | float) and isinstance(new, int | float) and not isinstance(old, bool):
         return abs(old - new) / max(abs(old), abs(new))
     return float("inf")
@@ -92,7 +110,9 @@ def relative(old: object, new: object) -> float:
 
 def main() -> None:
     """Compare two checkouts command by command."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("old", type=Path)
     parser.add_argument("new", type=Path)
     parser.add_argument("--tolerance", type=float, default=0.0)
@@ -102,7 +122,9 @@ def main() -> None:
     for command in COMMANDS:
         if not command.startswith(options.only):
             continue
-        before_all, after_all = (numbers_of(checkout.resolve(), command) for checkout in (options.old, options.new))
+        before_all, after_all = (
+            numbers_of(checkout.resolve(), command) for checkout in (options.old, options.new)
+        )
         largest: dict[str, tuple[float, object, object]] = {}
         for path, before, after in differences(before_all, after_all):
             size = relative(before, after)

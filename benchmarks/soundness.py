@@ -1,18 +1,20 @@
-"""Test the guaranteed model: simulate all kinds of noise with starts in all of B x D, and count violations.
+"""Test the guaranteed model: simulate all kinds of noise with starts in all of B x D, and count
+violations.
 
-    python -m benchmarks.soundness --engagements 200000
-    python -m benchmarks.soundness --engagements 200000 --hostile      # execution errors of 2 %, a manoeuvring target
-    python -m benchmarks.soundness --engagements 200000 --random rate  # random scenarios, each with a rate sensor
-    python -m benchmarks.soundness --engagements 100000 --random       # random scenarios without one
-    python -m benchmarks.soundness --engagements 200000 --space        # out of the plane, Sun anywhere
-    python -m benchmarks.soundness --engagements 40000 --camera        # random scenarios with a camera
-    python -m benchmarks.soundness --engagements 40000 --camera scheduled  # with a cut-off or times of impulses
-    python -m benchmarks.soundness --engagements 20000 --gravity       # random scenarios in strong gravity
+    python -m benchmarks.soundness --engagements 200000 python -m benchmarks.soundness --engagements
+    200000 --hostile      # execution errors of 2 %, a manoeuvring target python -m
+    benchmarks.soundness --engagements 200000 --random rate  # random scenarios, each with a rate
+    sensor python -m benchmarks.soundness --engagements 100000 --random       # random scenarios
+    without one python -m benchmarks.soundness --engagements 200000 --space        # out of the
+    plane, Sun anywhere python -m benchmarks.soundness --engagements 40000 --camera        # random
+    scenarios with a camera python -m benchmarks.soundness --engagements 40000 --camera scheduled  #
+    with a cut-off or times of impulses python -m benchmarks.soundness --engagements 20000 --gravity
+    # random scenarios in strong gravity
 
-Counted are engagements whose true state left its section (by any amount), whose set was lost, whose true miss exceeded
-Phi, and those without a Phi. All counts must be zero; a warning ends the run. Scenarios whose gravity has no bound are
-refused before the flight, and counted apart. A batch has all kinds of noise, the true
-motion is Keplerian, and V_x is anywhere in D.
+Counted are engagements whose true state left its section (by any amount), whose set was lost, whose
+true miss exceeded Phi, and those without a Phi. All counts must be zero; a warning ends the run.
+Scenarios whose gravity has no bound are refused before the flight, and counted apart. A batch has
+all kinds of noise, the true motion is Keplerian, and V_x is anywhere in D.
 """
 
 from __future__ import annotations
@@ -27,10 +29,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.random_scenarios import camera_scenario, gravity_scenario, random_scenario, scheduled
+from benchmarks.random_scenarios import (
+    camera_scenario,
+    gravity_scenario,
+    random_scenario,
+    scheduled,
+)
 from infoset import AngleSensor, InformationSetView, InitialSet, Model, RateSensor
 from infoset.experiments.interception.scenario_file import load_scenario
-from infoset.guidance import GameNoise, LineOfSight, MeasurementNoise, NoiseKind, RandomNoise, TieRule
+from infoset.guidance import (
+    GameNoise,
+    LineOfSight,
+    MeasurementNoise,
+    NoiseKind,
+    RandomNoise,
+    TieRule,
+)
 from infoset.sim import Manoeuvre, Outcome, Scenario, Target
 from infoset.sim.bound.pair_flight import middle
 from infoset.sim.draws import Draws, draw
@@ -39,12 +53,23 @@ from infoset.sim.scenario import of_model
 
 Floats = NDArray[np.float64]
 BATCH, SPACE_BATCH = 80, 160
-KINDS = ("random", "game, upper", "game, lower", "game, alternate", "game, random", "extremal", "constant", "pair")
+KINDS = (
+    "random",
+    "game, upper",
+    "game, lower",
+    "game, alternate",
+    "game, random",
+    "extremal",
+    "constant",
+    "pair",
+)
 
 
 @dataclass(frozen=True)
 class BoundedPairNoise:
-    """Noise of pairs: engagements 2 k and 2 k + 1 both measure their mean, within the bounds of each."""
+    """Noise of pairs: engagements 2 k and 2 k + 1 both measure their mean, within the bounds of
+    each.
+    """
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> dict[str, Floats]:
         """Measure the mean of both engagements of a pair."""
@@ -52,13 +77,17 @@ class BoundedPairNoise:
         for name, sensor in sight.sensors.items():
             true = sensor.true_value(sight)
             wanted = sight.alpha_rad if name == "angle" else true
-            measured[name] = true.copy() if name == "range" else sensor.nearest(sight, middle(wanted))
+            measured[name] = (
+                true.copy() if name == "range" else sensor.nearest(sight, middle(wanted))
+            )
         return measured
 
 
 @dataclass(frozen=True)
 class MixedNoise:
-    """Noise of different kinds in one batch; engagements 2 k and 2 k + 1 have kind k modulo the number of kinds."""
+    """Noise of different kinds in one batch; engagements 2 k and 2 k + 1 have kind k modulo the
+    number of kinds.
+    """
 
     parts: tuple[MeasurementNoise, ...]
 
@@ -66,7 +95,10 @@ class MixedNoise:
         """Measure with all kinds, and choose that of each engagement."""
         kind = kind_of(sight.range_m.size)
         measurements = [part.measure(sight, predicted) for part in self.parts]
-        return {name: np.choose(kind, [measured[name] for measured in measurements]) for name in sight.sensors}
+        return {
+            name: np.choose(kind, [measured[name] for measured in measurements])
+            for name in sight.sensors
+        }
 
 
 def kind_of(batch: int) -> NDArray[np.int64]:
@@ -85,7 +117,10 @@ def every_noise(draws: Draws) -> MixedNoise:
     return MixedNoise(
         (
             RandomNoise(draws.errors, draws.bias),
-            *(GameNoise(tie, draws.tie) for tie in (TieRule.UPPER, TieRule.LOWER, TieRule.ALTERNATE, TieRule.RANDOM)),
+            *(
+                GameNoise(tie, draws.tie)
+                for tie in (TieRule.UPPER, TieRule.LOWER, TieRule.ALTERNATE, TieRule.RANDOM)
+            ),
             RandomNoise({**extremal, "angle": signs}),
             RandomNoise({**constants, "angle": constant}),
             BoundedPairNoise(),
@@ -94,14 +129,19 @@ def every_noise(draws: Draws) -> MixedNoise:
 
 
 def in_space(scenario: Scenario, number: int) -> Scenario:
-    """Return the scenario out of the plane: another y axis and direction of the Sun for every number."""
+    """Return the scenario out of the plane: another y axis and direction of the Sun for every
+    number.
+    """
     random = np.random.default_rng(np.random.SeedSequence(entropy=21, spawn_key=(number,)))
-    model, sun = scenario.set_model, scenario.sun
+    model = scenario.set_model
+    sun = scenario.sun
     sensor = model.angle_sensor
     assert isinstance(sensor, AngleSensor)
     if random.uniform() < 0.25:  # a bound that rises with range
         swapped = sensor.error_at_zero_range_rad, sensor.error_at_nominal_range_rad
-        sensor = replace(sensor, error_at_nominal_range_rad=swapped[0], error_at_zero_range_rad=swapped[1])
+        sensor = replace(
+            sensor, error_at_nominal_range_rad=swapped[0], error_at_zero_range_rad=swapped[1]
+        )
     differ = random.uniform() < 0.5
     sensor = replace(
         sensor,
@@ -116,7 +156,8 @@ def in_space(scenario: Scenario, number: int) -> Scenario:
         vy_m_s=(-100.0, float(widths[1]) * 100.0),
     )
     if sun is not None:
-        direction, height = random.uniform(-np.pi, np.pi), random.uniform(-1.0, 1.0)
+        direction = random.uniform(-np.pi, np.pi)
+        height = random.uniform(-1.0, 1.0)
         sun = replace(sun, direction_rad=float(direction), elevation_rad=float(np.arcsin(height)))
     known = replace(model, bounds=bounds, angle_sensor=sensor)
     return replace(scenario, sun=sun, dispersion=bounds, **of_model(known))
@@ -125,8 +166,15 @@ def in_space(scenario: Scenario, number: int) -> Scenario:
 def guaranteed(scenario: Scenario, hostile: bool) -> Scenario:
     """Return the scenario with the guaranteed model and starts anywhere in B x D."""
     model = replace(scenario.set_model, model=Model.GUARANTEED, initial_set=InitialSet.BOX)
-    # Draws contain tie choices only with this noise; they are used as additional random numbers here.
-    scenario = replace(scenario, **of_model(model), dispersion=model.bounds, noise=NoiseKind.GAME, tie=TieRule.RANDOM)
+    # Draws contain tie choices only with this noise; they are used as additional random numbers
+    # here.
+    scenario = replace(
+        scenario,
+        **of_model(model),
+        dispersion=model.bounds,
+        noise=NoiseKind.GAME,
+        tie=TieRule.RANDOM,
+    )
     if not hostile:
         return scenario
     target = Target(Manoeuvre.WORST_CASE, model.disturbance_m_s2)
@@ -147,7 +195,9 @@ class Count:
     refused: int = 0
 
     def __add__(self, other: Count) -> Count:
-        return Count(*(a + b for a, b in zip(vars(self).values(), vars(other).values(), strict=True)))
+        return Count(
+            *(a + b for a, b in zip(vars(self).values(), vars(other).values(), strict=True))
+        )
 
 
 def fly(scenario: Scenario, first: int, batch: int, seed: int) -> Count:
@@ -177,12 +227,20 @@ def fly(scenario: Scenario, first: int, batch: int, seed: int) -> Count:
 
 def scenarios(hostile: bool) -> list[Scenario]:
     """Return the built-in scenarios, without and with the range sensor."""
-    built_in = [guaranteed(load_scenario(name), hostile) for name in ("asteroid-1997", "comet-fast")]
-    return [replace(scenario, range_sensor=sensor) for scenario in built_in for sensor in (None, scenario.range_sensor)]
+    built_in = [
+        guaranteed(load_scenario(name), hostile) for name in ("asteroid-1997", "comet-fast")
+    ]
+    return [
+        replace(scenario, range_sensor=sensor)
+        for scenario in built_in
+        for sensor in (None, scenario.range_sensor)
+    ]
 
 
 def fly_batch(number: int, hostile: bool, seed: int) -> Count:
-    """Simulate batch `number`: one in eight is of the comet, which takes three times as many steps."""
+    """Simulate batch `number`: one in eight is of the comet, which takes three times as many
+    steps.
+    """
     built_in = scenarios(hostile)
     often = [scenario for scenario in built_in if scenario.name == "asteroid-1997"]
     rarely = [scenario for scenario in built_in if scenario.name != "asteroid-1997"]
@@ -205,17 +263,28 @@ def fly_space_batch(number: int, hostile: bool, seed: int) -> Count:
 
 def fly_random_batch(number: int, rate_sensor: bool, seed: int) -> Count:
     """Simulate batch `number`, which has a random scenario."""
-    return fly(random_scenario(seed * 1_000_000 + number, rate_sensor=rate_sensor), number * BATCH, BATCH, seed)
+    return fly(
+        random_scenario(seed * 1_000_000 + number, rate_sensor=rate_sensor),
+        number * BATCH,
+        BATCH,
+        seed,
+    )
 
 
 def fly_camera_batch(number: int, seed: int, *, has_schedule: bool = False) -> Count:
-    """Simulate batch `number`, which has a random scenario with a camera, and a random schedule of impulses."""
+    """Simulate batch `number`, which has a random scenario with a camera, and a random schedule of
+    impulses.
+    """
     scenario = camera_scenario(seed * 1_000_000 + number)
-    return fly(scheduled(scenario, number) if has_schedule else scenario, number * BATCH, BATCH, seed)
+    return fly(
+        scheduled(scenario, number) if has_schedule else scenario, number * BATCH, BATCH, seed
+    )
 
 
 def fly_gravity_batch(number: int, seed: int) -> Count:
-    """Simulate batch `number`, which has a random scenario in strong gravity, unless that is refused."""
+    """Simulate batch `number`, which has a random scenario in strong gravity, unless that is
+    refused.
+    """
     try:
         scenario = gravity_scenario(seed * 1_000_000 + number)
     except ValueError:
@@ -225,16 +294,26 @@ def fly_gravity_batch(number: int, seed: int) -> Count:
 
 def main() -> None:
     """Simulate, count and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--engagements", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--hostile", action="store_true", help="execution errors of 2 %% and a manoeuvring target")
-    parser.add_argument("--random", nargs="?", const="plain", choices=("plain", "rate"), help="random scenarios")
+    parser.add_argument(
+        "--hostile", action="store_true", help="execution errors of 2 %% and a manoeuvring target"
+    )
+    parser.add_argument(
+        "--random", nargs="?", const="plain", choices=("plain", "rate"), help="random scenarios"
+    )
     parser.add_argument("--space", action="store_true", help="out of the plane")
     kinds = ("plain", "scheduled")
-    parser.add_argument("--camera", nargs="?", const="plain", choices=kinds, help="random scenarios with a camera")
+    parser.add_argument(
+        "--camera", nargs="?", const="plain", choices=kinds, help="random scenarios with a camera"
+    )
     parser.add_argument("--gravity", action="store_true", help="random scenarios in strong gravity")
-    parser.add_argument("--first", type=int, default=0, metavar="BATCH", help="number of the first batch")
+    parser.add_argument(
+        "--first", type=int, default=0, metavar="BATCH", help="number of the first batch"
+    )
     parser.add_argument("--workers", type=int, default=1)
     options = parser.parse_args()
     warnings.simplefilter("error")
@@ -246,13 +325,17 @@ def main() -> None:
         if options.camera:
             has_schedule = options.camera == "scheduled"
             jobs = [
-                pool.submit(fly_camera_batch, number, options.seed, has_schedule=has_schedule) for number in numbers
+                pool.submit(fly_camera_batch, number, options.seed, has_schedule=has_schedule)
+                for number in numbers
             ]
         elif options.gravity:
             jobs = [pool.submit(fly_gravity_batch, number, options.seed) for number in numbers]
         elif options.random is None:
             fly_one_batch = fly_space_batch if options.space else fly_batch
-            jobs = [pool.submit(fly_one_batch, number, options.hostile, options.seed) for number in numbers]
+            jobs = [
+                pool.submit(fly_one_batch, number, options.hostile, options.seed)
+                for number in numbers
+            ]
         else:
             rate = options.random == "rate"
             jobs = [pool.submit(fly_random_batch, number, rate, options.seed) for number in numbers]

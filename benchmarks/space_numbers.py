@@ -3,8 +3,9 @@
     python -m benchmarks.space_numbers --runs 9000 --game-runs 3000
     python -m benchmarks.space_numbers --cost
 
-The runs of a row are divided among three seeds. A standard error is that of a bootstrap over the runs. `--cost` prints
-the processor time of a spatial engagement over that of a planar one, both measured in turn in one process.
+The runs of a row are divided among three seeds. A standard error is that of a bootstrap over the
+runs. `--cost` prints the processor time of a spatial engagement over that of a planar one, both
+measured in turn in one process.
 """
 
 from __future__ import annotations
@@ -34,7 +35,9 @@ RESAMPLES = 400
 def in_model(scenario: Scenario, model: Model) -> Scenario:
     """Return the scenario with a model of the set, and the initial set of that model."""
     shape = InitialSet.BOX if model is Model.GUARANTEED else InitialSet.RECTANGLE
-    return replace(scenario, **of_model(replace(scenario.set_model, model=model, initial_set=shape)))
+    return replace(
+        scenario, **of_model(replace(scenario.set_model, model=model, initial_set=shape))
+    )
 
 
 def rows() -> Iterator[tuple[str, Scenario]]:
@@ -67,7 +70,9 @@ def with_error(values: Floats, level: float, random: np.random.Generator) -> str
 
 
 def line(title: str, results: Results) -> str:
-    """Return a row: quantiles of miss and impulse, and the share of runs with the true state always in the set."""
+    """Return a row: quantiles of miss and impulse, and the share of runs with the true state always
+    in the set.
+    """
     random = np.random.default_rng(0)
     miss, impulse = (
         " / ".join(with_error(values, level, random) for level in LEVELS)
@@ -76,7 +81,8 @@ def line(title: str, results: Results) -> str:
     known = results.guaranteed_miss_m.compressed() if results.guarantees else np.empty(0)
     phi = f", median Phi {with_error(known, 0.5, random)} m" if len(known) else ""
     return (
-        f"{title} ({len(results)}): miss {miss} m, impulse {impulse} m/s, inside {results.truth_kept.mean():.1%}{phi}"
+        f"{title} ({len(results)}): miss {miss} m, impulse {impulse} m/s, inside "
+        f"{results.truth_kept.mean():.1%}{phi}"
     )
 
 
@@ -90,7 +96,9 @@ def cost(runs: int) -> Iterator[str]:
     planar, spatial = (load_scenario(name) for name in ("asteroid-1997", "asteroid-1997-space"))
     for model in Model:
         for noise in (NoiseKind.RANDOM, NoiseKind.GAME):
-            pair = [replace(in_model(scenario, model), noise=noise) for scenario in (planar, spatial)]
+            pair = [
+                replace(in_model(scenario, model), noise=noise) for scenario in (planar, spatial)
+            ]
             times: list[list[float]] = [[], []]
             for _ in range(6):
                 for scenario, taken in zip(pair, times, strict=True):
@@ -98,22 +106,37 @@ def cost(runs: int) -> Iterator[str]:
                     simulate(scenario, runs, seed=1)
                     taken.append(time.process_time() - began)
             plane, space = (1e3 * min(taken) / runs for taken in times)
-            yield f"{model.value}, {noise.value}: {plane:.2f} and {space:.2f} ms, ratio {space / plane:.2f}"
+            yield (
+                f"{model.value}, {noise.value}: {plane:.2f} and {space:.2f} ms, ratio "
+                f"{space / plane:.2f}"
+            )
 
 
 def main() -> None:
     """Simulate and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--runs", type=int, default=900, help="runs of a row with random noise")
     parser.add_argument("--game-runs", type=int, default=300, help="runs of a row with game noise")
-    parser.add_argument("--only", default="", metavar="TEXT", help="only rows whose title begins with this text")
-    parser.add_argument("--cost", action="store_true", help="print only the cost of the second axis")
+    parser.add_argument(
+        "--only", default="", metavar="TEXT", help="only rows whose title begins with this text"
+    )
+    parser.add_argument(
+        "--cost", action="store_true", help="print only the cost of the second axis"
+    )
     options = parser.parse_args()
     if options.cost:
         lines = cost(200)
     else:
         lines = (
-            line(title, flown(scenario, options.game_runs if scenario.noise is NoiseKind.GAME else options.runs))
+            line(
+                title,
+                flown(
+                    scenario,
+                    options.game_runs if scenario.noise is NoiseKind.GAME else options.runs,
+                ),
+            )
             for title, scenario in rows()
             if title.startswith(options.only)
         )

@@ -1,9 +1,11 @@
-"""Print the miss of all strategies with square-wave errors: always at the bound, with sign changes at fixed times.
+"""Print the miss of all strategies with square-wave errors: always at the bound, with sign changes
+at fixed times.
 
     python benchmarks/square_wave_errors.py --model guaranteed --runs 50
 
-The table has a row for each strategy: median and maximum miss and impulse over the starts, with the worst square wave
-of each start (half-periods from one measurement to the whole flight, both signs). Range sensors measure without error.
+The table has a row for each strategy: median and maximum miss and impulse over the starts, with the
+worst square wave of each start (half-periods from one measurement to the whole flight, both signs).
+Range sensors measure without error.
 """
 
 from __future__ import annotations
@@ -26,11 +28,16 @@ HALF_PERIODS = (1, 2, 3, 4, 6, 10, 20, 40, 80, 1000)
 """Half-periods in steps; the last one is a constant bias."""
 
 
-def worst(scenario: Scenario, name: str, runs: int, seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the maximum miss (m) and the maximum impulse (m/s) of each start over all square waves."""
+def worst(
+    scenario: Scenario, name: str, runs: int, seed: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the maximum miss (m) and the maximum impulse (m/s) of each start over all square
+    waves.
+    """
     draws = draw(scenario, range(runs), seed)
     steps = draws.steps
-    misses, impulses = [], []
+    misses = []
+    impulses = []
     for half_period in HALF_PERIODS:
         wave = np.where(np.arange(steps) // half_period % 2 == 0, 1.0, -1.0)
         for sign in (1.0, -1.0):

@@ -1,4 +1,6 @@
-"""Campaigns: time of storing, gain of a second thread or process, and memory as a function of the number of runs."""
+"""Campaigns: time of storing, gain of a second thread or process, and memory as a function of the
+number of runs.
+"""
 
 from __future__ import annotations
 
@@ -77,8 +79,8 @@ def peak_mb(code: str, *arguments: object) -> float:
 def times_as_long(work: Work, other: Work, folder: Path) -> float:
     """Return the median over rounds of the ratio of two times.
 
-    Both are measured in every round, because the speed of a machine varies, and their order alternates. Both functions
-    get an empty folder.
+    Both are measured in every round, because the speed of a machine varies, and their order
+    alternates. Both functions get an empty folder.
     """
 
     def seconds(function: Work, empty: Path) -> float:
@@ -99,7 +101,9 @@ def times_as_long(work: Work, other: Work, folder: Path) -> float:
 def test_time_of_storing(curve: Scenario, tmp_path: Path, under: Check) -> None:
     simulate(curve, 64)
     ratio = times_as_long(
-        lambda folder: Campaign(curve, RUNS, folder).run(workers=1), lambda _: simulate(curve, RUNS), tmp_path
+        lambda folder: Campaign(curve, RUNS, folder).run(workers=1),
+        lambda _: simulate(curve, RUNS),
+        tmp_path,
     )
     under(f"campaign of {RUNS} runs compared with simulate, {curve.noise.value}", ratio, 1.1, "x")
 
@@ -132,12 +136,24 @@ def test_two_processes(curve: Scenario, tmp_path: Path, at_least: Check) -> None
 
 def test_memory_does_not_grow_with_the_runs(tmp_path: Path, under: Check) -> None:
     peaks = {runs: peak_mb(_SHORT_FLIGHTS, runs, tmp_path / str(runs)) for runs in (FEW, MANY)}
-    under(f"peak memory of {MANY} short runs compared with {FEW}", peaks[MANY] / peaks[FEW], 1.2, "x")
+    under(
+        f"peak memory of {MANY} short runs compared with {FEW}", peaks[MANY] / peaks[FEW], 1.2, "x"
+    )
     under(f"peak memory of {MANY} short runs", peaks[MANY], 600.0, "MB")
 
 
 def test_memory_of_a_real_campaign(tmp_path: Path, under: Check) -> None:
-    command = ("campaign", "--model", "paper", "--noise", NoiseKind.GAME.value, "-q", "--workers", 1, "--runs")
+    command = (
+        "campaign",
+        "--model",
+        "paper",
+        "--noise",
+        NoiseKind.GAME.value,
+        "-q",
+        "--workers",
+        1,
+        "--runs",
+    )
     few = peak_mb(_COMMAND, *command, 640, "--out", tmp_path / "few")
     many = peak_mb(_COMMAND, *command, FEW, "--out", tmp_path / "many")
     under(f"peak memory of {FEW} runs compared with 640", many / few, 1.2, "x")

@@ -1,7 +1,7 @@
 """Encounters of several spacecraft and visits to several targets: computing time and memory.
 
-Times are processor times, the shortest of several rounds, so that other work on the machine has little effect. Ratios
-are measured in one run.
+Times are processor times, the shortest of several rounds, so that other work on the machine has
+little effect. Ratios are measured in one run.
 """
 
 from __future__ import annotations
@@ -26,7 +26,12 @@ from infoset.rendezvous.multipoint import (
     solve_segments,
 )
 from infoset.rendezvous.pareto import analyse_coalitions, solve_encounter
-from infoset.rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, TimeVaryingMotion, TschaunerHempel
+from infoset.rendezvous.relative_motion import (
+    ClohessyWiltshire,
+    EllipticOrbit,
+    TimeVaryingMotion,
+    TschaunerHempel,
+)
 from tests.rendezvous.multipoint.dense import solve_dense
 
 Floats = NDArray[np.float64]
@@ -61,11 +66,15 @@ def test_pareto(benchmark: BenchmarkFixture, under: Check) -> None:
 
 
 def test_elliptic_motion(under: Check, at_least: Check) -> None:
-    """500 transitions over 2.5 revolutions, and a Gramian over them, in closed form and by collocation of A(t)."""
+    """500 transitions over 2.5 revolutions, and a Gramian over them, in closed form and by
+    collocation of A(t).
+    """
     orbit = EllipticOrbit(RATE, 0.3, 0.4)
     end = 2.5 * 2.0 * np.pi / RATE
-    times, ends = np.linspace(0.0, end, 500), np.full(500, end)
-    closed, collocated = TschaunerHempel(orbit), TimeVaryingMotion(orbit.dynamics)
+    times = np.linspace(0.0, end, 500)
+    ends = np.full(500, end)
+    closed = TschaunerHempel(orbit)
+    collocated = TimeVaryingMotion(orbit.dynamics)
     transitions = best_s(lambda: closed.transition(times, ends), 20)
     under("500 transitions about an ellipse", 1e3 * transitions, 5.0, "ms")
     by_collocation = best_s(lambda: collocated.transition(times, ends), 1)
@@ -76,17 +85,28 @@ def test_elliptic_motion(under: Check, at_least: Check) -> None:
     at_least("the same by collocation, compared with it", by_collocation / gramian, 20.0, "x")
 
 
-def test_segments_and_the_dense_system(benchmark: BenchmarkFixture, under: Check, at_least: Check) -> None:
-    motion, nodes, start = ClohessyWiltshire(RATE), equally_spaced(1000), np.zeros(6)
+def test_segments_and_the_dense_system(
+    benchmark: BenchmarkFixture, under: Check, at_least: Check
+) -> None:
+    motion = ClohessyWiltshire(RATE)
+    nodes = equally_spaced(1000)
+    start = np.zeros(6)
     benchmark.pedantic(solve_segments, args=(motion, 0.0, start, nodes), rounds=20, warmup_rounds=2)
     segments = best_s(lambda: solve_segments(motion, 0.0, start, nodes), 20)
     dense = best_s(lambda: solve_dense(motion, 0.0, start, nodes), 2)
     under("segment solver, N = 1000", 1e3 * segments, 40.0, "ms")
-    at_least("time of the dense system divided by the segment solver, N = 1000", dense / segments, 10.0, "times")
+    at_least(
+        "time of the dense system divided by the segment solver, N = 1000",
+        dense / segments,
+        10.0,
+        "times",
+    )
 
 
 def test_memory_is_linear(under: Check) -> None:
-    motion, start, peaks = ClohessyWiltshire(RATE), np.zeros(6), []
+    motion = ClohessyWiltshire(RATE)
+    start = np.zeros(6)
+    peaks = []
     for count in (1000, 4000):
         nodes = equally_spaced(count)
         solve_segments(motion, 0.0, start, nodes)
@@ -99,8 +119,10 @@ def test_memory_is_linear(under: Check) -> None:
 
 
 def test_time_is_linear(under: Check) -> None:
-    motion, start = ClohessyWiltshire(RATE), np.zeros(6)
-    few, many = equally_spaced(1000), equally_spaced(8000)
+    motion = ClohessyWiltshire(RATE)
+    start = np.zeros(6)
+    few = equally_spaced(1000)
+    many = equally_spaced(8000)
     short = best_s(lambda: solve_segments(motion, 0.0, start, few), 20)
     long = best_s(lambda: solve_segments(motion, 0.0, start, many), 10)
     under("time of 8000 nodes compared with 1000", long / short, 12.0, "times")
@@ -109,28 +131,45 @@ def test_time_is_linear(under: Check) -> None:
 def test_order_and_times_of_five(benchmark: BenchmarkFixture, under: Check) -> None:
     problem = load_problem("service-5")
     benchmark.pedantic(best_order, args=(problem.tour, problem.limits()), rounds=3, warmup_rounds=1)
-    under("N = 5, order and times", best_s(lambda: best_order(problem.tour, problem.limits()), 3), 2.0, "s")
+    under(
+        "N = 5, order and times",
+        best_s(lambda: best_order(problem.tour, problem.limits()), 3),
+        2.0,
+        "s",
+    )
 
 
 @pytest.mark.parametrize(("count", "most_s"), [(6, 4.0), (9, 120.0)])
 def test_order_and_times_of_many(count: int, most_s: float, under: Check) -> None:
-    rate_rad_s, random = 1.1e-3, np.random.default_rng(1)
+    rate_rad_s = 1.1e-3
+    random = np.random.default_rng(1)
     states = random.normal(size=(count, 6)) * np.array([300.0, 3000.0, 300.0, 0.3, 0.3, 0.3])
     states[:, 4] = -2.0 * rate_rad_s * states[:, 0]
     targets = tuple(Target(str(number)) for number in range(count))
     tour = Tour(ClohessyWiltshire(rate_rad_s), targets, states, np.zeros(6))
     two_revolutions = TimeLimits(4.0 * np.pi / rate_rad_s)
     best_order(tour, TimeLimits(1.0 / rate_rad_s))
-    under(f"N = {count}, order and times", best_s(lambda: best_order(tour, two_revolutions), 1), most_s, "s")
+    under(
+        f"N = {count}, order and times",
+        best_s(lambda: best_order(tour, two_revolutions), 1),
+        most_s,
+        "s",
+    )
 
 
 def test_the_asteroid_tour(benchmark: BenchmarkFixture, under: Check) -> None:
     problem = load_problem("asteroid-tour")
     assert problem.times_s is not None
-    times, order = problem.times_s, (0, 1, 2)
+    times = problem.times_s
+    order = (0, 1, 2)
     problem.tour.fly(order, times)
     benchmark.pedantic(problem.tour.fly, args=(order, times), rounds=3)
     under("asteroid-tour: its path", best_s(lambda: problem.tour.fly(order, times), 3), 2.0, "s")
-    under("its best times", best_s(lambda: best_times(problem.tour, order, problem.limits(), [times]), 1), 20.0, "s")
+    under(
+        "its best times",
+        best_s(lambda: best_times(problem.tour, order, problem.limits(), [times]), 1),
+        20.0,
+        "s",
+    )
     both = best_s(lambda: best_order(problem.tour, problem.limits(), [times]), 1)
     under("its best order and times", both, 60.0, "s")

@@ -1,4 +1,6 @@
-"""The interception experiment: one curve in this process, and commands as processes with their peak memory."""
+"""The interception experiment: one curve in this process, and commands as processes with their peak
+memory.
+"""
 
 from __future__ import annotations
 
@@ -36,8 +38,12 @@ class Process:
 
 
 def infoset(*arguments: str, cache: Path | None = None) -> Process:
-    """Run the command `infoset` in a new process, with another compile cache if `cache` is not None."""
-    environment = dict(os.environ) if cache is None else {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
+    """Run the command `infoset` in a new process, with another compile cache if `cache` is not
+    None.
+    """
+    environment = (
+        dict(os.environ) if cache is None else {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
+    )
     command = [sys.executable, "-m", "infoset", *arguments]
     began = time.perf_counter()
     with subprocess.Popen(
@@ -49,7 +55,9 @@ def infoset(*arguments: str, cache: Path | None = None) -> Process:
         process.returncode = os.waitstatus_to_exitcode(status)
     elapsed_s = time.perf_counter() - began
     assert process.returncode == 0, errors
-    unit = 1.0 if sys.platform == "darwin" else 1024.0  # ru_maxrss is in bytes there, in KiB elsewhere
+    unit = (
+        1.0 if sys.platform == "darwin" else 1024.0
+    )  # ru_maxrss is in bytes there, in KiB elsewhere
     return Process(elapsed_s, usage.ru_maxrss * unit / 1e6, errors)
 
 
@@ -66,7 +74,9 @@ def test_rate(benchmark: BenchmarkFixture, curve: Scenario, at_least: Check) -> 
     benchmark.pedantic(simulate, args=(curve, MANY), rounds=ROUNDS, warmup_rounds=1)
     assert benchmark.stats is not None
     rate = MANY / float(benchmark.stats.stats.median)
-    at_least(f"engagements, {curve.noise.value}, 29 sections", rate, RATE_TARGET[curve.noise], "a second")
+    at_least(
+        f"engagements, {curve.noise.value}, 29 sections", rate, RATE_TARGET[curve.noise], "a second"
+    )
 
 
 def test_phi_costs_at_most_three_times(curve: Scenario, under: Check) -> None:
@@ -81,7 +91,12 @@ def test_phi_costs_at_most_three_times(curve: Scenario, under: Check) -> None:
     for guarantee in (True, False):
         elapsed_s(guarantee)
     ratios = [elapsed_s(True) / elapsed_s(False) for _ in range(ROUNDS)]
-    under(f"time with Phi divided by time without, {curve.noise.value}", sorted(ratios)[ROUNDS // 2], 3.0, "times")
+    under(
+        f"time with Phi divided by time without, {curve.noise.value}",
+        sorted(ratios)[ROUNDS // 2],
+        3.0,
+        "times",
+    )
 
 
 def test_first_run(tmp_path: Path, under: Check) -> None:
@@ -100,7 +115,10 @@ def test_without_figures(under: Check) -> None:
 
 def test_with_figures(tmp_path: Path, under: Check) -> None:
     infoset("experiment", "--runs", "1", "--out", str(tmp_path / "warm"))
-    runs = [infoset("experiment", "--out", str(tmp_path / f"results{number}")) for number in range(ROUNDS)]
+    runs = [
+        infoset("experiment", "--out", str(tmp_path / f"results{number}"))
+        for number in range(ROUNDS)
+    ]
     under("infoset experiment with figures", min(run.elapsed_s for run in runs), 8.0, "s")
     under("peak memory with figures", max(run.peak_mb for run in runs), 400.0, "MB")
 

@@ -1,6 +1,7 @@
 """The orbital pursuit-evasion game: without and with an initial guess, and compared with SciPy.
 
-Times are processor times, the shortest of many rounds, so that other work on the machine has little effect.
+Times are processor times, the shortest of many rounds, so that other work on the machine has little
+effect.
 """
 
 from __future__ import annotations
@@ -61,8 +62,11 @@ def test_cold(benchmark: BenchmarkFixture, game: Game, under: Check) -> None:
 
 
 def rates(t: float, y: Floats, thrust: float, mass: float, flow: float) -> Floats:
-    """Right-hand side of state and costate of the pursuer, or of the evader with its costate negated, for mu = 1."""
-    r, lv = y[:3], y[9:]
+    """Right-hand side of state and costate of the pursuer, or of the evader with its costate
+    negated, for mu = 1.
+    """
+    r = y[:3]
+    lv = y[9:]
     square = float(r @ r)
     cube = square * math.sqrt(square)
     out = np.empty(12)
@@ -74,12 +78,15 @@ def rates(t: float, y: Floats, thrust: float, mass: float, flow: float) -> Float
 
 
 def test_compared_with_scipy(game: Game, solved: Solution, at_least: Check) -> None:
-    """Compare with `solve_ivp` (DOP853) and `fsolve` on 13 unknowns, from a guess with a relative error of 1e-4.
+    """Compare with `solve_ivp` (DOP853) and `fsolve` on 13 unknowns, from a guess with a relative
+    error of 1e-4.
 
-    SciPy's right-hand side is scalar Python with few array operations. The solver of the project has no guess.
+    SciPy's right-hand side is scalar Python with few array operations. The solver of the project
+    has no guess.
     """
     assert solved.capture is not None
-    units, node = units_of(game), solved.capture.extremal
+    units = units_of(game)
+    node = solved.capture.extremal
     crafts = [scaled_craft(player, game.gravity, units) for player in (game.pursuer, game.evader)]
 
     def miss(unknown: Floats) -> Floats:
@@ -95,9 +102,13 @@ def test_compared_with_scipy(game: Game, solved: Solution, at_least: Check) -> N
             ).y[:, -1]
             for k, craft in enumerate(crafts)
         )
-        return np.concatenate([p[:3] - e[:3], p[6:9] - e[6:9], p[9:], e[9:], [p[6:9] @ p[6:9] - 1.0]])
+        return np.concatenate(
+            [p[:3] - e[:3], p[6:9] - e[6:9], p[9:], e[9:], [p[6:9] @ p[6:9] - 1.0]]
+        )
 
-    guess = np.concatenate([node.costates[0], node.costates[1], [node.duration]]) * (1.0 + 1e-4 * np.cos(np.arange(13)))
+    guess = np.concatenate([node.costates[0], node.costates[1], [node.duration]]) * (
+        1.0 + 1e-4 * np.cos(np.arange(13))
+    )
     times: list[float] = []
 
     def scipy() -> None:
@@ -106,4 +117,9 @@ def test_compared_with_scipy(game: Game, solved: Solution, at_least: Check) -> N
     theirs = seconds(scipy, 3)
     assert times[-1] == pytest.approx(solved.capture.time_s, rel=1e-7)
     cold = seconds(lambda: solve(game), 20)
-    at_least("pursuit without a guess, compared with SciPy from a close guess", theirs / cold, TIMES_FASTER, "x")
+    at_least(
+        "pursuit without a guess, compared with SciPy from a close guess",
+        theirs / cold,
+        TIMES_FASTER,
+        "x",
+    )

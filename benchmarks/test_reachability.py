@@ -1,6 +1,8 @@
-"""Reachable rendezvous: the paper's case, long horizons, and forward sets compared with two polytope libraries.
+"""Reachable rendezvous: the paper's case, long horizons, and forward sets compared with two
+polytope libraries.
 
-Times are processor times, the shortest of several rounds, so that other work on the machine has little effect.
+Times are processor times, the shortest of several rounds, so that other work on the machine has
+little effect.
 """
 
 from __future__ import annotations
@@ -49,9 +51,13 @@ def best_s(work: Callable[[], object], rounds: int) -> float:
 def paper(periods: int) -> ReachabilityProblem:
     """Return the paper's problem of 720 s with another number of periods."""
     orbit = EllipticOrbit.of_size(1e7, 0.1, 3.986004418e14)
-    transition, control = discretised(motion_of(orbit, MotionModel.FROZEN), periods, 720.0 / periods, 0.15)
+    transition, control = discretised(
+        motion_of(orbit, MotionModel.FROZEN), periods, 720.0 / periods, 0.15
+    )
     start = np.array([-2540.0, -2650.0, 2120.0, 2.0, 3.0, 3.0])
-    return ReachabilityProblem(transition, control, start, np.array([3000.0] * 3 + [7.5] * 3), np.ones(3))
+    return ReachabilityProblem(
+        transition, control, start, np.array([3000.0] * 3 + [7.5] * 3), np.ones(3)
+    )
 
 
 def test_the_papers_case_with_its_report(under: Check) -> None:
@@ -93,7 +99,9 @@ def own_step(block: Block, vertices: Floats, period: int) -> Floats:
 
 
 def cdd_step(block: Block, vertices: Floats, period: int) -> Floats:
-    """Compute a forward set with the package `cdd`: generators, half-spaces, then generators of the intersection."""
+    """Compute a forward set with the package `cdd`: generators, half-spaces, then generators of the
+    intersection.
+    """
     import cdd
 
     points = _moved(block, vertices, period)
@@ -108,7 +116,9 @@ def cdd_step(block: Block, vertices: Floats, period: int) -> Floats:
 
 
 def polytope_step(block: Block, vertices: Floats, period: int) -> Floats:
-    """Compute a forward set with the package `polytope`: its quickhull and its vertex enumeration."""
+    """Compute a forward set with the package `polytope`: its quickhull and its vertex
+    enumeration.
+    """
     import polytope
 
     box = polytope.Polytope(block.normals, block.offsets[period + 1])
@@ -119,13 +129,19 @@ def polytope_step(block: Block, vertices: Floats, period: int) -> Floats:
 
 
 def _moved(block: Block, vertices: Floats, period: int) -> Floats:
-    corners = Polytope.from_box(-np.ones(len(block.controls)), np.ones(len(block.controls))).vertices
-    sums = (vertices @ block.transition[period].T)[:, None] + (corners @ block.control[period].T)[None]
+    corners = Polytope.from_box(
+        -np.ones(len(block.controls)), np.ones(len(block.controls))
+    ).vertices
+    sums = (vertices @ block.transition[period].T)[:, None] + (corners @ block.control[period].T)[
+        None
+    ]
     return np.asarray(sums.reshape(-1, block.size))
 
 
 def essential(vertices: Floats) -> int:
-    """Return the number of vertices farther than 1e-7 from the hull of the others, by linear programs."""
+    """Return the number of vertices farther than 1e-7 from the hull of the others, by linear
+    programs.
+    """
     kept = list(range(len(vertices)))
     size = vertices.shape[1]
     for candidate in range(len(vertices)):
@@ -134,7 +150,9 @@ def essential(vertices: Floats) -> int:
         ends = np.concatenate([vertices[candidate], -vertices[candidate]])
         cost = np.concatenate([np.zeros(len(others)), [1.0]])
         sums = np.concatenate([np.ones(len(others)), [0.0]])[None]
-        distance = linprog(cost, A_ub=rows, b_ub=ends, A_eq=sums, b_eq=[1.0], bounds=(0.0, None), method="highs")
+        distance = linprog(
+            cost, A_ub=rows, b_ub=ends, A_eq=sums, b_eq=[1.0], bounds=(0.0, None), method="highs"
+        )
         if distance.fun < MERGE:
             kept.remove(candidate)
     return len(kept)
@@ -147,10 +165,16 @@ STEPS: dict[str, tuple[str, Callable[[Block, Floats, int], Floats]]] = {
 }
 
 
-@pytest.mark.parametrize("first", [0, 2], ids=["from the start", "from t = 2, where sets have an interior"])
+@pytest.mark.parametrize(
+    "first", [0, 2], ids=["from the start", "from t = 2, where sets have an interior"]
+)
 @pytest.mark.parametrize("which", [0, 1], ids=["x-y block, 4-D", "z block, 2-D"])
-def test_forward_sets_compared_with_other_libraries(pytestconfig: pytest.Config, which: int, first: int) -> None:
-    """List the time of each library, whether it finishes, and whether its vertex counts are right."""
+def test_forward_sets_compared_with_other_libraries(
+    pytestconfig: pytest.Config, which: int, first: int
+) -> None:
+    """List the time of each library, whether it finishes, and whether its vertex counts are
+    right.
+    """
     block = paper(4).blocks[which]
     exact = [forward.vertices for forward in rational_sets(block)[0]]
     right = [essential(vertices) for vertices in exact[first + 1 :]]
@@ -162,17 +186,25 @@ def test_forward_sets_compared_with_other_libraries(pytestconfig: pytest.Config,
         if importlib.util.find_spec(module) is None:
             lines.append(f"    {name}: not installed")
             continue
-        vertices, counts, failure = exact[first], [], ""
+        vertices = exact[first]
+        counts = []
+        failure = ""
         began = time.process_time()
         try:
             for period in range(first, 4):
                 vertices = step(block, vertices, period)
                 counts.append(len(vertices))
         except Exception as error:
-            failure = f", does not finish at t = {len(counts) + first + 1}: {type(error).__name__}: {str(error)[:50]}"
+            failure = (
+                f", does not finish at t = {len(counts) + first + 1}: {type(error).__name__}: "
+                f"{str(error)[:50]}"
+            )
         taken = time.process_time() - began
         verdict = "right" if counts == right else "not right"
-        lines.append(f"    {name}: {1e3 * taken:.0f} ms, counts {counts} {'' if failure else verdict}{failure}")
+        lines.append(
+            f"    {name}: {1e3 * taken:.0f} ms, counts {counts} "
+            f"{'' if failure else verdict}{failure}"
+        )
         if name == "infoset":
             assert counts == right
     pytestconfig.stash[LINES] += lines

@@ -1,9 +1,11 @@
-"""One step of the sections: the engine compared with shapely objects in a loop and with shapely's vectorised calls.
+"""One step of the sections: the engine compared with shapely objects in a loop and with shapely's
+vectorised calls.
 
-The step is that of the paper: shear (one step of the motion), sum with the segment of the disturbance, cut by an angle
-measurement, and the extremes of the predicted miss. The sections are those of 50 engagements after 60 steps. Both
-versions with shapely are optimised; for example, they take the hull of a line through all corners, because an object
-for each corner would take five times as long as the whole step. Times are processor times.
+The step is that of the paper: shear (one step of the motion), sum with the segment of the
+disturbance, cut by an angle measurement, and the extremes of the predicted miss. The sections are
+those of 50 engagements after 60 steps. Both versions with shapely are optimised; for example, they
+take the hull of a line through all corners, because an object for each corner would take five times
+as long as the whole step. Times are processor times.
 """
 
 from __future__ import annotations
@@ -37,10 +39,11 @@ WHOLE, WHOLE_TARGET = 200, 100.0
 
 @dataclass(frozen=True)
 class Flight:
-    """Information sets after some steps, the angles of the next step, and the same sections as shapely objects.
+    """Information sets after some steps, the angles of the next step, and the same sections as
+    shapely objects.
 
-    The engine is timed over several steps (angles and impulses), so that the sets are in the processor's cache as in an
-    engagement; a new copy is not.
+    The engine is timed over several steps (angles and impulses), so that the sets are in the
+    processor's cache as in an engagement; a new copy is not.
     """
 
     model: SetModel
@@ -53,7 +56,9 @@ class Flight:
     half_width_m: Floats
 
     def batch(self) -> tuple[tuple[InformationSet], dict[str, object]]:
-        """Return copies of the sets for a round, because the engine's step changes its arguments."""
+        """Return copies of the sets for a round, because the engine's step changes its
+        arguments.
+        """
         return (self.information.copy(),), {}
 
 
@@ -75,7 +80,10 @@ def flight(curve: Scenario) -> Flight:
     (information,), alpha_rad = caught, stretch[0][0]
     model = curve.set_model
     sections = [(b, section) for b in range(ENGAGEMENTS) for section in information.sections(b)]
-    range_m = np.array([section.range_m for _, section in sections]) - model.closing_speed_m_s * model.step_s
+    range_m = (
+        np.array([section.range_m for _, section in sections])
+        - model.closing_speed_m_s * model.step_s
+    )
     bound = np.asarray(model.angle_sensor.error_bound(range_m))
     return Flight(
         model=model,
@@ -105,13 +113,16 @@ def fly_stretch(information: InformationSet, stretch: list[tuple[Floats, Floats]
 def step_objects(flight: Flight) -> Floats:
     """Step over shapely objects in a loop; return the extremes (minimum, maximum) of z + V x/e."""
     model = flight.model
-    half = np.array([model.disturbance_m_s2 * model.step_s, 0.5 * model.disturbance_m_s2 * model.step_s**2])
+    half = np.array(
+        [model.disturbance_m_s2 * model.step_s, 0.5 * model.disturbance_m_s2 * model.step_s**2]
+    )
     extremes = np.full((len(flight.polygons), 2), np.nan)
     for i, polygon in enumerate(flight.polygons):
         corners = shapely.get_coordinates(polygon)
         corners[:, 1] += model.step_s * corners[:, 0]
         grown = LineString(np.concatenate([corners + half, corners - half])).convex_hull
-        centre, half_width = flight.centre_m[i], flight.half_width_m[i]
+        centre = flight.centre_m[i]
+        half_width = flight.half_width_m[i]
         cut = grown.intersection(shapely.box(-FAR, centre - half_width, FAR, centre + half_width))
         if not cut.is_empty:
             left = shapely.get_coordinates(cut)
@@ -121,15 +132,21 @@ def step_objects(flight: Flight) -> Floats:
 
 
 def step_vectorised(flight: Flight, polygons: NDArray[np.object_]) -> Floats:
-    """Step over an array of shapely polygons with shapely's vectorised calls; return the extremes."""
+    """Step over an array of shapely polygons with shapely's vectorised calls; return the
+    extremes.
+    """
     model = flight.model
-    half = np.array([model.disturbance_m_s2 * model.step_s, 0.5 * model.disturbance_m_s2 * model.step_s**2])
+    half = np.array(
+        [model.disturbance_m_s2 * model.step_s, 0.5 * model.disturbance_m_s2 * model.step_s**2]
+    )
     corners, owner = shapely.get_coordinates(polygons, return_index=True)
     corners[:, 1] += model.step_s * corners[:, 0]
     order = np.argsort(np.concatenate([owner, owner]), kind="stable")
     both = np.concatenate([corners + half, corners - half])[order]
     grown = shapely.convex_hull(shapely.linestrings(both, indices=np.repeat(owner, 2)))
-    bands = shapely.box(-FAR, flight.centre_m - flight.half_width_m, FAR, flight.centre_m + flight.half_width_m)
+    bands = shapely.box(
+        -FAR, flight.centre_m - flight.half_width_m, FAR, flight.centre_m + flight.half_width_m
+    )
     cut = shapely.intersection(grown, bands)
     left, owner = shapely.get_coordinates(cut, return_index=True)
     misses = left[:, 1] + left[:, 0] * (flight.range_m / model.closing_speed_m_s)[owner]
@@ -153,12 +170,19 @@ def median_s() -> dict[str, float]:
 
 
 @pytest.mark.benchmark(group="section-step", timer=time.process_time)
-def test_engine(benchmark: BenchmarkFixture, flight: Flight, curve: Scenario, median_s: dict[str, float]) -> None:
+def test_engine(
+    benchmark: BenchmarkFixture, flight: Flight, curve: Scenario, median_s: dict[str, float]
+) -> None:
     benchmark.pedantic(
-        lambda information: fly_stretch(information, flight.stretch), setup=flight.batch, rounds=100, warmup_rounds=5
+        lambda information: fly_stretch(information, flight.stretch),
+        setup=flight.batch,
+        rounds=100,
+        warmup_rounds=5,
     )
     median_s[f"engine {curve.noise.value}"] = seconds(benchmark) / STRETCH
-    benchmark.extra_info["ns_per_section"] = 1e9 * seconds(benchmark) / STRETCH / len(flight.polygons)
+    benchmark.extra_info["ns_per_section"] = (
+        1e9 * seconds(benchmark) / STRETCH / len(flight.polygons)
+    )
 
 
 @pytest.mark.benchmark(group="section-step", timer=time.process_time)
@@ -178,14 +202,25 @@ def test_shapely_vectorised(
     median_s[f"vectorised {curve.noise.value}"] = seconds(benchmark)
 
 
-def test_ratios(flight: Flight, curve: Scenario, median_s: dict[str, float], at_least: Check) -> None:
-    noise, sections = curve.noise.value, len(flight.polygons)
+def test_ratios(
+    flight: Flight, curve: Scenario, median_s: dict[str, float], at_least: Check
+) -> None:
+    noise = curve.noise.value
+    sections = len(flight.polygons)
     if len([key for key in median_s if key.endswith(f" {noise}")]) < 3:
         pytest.skip("the ratio needs all three benchmarks")
     engine = median_s[f"engine {noise}"]
     vertices = np.mean([len(polygon.exterior.coords) - 1 for polygon in flight.polygons])
-    sort = f"{noise}, {sections} sections of {vertices:.0f} vertices, {1e9 * engine / sections:.0f} ns each"
-    at_least(f"section-step compared with objects ({sort})", median_s[f"objects {noise}"] / engine, OVER_OBJECTS, "x")
+    sort = (
+        f"{noise}, {sections} sections of {vertices:.0f} vertices, {1e9 * engine / sections:.0f} "
+        "ns each"
+    )
+    at_least(
+        f"section-step compared with objects ({sort})",
+        median_s[f"objects {noise}"] / engine,
+        OVER_OBJECTS,
+        "x",
+    )
     at_least(
         f"section-step compared with vectorised ({sort})",
         median_s[f"vectorised {noise}"] / engine,
@@ -194,21 +229,29 @@ def test_ratios(flight: Flight, curve: Scenario, median_s: dict[str, float], at_
     )
 
 
-def test_whole_engagements(flight: Flight, curve: Scenario, median_s: dict[str, float], at_least: Check) -> None:
+def test_whole_engagements(
+    flight: Flight, curve: Scenario, median_s: dict[str, float], at_least: Check
+) -> None:
     noise = curve.noise.value
     if f"objects {noise}" not in median_s:
         pytest.skip("the ratio needs the benchmark of shapely objects")
-    draws, sections = draw(curve, range(WHOLE), seed=0), []
+    draws = draw(curve, range(WHOLE), seed=0)
+    sections = []
     counted = Engagements(curve, draws)
     while counted.flying:
-        counted.advance(lambda step: sections.append(int(step.information.section_counts[step.tracking].sum())))
+        counted.advance(
+            lambda step: sections.append(int(step.information.section_counts[step.tracking].sum()))
+        )
     times = []
     for _ in range(3):
         began_s = time.process_time()
         simulate(curve, WHOLE)
         times.append(time.process_time() - began_s)
     objects_s = median_s[f"objects {noise}"] / len(flight.polygons) * sum(sections)
-    sort = f"{noise}, {WHOLE / min(times):.0f} engagements per second, {sum(sections) / WHOLE:.0f} section-steps each"
+    sort = (
+        f"{noise}, {WHOLE / min(times):.0f} engagements per second, {sum(sections) / WHOLE:.0f} "
+        "section-steps each"
+    )
     at_least(
         f"whole engagements compared with their section-steps as objects ({sort})",
         objects_s / min(times),
@@ -219,14 +262,21 @@ def test_whole_engagements(flight: Flight, curve: Scenario, median_s: dict[str, 
 
 def test_all_three_do_the_same_step(flight: Flight) -> None:
     polygons = np.array(flight.polygons, dtype=object)
-    objects, vectorised = step_objects(flight), step_vectorised(flight, polygons)
+    objects = step_objects(flight)
+    vectorised = step_vectorised(flight, polygons)
     np.testing.assert_allclose(vectorised, objects, rtol=1e-9)
     information = flight.information.copy()
     step_engine(information, flight.alpha_rad)
     miss = information.predicted_miss()
-    drift = 0.5 * flight.model.disturbance_m_s2 * (flight.range_m / flight.model.closing_speed_m_s) ** 2
+    drift = (
+        0.5 * flight.model.disturbance_m_s2 * (flight.range_m / flight.model.closing_speed_m_s) ** 2
+    )
     owner = np.repeat(np.arange(ENGAGEMENTS), flight.information.section_counts)
     for b in np.flatnonzero(miss.exists):
         mine = owner == b
-        np.testing.assert_allclose(np.nanmax((vectorised[:, 1] + drift)[mine]), miss.upper_m[b], rtol=1e-6, atol=1e-3)
-        np.testing.assert_allclose(np.nanmin((vectorised[:, 0] - drift)[mine]), miss.lower_m[b], rtol=1e-6, atol=1e-3)
+        np.testing.assert_allclose(
+            np.nanmax((vectorised[:, 1] + drift)[mine]), miss.upper_m[b], rtol=1e-6, atol=1e-3
+        )
+        np.testing.assert_allclose(
+            np.nanmin((vectorised[:, 0] - drift)[mine]), miss.lower_m[b], rtol=1e-6, atol=1e-3
+        )

@@ -1,13 +1,17 @@
-"""Random encounters from OEM tables: `python -m benchmarks.trajectory_tables [--encounters 200] [--first 0]`.
+"""Random encounters from OEM tables: `python -m benchmarks.trajectory_tables [--encounters 200]
+[--first 0]`.
 
-Each encounter has two orbits around the Sun, tables of both as OEM files, and an epoch beside a change of the step. The
-script makes the scenario of each (`infoset scenarios from-states`) and compares B.T and B.R with the closest approach
-by SciPy's DOP853 from the exact states. Every encounter must be within 10 m, or refused. The tables are of five kinds
-of steps, three interpolations, two segments and four time systems; the epoch has the time system of the first table.
-The covariance claims errors of a quarter of this; a table that cannot be so accurate must be refused.
+Each encounter has two orbits around the Sun, tables of both as OEM files, and an epoch beside a
+change of the step. The script makes the scenario of each (`infoset scenarios from-states`) and
+compares B.T and B.R with the closest approach by SciPy's DOP853 from the exact states. Every
+encounter must be within 10 m, or refused. The tables are of five kinds of steps, three
+interpolations, two segments and four time systems; the epoch has the time system of the first
+table. The covariance claims errors of a quarter of this; a table that cannot be so accurate must be
+refused.
 
-The positions of the tables are those of Kepler's equation. TDB - TT is the series of Kaplan (2005), USNO Circular 179,
-equation 2.6, which has terms that the program neglects (below 50 microseconds, or 1.5 m at 30 km/s).
+The positions of the tables are those of Kepler's equation. TDB - TT is the series of Kaplan (2005),
+USNO Circular 179, equation 2.6, which has terms that the program neglects (below 50 microseconds,
+or 1.5 m at 30 km/s).
 """
 
 from __future__ import annotations
@@ -113,8 +117,18 @@ def random_encounter(number: int) -> Encounter:
 
     at_epoch = np.concatenate([kepler(craft, np.array([-arrival_s])) for craft in meeting])
     flight_s = float(min(4 * 3600.0, 0.5 * arrival_s))
-    files["states.toml"] = _toml(f"{_text(epoch, scales[0])} {scales[0]}", flight_s, float(arrival_s))
-    return Encounter(steps, method, segments, scales, is_sound, files, b_plane_by_dop853(at_epoch, flight_s, arrival_s))
+    files["states.toml"] = _toml(
+        f"{_text(epoch, scales[0])} {scales[0]}", flight_s, float(arrival_s)
+    )
+    return Encounter(
+        steps,
+        method,
+        segments,
+        scales,
+        is_sound,
+        files,
+        b_plane_by_dop853(at_epoch, flight_s, arrival_s),
+    )
 
 
 def outcome_of(encounter: Encounter, folder: Path) -> Outcome:
@@ -132,7 +146,9 @@ def outcome_of(encounter: Encounter, folder: Path) -> Outcome:
 
 
 def kepler(state: Floats, times_s: Floats) -> Floats:
-    """Return an elliptic orbit around the Sun at times from a state, shape (n, 2, 3), by the functions f and g."""
+    """Return an elliptic orbit around the Sun at times from a state, shape (n, 2, 3), by the
+    functions f and g.
+    """
     position, velocity = state
     distance = np.linalg.norm(position)
     axis = 1.0 / (2.0 / distance - velocity @ velocity / SUN_M3_S2)
@@ -158,7 +174,9 @@ def kepler(state: Floats, times_s: Floats) -> Floats:
 
 
 def b_plane_by_dop853(states: Floats, flight_s: float, arrival_s: float) -> Floats:
-    """Return (B.T, B.R) of two states, shape (2, 2, 3), m, with the axes `flight_s` before the closest approach."""
+    """Return (B.T, B.R) of two states, shape (2, 2, 3), m, with the axes `flight_s` before the
+    closest approach.
+    """
     from scipy.integrate import solve_ivp
 
     def rates(_time: float, y: Floats) -> Floats:
@@ -166,8 +184,12 @@ def b_plane_by_dop853(states: Floats, flight_s: float, arrival_s: float) -> Floa
         pull = -SUN_M3_S2 * pairs[:, 0] / np.linalg.norm(pairs[:, 0], axis=1, keepdims=True) ** 3
         return np.concatenate([pairs[0, 1], pull[0], pairs[1, 1], pull[1]])
 
-    def moved(y: Floats, duration_s: float, event: Callable[[float, Floats], float] | None = None) -> Any:
-        return solve_ivp(rates, (0.0, duration_s), y, method="DOP853", rtol=1e-13, atol=1e-6, events=event)
+    def moved(
+        y: Floats, duration_s: float, event: Callable[[float, Floats], float] | None = None
+    ) -> Any:
+        return solve_ivp(
+            rates, (0.0, duration_s), y, method="DOP853", rtol=1e-13, atol=1e-6, events=event
+        )
 
     def recedes(_time: float, y: Floats) -> float:
         return float((y[6:9] - y[0:3]) @ (y[9:12] - y[3:6]))
@@ -190,20 +212,30 @@ def _meeting(generator: np.random.Generator) -> tuple[Floats, Floats]:
     distance = generator.uniform(0.8, 1.6) * 1.495978707e11
     circular = np.sqrt(SUN_M3_S2 / distance)
     turn = np.linalg.qr(generator.normal(size=(3, 3)))[0]
-    velocity = circular * generator.uniform(0.9, 1.1) * (turn[1] + generator.uniform(-0.2, 0.2) * turn[0])
+    velocity = (
+        circular * generator.uniform(0.9, 1.1) * (turn[1] + generator.uniform(-0.2, 0.2) * turn[0])
+    )
     relative = generator.normal(size=3)
-    relative *= circular * generator.uniform(0.1, 0.27) / np.linalg.norm(relative)  # both orbits are ellipses
+    relative *= (
+        circular * generator.uniform(0.1, 0.27) / np.linalg.norm(relative)
+    )  # both orbits are ellipses
     miss = np.cross(relative, generator.normal(size=3))
     miss *= generator.uniform(0.0, 5e3) / np.linalg.norm(miss)
     position = distance * turn[0]
     return np.stack([position, velocity]), np.stack([position + miss, velocity + relative])
 
 
-def _row_times(steps: str, change: int, is_reversed: bool, generator: np.random.Generator) -> list[Fraction]:
-    """Return the times of the rows around a change of the step, s from J2000 in the table's scale (TAI for UTC)."""
+def _row_times(
+    steps: str, change: int, is_reversed: bool, generator: np.random.Generator
+) -> list[Fraction]:
+    """Return the times of the rows around a change of the step, s from J2000 in the table's scale
+    (TAI for UTC).
+    """
     first, second = KINDS[steps][::-1] if is_reversed else KINDS[steps]
     if steps == "irregular":
-        lengths = [round(first * factor) for factor in 10.0 ** generator.uniform(-0.5, 0.5, size=2 * ROWS)]
+        lengths = [
+            round(first * factor) for factor in 10.0 ** generator.uniform(-0.5, 0.5, size=2 * ROWS)
+        ]
     else:
         lengths = [first] * ROWS + [second] * ROWS
     begin = Fraction(change - sum(lengths[:ROWS])) + Fraction(331, 1000)
@@ -233,7 +265,9 @@ def _tdb(seconds: Fraction, scale: str) -> Fraction:
         (0.000002, 21.3299, 5.5431),
         (0.000010 * centuries, 628.3076, 4.2490),
     )
-    return tt + Fraction(sum(size * np.sin(rate * centuries + phase) for size, rate, phase in terms))
+    return tt + Fraction(
+        sum(size * np.sin(rate * centuries + phase) for size, rate, phase in terms)
+    )
 
 
 def _text(seconds: Fraction, scale: str) -> str:
@@ -268,8 +302,8 @@ def _oem(
 ) -> str:
     """Return an OEM file of one or two segments, divided at a row away from the epoch.
 
-    If `is_broken`, the segment that holds the epoch `held` has a rotating frame or another centre; otherwise the
-    segment that does not hold it may have them.
+    If `is_broken`, the segment that holds the epoch `held` has a rotating frame or another centre;
+    otherwise the segment that does not hold it may have them.
     """
     divisions = [0, len(rows) - 1]
     if segments == 2:
@@ -281,9 +315,17 @@ def _oem(
         if (is_broken and holds) or (held is not None and not is_broken and not holds):
             frame, centre = (("ITRF-97", "SUN"), ("EME2000", "EARTH"))[generator.integers(2)]
         text += (
-            f"META_START\nOBJECT_NAME = X\nOBJECT_ID = 2026-001A\nCENTER_NAME = {centre}\nREF_FRAME = {frame}\n"
-            f"TIME_SYSTEM = {scale}\nSTART_TIME = {_text(rows[first], scale)}\n"
-            f"STOP_TIME = {_text(rows[last], scale)}\nINTERPOLATION = {method}\nINTERPOLATION_DEGREE = 7\nMETA_STOP\n"
+            "META_START\n"
+            "OBJECT_NAME = X\n"
+            "OBJECT_ID = 2026-001A\n"
+            f"CENTER_NAME = {centre}\n"
+            f"REF_FRAME = {frame}\n"
+            f"TIME_SYSTEM = {scale}\n"
+            f"START_TIME = {_text(rows[first], scale)}\n"
+            f"STOP_TIME = {_text(rows[last], scale)}\n"
+            f"INTERPOLATION = {method}\n"
+            "INTERPOLATION_DEGREE = 7\n"
+            "META_STOP\n"
         )
         for row in range(first, last + 1):
             words = [f"{value:.15e}" for value in (1e-3 * states[row]).ravel()]
@@ -292,7 +334,8 @@ def _oem(
 
 
 def _toml(epoch: str, flight_s: float, arrival_s: float) -> str:
-    # The errors of both states together may be a quarter of what is allowed, in position and until the arrival.
+    # The errors of both states together may be a quarter of what is allowed, in position and until
+    # the arrival.
     position_m = 0.25 * ALLOWED_M / math.sqrt(3.0)
     velocity_m_s = position_m / arrival_s
     return f"""\
@@ -320,7 +363,9 @@ def outcomes(first: int, count: int) -> Iterator[Outcome]:
 
 def main() -> int:
     """Print the table; return 1 if an encounter is neither right nor refused."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--encounters", type=int, default=200)
     parser.add_argument("--first", type=int, default=0)
     options = parser.parse_args()
@@ -332,7 +377,11 @@ def main() -> int:
             print(
                 _line(
                     f"{steps:12} {method:9}",
-                    [each for each in found if (each.encounter.steps, each.encounter.method) == (steps, method)],
+                    [
+                        each
+                        for each in found
+                        if (each.encounter.steps, each.encounter.method) == (steps, method)
+                    ],
                 )
             )
     print(_line(f"{'all':22}", found))

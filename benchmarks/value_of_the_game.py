@@ -1,12 +1,14 @@
-"""Print lower bounds, worst misses found, and misses with random and game errors, for strategies on the set.
+"""Print lower bounds, worst misses found, and misses with random and game errors, for strategies on
+the set.
 
-    python -m benchmarks.value_of_the_game                                  # asteroid-1997, five searches each
-    python -m benchmarks.value_of_the_game --scenarios built-in --budget 2000 --seeds 1
-    python -m benchmarks.value_of_the_game --scenarios variants --budget 2000 --seeds 1
-    python -m benchmarks.value_of_the_game --scenarios random --budget 2000 --seeds 1
+    python -m benchmarks.value_of_the_game                                  # asteroid-1997, five
+    searches each python -m benchmarks.value_of_the_game --scenarios built-in --budget 2000 --seeds
+    1 python -m benchmarks.value_of_the_game --scenarios variants --budget 2000 --seeds 1 python -m
+    benchmarks.value_of_the_game --scenarios random --budget 2000 --seeds 1
 
-Searches start anywhere in the uncertainty of the scenario, the other runs in its dispersion. The model is `guaranteed`.
-Each row has the maximum value found, that of any state of the set, and the miss of the truth of that engagement.
+Searches start anywhere in the uncertainty of the scenario, the other runs in its dispersion. The
+model is `guaranteed`. Each row has the maximum value found, that of any state of the set, and the
+miss of the truth of that engagement.
 """
 
 from __future__ import annotations
@@ -24,7 +26,14 @@ from infoset.experiments import load_scenario
 from infoset.guidance import NoiseKind
 from infoset.sim import NothingCountsError, Scenario, find_worst, lower_bound, simulate
 
-BUILT_IN = ("asteroid-1997", "comet-fast", "asteroid-1997-space", "dart-2022", "deep-impact-2005", "haiv-2013")
+BUILT_IN = (
+    "asteroid-1997",
+    "comet-fast",
+    "asteroid-1997-space",
+    "dart-2022",
+    "deep-impact-2005",
+    "haiv-2013",
+)
 STRATEGIES = ("symmetric-miss", "least-effort", "patient")
 RUNS = 100
 RANDOM = 10
@@ -54,7 +63,9 @@ VARIANTS = {
 
 
 def scenarios(choice: str) -> Iterator[tuple[str, Scenario]]:
-    """Yield scenarios in the guaranteed model: with and without the range sensor, variants, or random ones."""
+    """Yield scenarios in the guaranteed model: with and without the range sensor, variants, or
+    random ones.
+    """
     if choice == "random":
         number = found = 0
         while found < RANDOM:
@@ -64,7 +75,13 @@ def scenarios(choice: str) -> Iterator[tuple[str, Scenario]]:
                 found += 1
             number += 1
         return
-    for name in BUILT_IN if choice == "built-in" else ("asteroid-1997",) if choice == "variants" else (choice,):
+    for name in (
+        BUILT_IN
+        if choice == "built-in"
+        else ("asteroid-1997",)
+        if choice == "variants"
+        else (choice,)
+    ):
         for variant, settings in VARIANTS.items() if choice == "variants" else [("", [])]:
             scenario = guaranteed(load_scenario(name, settings))
             assert scenario is not None
@@ -87,7 +104,10 @@ def row(scenario: Scenario, strategy: str, budget: int, seeds: int) -> str:
     texts = []
     for noise in (NoiseKind.RANDOM, NoiseKind.GAME):
         results = simulate(replace(scenario, noise=noise), RUNS, strategy=strategy, guarantee=False)
-        (median, most), impulse = np.quantile(results.miss_m, (0.5, 0.9)), np.median(results.impulse_m_s)
+        (median, most), impulse = (
+            np.quantile(results.miss_m, (0.5, 0.9)),
+            np.median(results.impulse_m_s),
+        )
         texts.append(f"{noise.value} {median:.3g} / {most:.3g} m, {impulse:.3g} m/s")
     worst = []
     for seed in range(seeds):
@@ -101,14 +121,20 @@ def row(scenario: Scenario, strategy: str, budget: int, seeds: int) -> str:
 
 def main() -> None:
     """Print the figures of each scenario."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scenarios", default="asteroid-1997", help="a name, or built-in, variants or random")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--scenarios", default="asteroid-1997", help="a name, or built-in, variants or random"
+    )
     parser.add_argument("--budget", type=int, default=8000, help="engagements of a search")
     parser.add_argument("--seeds", type=int, default=5, help="number of searches")
     parser.add_argument("--strategies", nargs="*", default=STRATEGIES)
     options = parser.parse_args()
     for name, scenario in scenarios(options.scenarios):
-        sys.stdout.write(f"{name}: no strategy guarantees less than {lower_bound(scenario).bound_m:.4g} m\n")
+        sys.stdout.write(
+            f"{name}: no strategy guarantees less than {lower_bound(scenario).bound_m:.4g} m\n"
+        )
         for strategy in options.strategies:
             sys.stdout.write(row(scenario, strategy, options.budget, options.seeds) + "\n")
             sys.stdout.flush()

@@ -1,10 +1,12 @@
-"""Print the time of an engagement by part and per section-step, and the number of vertices of the sections.
+"""Print the time of an engagement by part and per section-step, and the number of vertices of the
+sections.
 
-    python benchmarks/where_time_goes.py                     # random noise, 50 and 200 engagements at once
-    python benchmarks/where_time_goes.py --noise game --together 400
+    python benchmarks/where_time_goes.py                     # random noise, 50 and 200 engagements
+    at once python benchmarks/where_time_goes.py --noise game --together 400
 
-Kernels and methods are wrapped in timers. The time of a part does not include other parts that it calls. The output is
-that of the fastest round. The timers take a few per cent, which are counted as time of the interpreter.
+Kernels and methods are wrapped in timers. The time of a part does not include other parts that it
+calls. The output is that of the fastest round. The timers take a few per cent, which are counted as
+time of the interpreter.
 """
 
 from __future__ import annotations
@@ -46,7 +48,9 @@ class Clock:
     inside: list[float] = field(default_factory=list)
 
     def timed(self, part: Callable[..., str], work: Callable[..., Any]) -> Callable[..., Any]:
-        """Return the function `work` with a timer; the time of timed functions that it calls is not included."""
+        """Return the function `work` with a timer; the time of timed functions that it calls is not
+        included.
+        """
 
         def wrapped(*arguments: Any) -> Any:
             name = part(*arguments)
@@ -66,7 +70,9 @@ class Clock:
 
         def part(measured: Any, *others: Any) -> str:
             sections = others[-2]
-            self.section_steps += int((sections.slots["living"] & (measured | sections.behind)[:, None]).sum())
+            self.section_steps += int(
+                (sections.slots["living"] & (measured | sections.behind)[:, None]).sum()
+            )
             return SECTION_STEPS
 
         return self.timed(part, work)
@@ -75,7 +81,11 @@ class Clock:
         """Add timers to the kernels and to the true motion."""
         section_passes.step_all = self.measured(section_passes.step_all)
         for owner, names, part in (
-            (section_passes, ("widest_all", "extreme_angles_all", "keep_labels_all"), SECTION_STEPS),
+            (
+                section_passes,
+                ("widest_all", "extreme_angles_all", "keep_labels_all"),
+                SECTION_STEPS,
+            ),
             (replays, ("margins_all",), TRUTH_SECTION),
             (section_passes, ("make_room_all", "start_all"), REGRIDS),
             (set_state, ("refine_all",), REGRIDS),
@@ -87,9 +97,12 @@ class Clock:
 
 
 def vertices(scenario: Scenario, together: int) -> tuple[float, float, int]:
-    """Return the minimum and maximum mean number of vertices of the sections over the steps, and the maximum number."""
+    """Return the minimum and maximum mean number of vertices of the sections over the steps, and
+    the maximum number.
+    """
     flight = Engagements(scenario, draw(scenario, range(together), 0), guarantee=False)
-    means, maximum = [], 0
+    means = []
+    maximum = 0
     while flight.flying:
         flight.advance()
         sections = flight._information._state.sections
@@ -103,7 +116,9 @@ def vertices(scenario: Scenario, together: int) -> tuple[float, float, int]:
 
 def show(scenario: Scenario, together: int, clock: Clock) -> None:
     """Simulate several rounds and print the times of the fastest."""
-    best_s, parts, steps = float("inf"), dict[str, float](), 1
+    best_s = float("inf")
+    parts = dict[str, float]()
+    steps = 1
     for _ in range(ROUNDS):
         clock.seconds.clear()
         clock.section_steps = 0
@@ -116,29 +131,44 @@ def show(scenario: Scenario, together: int, clock: Clock) -> None:
         flight.results(np.arange(together))
         elapsed_s = time.perf_counter() - began_s
         if elapsed_s < best_s:
-            best_s, parts, steps = elapsed_s, dict(clock.seconds), clock.section_steps
+            best_s = elapsed_s
+            parts = dict(clock.seconds)
+            steps = clock.section_steps
     parts[REST] = best_s - sum(parts.values())
     lines = [
-        f"{together} engagements at once: {1e3 * best_s / together:.2f} ms each, {together / best_s:.0f} per second",
+        (
+            f"{together} engagements at once: {1e3 * best_s / together:.2f} ms each, "
+            f"{together / best_s:.0f} per second"
+        ),
         *(
             f"  {1e3 * spent_s / together:6.2f} ms  {100.0 * spent_s / best_s:3.0f} %  {part}"
             for part, spent_s in sorted(parts.items(), key=lambda item: -item[1])
         ),
-        f"  {1e9 * parts[SECTION_STEPS] / steps:.0f} ns per section-step, {steps / together:.0f} steps per engagement",
+        (
+            f"  {1e9 * parts[SECTION_STEPS] / steps:.0f} ns per section-step, "
+            f"{steps / together:.0f} steps per engagement"
+        ),
     ]
     sys.stdout.write("\n".join(lines) + "\n")
 
 
 def main() -> None:
     """Print the times for each size of batch."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--noise", choices=[kind.value for kind in NoiseKind], default=NoiseKind.RANDOM.value)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--noise", choices=[kind.value for kind in NoiseKind], default=NoiseKind.RANDOM.value
+    )
     parser.add_argument("--together", type=int, nargs="+", default=[50, 200])
     options = parser.parse_args()
-    scenario = replace(load_scenario("asteroid-1997"), range_sensor=None, noise=NoiseKind(options.noise))
+    scenario = replace(
+        load_scenario("asteroid-1997"), range_sensor=None, noise=NoiseKind(options.noise)
+    )
     minimum, most, maximum = vertices(scenario, max(options.together))
     sys.stdout.write(
-        f"vertices of a section: {minimum:.0f} to {most:.0f} on average over a flight, {maximum} at most\n"
+        f"vertices of a section: {minimum:.0f} to {most:.0f} on average over a flight, {maximum} "
+        "at most\n"
     )
     clock = Clock()
     clock.watch()

@@ -1,13 +1,15 @@
-"""Observers of five and more states: times of zonotopes and of programs, and widths compared with the exact ones.
+"""Observers of five and more states: times of zonotopes and of programs, and widths compared with
+the exact ones.
 
-``python -m benchmarks.window_numbers [STATES ..]``, 8, 12 and 20 by default. The systems are those of
-`tests/infoset/observer/test_window.py`: a random one, masses in a row whose positions are measured, and undamped masses
-between springs, of which every other position is measured; 40 steps with errors within their bounds. The ratios are
-geometric means over the states at steps 29 and 39, of the width to that of the whole record. Times are processor times
-of one thread: of a step of the zonotope, and of one bound.
+``python -m benchmarks.window_numbers [STATES ..]``, 8, 12 and 20 by default. The systems are those
+of `tests/infoset/observer/test_window.py`: a random one, masses in a row whose positions are
+measured, and undamped masses between springs, of which every other position is measured; 40 steps
+with errors within their bounds. The ratios are geometric means over the states at steps 29 and 39,
+of the width to that of the whole record. Times are processor times of one thread: of a step of the
+zonotope, and of one bound.
 
-``python -m benchmarks.window_numbers small`` compares windows with the polytopes of `max_facets`, for random systems
-of three and four states of `benchmarks/observer_numbers.py` with 30 steps.
+``python -m benchmarks.window_numbers small`` compares windows with the polytopes of `max_facets`,
+for random systems of three and four states of `benchmarks/observer_numbers.py` with 30 steps.
 """
 
 from __future__ import annotations
@@ -95,7 +97,9 @@ def windows_of_few_states(system: System) -> LinearObserver:
     try:
         start = Zonotope.box(-np.ones(system.size), np.ones(system.size))
         disturbance = Zonotope(np.zeros(system.size), system.generators)
-        return LinearObserver(system.a, system.c, start, noise=system.noise, disturbance=disturbance)
+        return LinearObserver(
+            system.a, system.c, start, noise=system.noise, disturbance=disturbance
+        )
     finally:
         linear_observer.MAX_POLYTOPE_STATES = most
 
@@ -110,9 +114,17 @@ def print_small(states: int) -> None:
         measured = []
         for k in range(SMALL_STEPS):
             if k:
-                state = system.a @ state + random.uniform(-1.0, 1.0, len(system.generators)) @ system.generators
-            measured.append(system.c @ state + random.uniform(-system.noise, system.noise, len(system.c)))
-        for name, observer in (("polytopes", system.observer()), ("windows", windows_of_few_states(system))):
+                state = (
+                    system.a @ state
+                    + random.uniform(-1.0, 1.0, len(system.generators)) @ system.generators
+                )
+            measured.append(
+                system.c @ state + random.uniform(-system.noise, system.noise, len(system.c))
+            )
+        for name, observer in (
+            ("polytopes", system.observer()),
+            ("windows", windows_of_few_states(system)),
+        ):
             timed = run_timed(observer, np.array(measured))
             last = timed.estimates[-1]
             widths, bound_ms = widths_of(last)
@@ -122,8 +134,9 @@ def print_small(states: int) -> None:
         excess = np.concatenate([more for _, _, more in results])
         step_ms, bound_ms = (np.median([row[k] for row in results]) for k in range(2))
         print(
-            f"{states} states, {name:9}: {step_ms:6.2f} ms a step, {bound_ms:5.2f} ms a bound; widths "
-            f"{excess.mean():.1%} too large, median {np.median(excess):.1%}, {excess.max():.1%} at most",
+            f"{states} states, {name:9}: {step_ms:6.2f} ms a step, {bound_ms:5.2f} ms a bound; "
+            f"widths {excess.mean():.1%} too large, median {np.median(excess):.1%}, "
+            f"{excess.max():.1%} at most",
             flush=True,
         )
 

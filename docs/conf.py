@@ -1,4 +1,6 @@
-"""Configuration of the documentation; CONTRIBUTING.md has the command. Nothing is loaded from the network."""
+"""Configuration of the documentation; CONTRIBUTING.md has the command. Nothing is loaded from the
+network.
+"""
 
 from __future__ import annotations
 
@@ -38,12 +40,23 @@ extensions = [
     "mathml",
 ]
 html_math_renderer = "mathml"
-exclude_patterns = ["_build", "_extensions", "examples", "gallery/*.py", "gallery/*.ipynb", "**/sg_execution_times.rst"]
+exclude_patterns = [
+    "_build",
+    "_extensions",
+    "examples",
+    "gallery/*.py",
+    "gallery/*.ipynb",
+    "**/sg_execution_times.rst",
+]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 nitpicky = True
-# Types of other projects are named and not linked: links would need their inventories from the network.
+# Types of other projects are named and not linked: links would need their inventories from the
+# network.
 nitpick_ignore_regex = [
-    ("py:.*", r"(numpy|np|os|shapely|pyarrow|matplotlib|concurrent|collections|pathlib|enum|types|typing)\..*"),
+    (
+        "py:.*",
+        r"(numpy|np|os|shapely|pyarrow|matplotlib|concurrent|collections|pathlib|enum|types|typing)\..*",
+    ),
     (
         "py:.*",
         r"(ArrayLike|NDArray|Floats|Flags|Integers|Interval|RangeOrRanges|Callable|Sequence|Iterator|Mapping|Executor|Path"
@@ -98,7 +111,8 @@ nitpick_ignore.append(("py:class", "0.0"))  # the limit in the type of a speed
 
 # --- text
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
-# Displayed formulas are fenced blocks: hosts of repositories render those without losing backslashes.
+# Displayed formulas are fenced blocks: hosts of repositories render those without losing
+# backslashes.
 myst_fence_as_directive = ["math"]
 myst_heading_anchors = 3
 myst_links_external_new_tab = False
@@ -121,7 +135,9 @@ xref.DEFAULT_LINKS.clear()
 
 
 def _public(*packages: ModuleType) -> dict[str, str]:
-    """Return where the type names in docstrings are described; names that occur in two packages are left out."""
+    """Return where the type names in docstrings are described; names that occur in two packages are
+    left out.
+    """
     homes: dict[str, list[str]] = {}
     for package in packages:
         for name in package.__all__:
@@ -131,27 +147,52 @@ def _public(*packages: ModuleType) -> dict[str, str]:
 
 
 numpydoc_xref_aliases = _public(
-    infoset, guidance, sim, multipoint, pareto, polytope, pursuit_evasion, reachability, relative_motion
+    infoset,
+    guidance,
+    sim,
+    multipoint,
+    pareto,
+    polytope,
+    pursuit_evasion,
+    reachability,
+    relative_motion,
 )
 
-# Docstrings are plain text with |moduli| and `names`; reStructuredText reads the first as substitutions.
+# Docstrings are plain text with |moduli| and `names`; reStructuredText reads the first as
+# substitutions.
 default_role = "code"
 
 
-def _keep_moduli(app: Sphinx, what: str, name: str, thing: object, options: object, lines: list[str]) -> None:
-    lines[:] = [line if line.lstrip().startswith(">>>") else line.replace("|", r"\|") for line in lines]
+def _keep_moduli(
+    app: Sphinx, what: str, name: str, thing: object, options: object, lines: list[str]
+) -> None:
+    lines[:] = [
+        line if line.lstrip().startswith(">>>") else line.replace("|", r"\|") for line in lines
+    ]
 
 
-_ARRAY = re.compile(r"~?numpy\.ndarray\[tuple\[~?(?:typing\.)?Any, \.\.\.\], ~?numpy\.dtype\[[^\[\]]*\]\]")
+_ARRAY = re.compile(
+    r"~?numpy\.ndarray\[tuple\[~?(?:typing\.)?Any, \.\.\.\], ~?numpy\.dtype\[[^\[\]]*\]\]"
+)
 
 
-_LIMITED = re.compile(r"~?(?:typing\.)?Annotated\[((?:[^\[\]]|\[[^\[\]]*\])*?), ~?[\w.]*Limits\([^()]*\)\]")
+_LIMITED = re.compile(
+    r"~?(?:typing\.)?Annotated\[((?:[^\[\]]|\[[^\[\]]*\])*?), ~?[\w.]*Limits\([^()]*\)\]"
+)
 
 
 def _plain_types(
-    app: Sphinx, what: str, name: str, thing: object, options: object, signature: str | None, returned: str | None
+    app: Sphinx,
+    what: str,
+    name: str,
+    thing: object,
+    options: object,
+    signature: str | None,
+    returned: str | None,
 ) -> tuple[str | None, str | None]:
-    """Write `ndarray` and `float` instead of full types: the docstring has shapes, units and limits."""
+    """Write `ndarray` and `float` instead of full types: the docstring has shapes, units and
+    limits.
+    """
     plain = [
         None if text is None else _LIMITED.sub(r"\1", _ARRAY.sub("numpy.ndarray", text))
         for text in (signature, returned)

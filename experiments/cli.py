@@ -17,7 +17,14 @@ import typer
 from infoset.experiments.campaigns.command import Campaign, Report, Sweep
 from infoset.experiments.common.errors import InputError, on_a_screen
 from infoset.experiments.file_commands import problems, scenarios
-from infoset.experiments.interception.command import Adversary, Bound, Compare, Engage, Experiment, Replay
+from infoset.experiments.interception.command import (
+    Adversary,
+    Bound,
+    Compare,
+    Engage,
+    Experiment,
+    Replay,
+)
 from infoset.experiments.multipoint.command import Multipoint
 from infoset.experiments.observer.command import Observe
 from infoset.experiments.pareto.command import Pareto
@@ -41,15 +48,18 @@ EXTRAS = {
 BACKEND = "MPLBACKEND"
 """Environment variable with the backend of Matplotlib."""
 RUNS: dict[type, str] = {}
-"""The module in `infoset.experiments` whose function ``run`` takes the options, by the class of the options."""
+"""The module in `infoset.experiments` whose function ``run`` takes the options, by the class of the
+options.
+"""
 
 
 def _add(name: str, options: type, run: str, *, example: str) -> None:
     """Add a command.
 
-    The fields of the dataclass `options`, declared with ``Annotated[type, typer.Option(...)]``, are its options and
-    arguments, and its docstring is the help; the first sentence stands in the list of commands. The module `run` is
-    imported when the command runs, so that ``--help`` does not wait for it.
+    The fields of the dataclass `options`, declared with ``Annotated[type, typer.Option(...)]``, are
+    its options and arguments, and its docstring is the help; the first sentence stands in the list
+    of commands. The module `run` is imported when the command runs, so that ``--help`` does not
+    wait for it.
     """
     RUNS[options] = f"infoset.experiments.{run}"
     hints = get_type_hints(options, include_extras=True)
@@ -72,36 +82,80 @@ def _add(name: str, options: type, run: str, *, example: str) -> None:
     app.command(name, help=options.__doc__, epilog=f"Example: infoset {name} {example}")(command)
 
 
-_add("experiment", Experiment, "interception.runs.experiment", example="asteroid-1997 --runs 50 --out results")
-_add("engage", Engage, "interception.runs.engage", example="asteroid-1997-single --noise both --out figures")
-_add("compare", Compare, "interception.runs.compare", example="--strategies patient,symmetric-miss --out results")
-_add("bound", Bound, "interception.runs.bound", example="asteroid-1997 --strategies patient --out results")
+_add(
+    "experiment",
+    Experiment,
+    "interception.runs.experiment",
+    example="asteroid-1997 --runs 50 --out results",
+)
+_add(
+    "engage",
+    Engage,
+    "interception.runs.engage",
+    example="asteroid-1997-single --noise both --out figures",
+)
+_add(
+    "compare",
+    Compare,
+    "interception.runs.compare",
+    example="--strategies patient,symmetric-miss --out results",
+)
+_add(
+    "bound",
+    Bound,
+    "interception.runs.bound",
+    example="asteroid-1997 --strategies patient --out results",
+)
 _add(
     "adversary",
     Adversary,
     "interception.runs.adversary",
     example="--strategy symmetric-miss --budget 2000 --record worst.npz",
 )
-_add("replay", Replay, "interception.runs.replay", example="flight-random.npz flight-game.npz --html flights.html")
-_add("campaign", Campaign, "campaigns.run_campaign", example="--noise mixed --runs 100000 --out runs")
+_add(
+    "replay",
+    Replay,
+    "interception.runs.replay",
+    example="flight-random.npz flight-game.npz --html flights.html",
+)
+_add(
+    "campaign", Campaign, "campaigns.run_campaign", example="--noise mixed --runs 100000 --out runs"
+)
 _add(
     "sweep",
     Sweep,
     "campaigns.run_sweep",
-    example="--set body.radius_m=80 --vary angle_sensor.scale=1:8:8,thruster.max_impulse_m_s=2.5:20:8 --runs 100 "
-    "--until decided --out sensors",
+    example=(
+        "--set body.radius_m=80 --vary angle_sensor.scale=1:8:8,thruster.max_impulse_m_s=2.5:20:8 "
+        "--runs 100 --until decided --out sensors"
+    ),
 )
 _add("report", Report, "campaigns.run_report", example="runs --out figures")
-_add("pursuit", Pursuit, "pursuit.run", example="geo-pursuit --certify --feedback coast --out results")
+_add(
+    "pursuit",
+    Pursuit,
+    "pursuit.run",
+    example="geo-pursuit --certify --feedback coast --out results",
+)
 _add(
     "pursuit-map",
     PursuitMap,
     "pursuit.map",
     example="geo-pursuit --x phase_deg=-60:60:61 --y thrust_ratio=0:0.9:19 --out map",
 )
-_add("reach", Reach, "reachability.run", example="rendezvous-2021 --select energy,vertices --replan --out reach")
+_add(
+    "reach",
+    Reach,
+    "reachability.run",
+    example="rendezvous-2021 --select energy,vertices --replan --out reach",
+)
 _add("pareto", Pareto, "pareto.run", example="pareto-2008 --prefer x_m=0,z_m=50 --out figures")
-_add("multipoint", Multipoint, "multipoint.run", example="service-3 --order best --times best --out figures")
+_add(
+    "multipoint",
+    Multipoint,
+    "multipoint.run",
+    example="service-3 --order best --times best --out figures",
+)
 _add("observe", Observe, "observer.run", example="vehicle --smooth --out results")
 _add("reproduce", Reproduce, "reproduced_numbers", example="--paper pareto --json numbers.json")
 app.add_typer(scenarios)
@@ -117,12 +171,16 @@ def _show_version(wanted: bool) -> None:
 @app.callback()
 def infoset(
     version: Annotated[
-        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
+        bool,
+        typer.Option(
+            "--version", callback=_show_version, is_eager=True, help="Show the version and exit."
+        ),
     ] = False,
 ) -> None:
     """Simulate interceptions guided by information sets, and solve rendezvous and pursuit problems.
 
-    An information set contains all states that are consistent with the measurements, the impulses and the model.
+    An information set contains all states that are consistent with the measurements, the impulses
+    and the model.
     """
 
 
@@ -134,7 +192,8 @@ def commands() -> Any:
 
 @contextlib.contextmanager
 def _agg_backend() -> Iterator[None]:
-    """Let Matplotlib, when a command imports it, use Agg: a backend of the user's that is missing stops the import.
+    """Let Matplotlib, when a command imports it, use Agg: a backend of the user's that is missing
+    stops the import.
 
     A notebook, for example, sets its backend for all processes that it starts.
     """
@@ -152,7 +211,8 @@ def _agg_backend() -> Iterator[None]:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command `infoset`, and exit with its code; None takes the arguments from the process.
 
-    It always raises `SystemExit`: 0 done, 1 a published number disagrees, 2 wrong input, 130 interrupted.
+    It always raises `SystemExit`: 0 done, 1 a published number disagrees, 2 wrong input, 130
+    interrupted.
     """
     try:
         with _agg_backend():
@@ -163,6 +223,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             library = str(error.name).partition(".")[0]
             if library not in EXTRAS:
                 raise
-            message = f"{library} is not installed: install infoset with the extra [{EXTRAS[library]}]"
+            message = (
+                f"{library} is not installed: install infoset with the extra [{EXTRAS[library]}]"
+            )
         typer.echo(on_a_screen(f"error: {message}"), err=True)
         sys.exit(2)

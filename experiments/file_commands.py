@@ -1,4 +1,6 @@
-"""The commands `infoset scenarios` and `infoset problems`, which list, show, copy and check files."""
+"""The commands `infoset scenarios` and `infoset problems`, which list, show, copy and check
+files.
+"""
 
 from __future__ import annotations
 
@@ -9,23 +11,41 @@ from typing import Annotated, Any
 
 import typer
 
-from infoset.experiments.common.built_in_files import PROBLEMS, SCENARIO, BuiltIn, built_in, built_in_files
+from infoset.experiments.common.built_in_files import (
+    PROBLEMS,
+    SCENARIO,
+    BuiltIn,
+    built_in,
+    built_in_files,
+)
 from infoset.experiments.common.options import AsJson, Overwrite, Quiet, Settings
 
 BuiltInName = Annotated[str, typer.Argument(metavar="NAME", help="A built-in name.")]
 FileName = Annotated[str, typer.Argument(metavar="FILE", help="A file, or a built-in name.")]
 Like = Annotated[str, typer.Option("--like", metavar="NAME", help="The built-in file to copy.")]
 LikeScenario = Annotated[
-    str, typer.Option("--like", metavar="NAME", help="The scenario whose sensors, engine and settings it takes.")
+    str,
+    typer.Option(
+        "--like", metavar="NAME", help="The scenario whose sensors, engine and settings it takes."
+    ),
 ]
 Sigmas = Annotated[
     float,
-    typer.Option("--sigma", min=0.1, max=10.0, help="Standard deviations that uncertainty and dispersion contain."),
+    typer.Option(
+        "--sigma",
+        min=0.1,
+        max=10.0,
+        help="Standard deviations that uncertainty and dispersion contain.",
+    ),
 ]
 BodyRadius = Annotated[
     float | None,
     typer.Option(
-        "--body-radius-m", metavar="M", min=1e-3, max=1e9, help="Radius of the target, m; without it no run hits."
+        "--body-radius-m",
+        metavar="M",
+        min=1e-3,
+        max=1e9,
+        help="Radius of the target, m; without it no run hits.",
     ),
 ]
 Disturbance = Annotated[
@@ -46,17 +66,25 @@ FilesIn = Annotated[
         help="A folder whose OEM files and kernels the file may name too; repeat it for several.",
     ),
 ]
-Out = Annotated[Path, typer.Option("--out", metavar="FILE", help="The scenario file to write; - is stdout.")]
+Out = Annotated[
+    Path, typer.Option("--out", metavar="FILE", help="The scenario file to write; - is stdout.")
+]
 NewFile = Annotated[Path, typer.Argument(metavar="FILE", help="The file to write; - is stdout.")]
 
 
 def _commands(noun: str, of_what: str, example: str) -> typer.Typer:
-    """Return the commands for the files of a noun, scenario or problem; `example` is a built-in name."""
+    """Return the commands for the files of a noun, scenario or problem; `example` is a built-in
+    name.
+    """
     name = f"infoset {noun}s"
     kinds = [SCENARIO] if noun == SCENARIO else [*PROBLEMS]
     app = typer.Typer(
         name=f"{noun}s",
-        help=f"List, show, check and create {noun} files.\n\n{of_what} Without a command, list the built-in {noun}s.",
+        help=(
+            f"List, show, check and create {noun} files.\n"
+            "\n"
+            f"{of_what} Without a command, list the built-in {noun}s."
+        ),
         epilog=f"Example: {name} new mine.toml --like {example}",
     )
 
@@ -69,14 +97,19 @@ def _commands(noun: str, of_what: str, example: str) -> typer.Typer:
     def list_files() -> None:
         _print_list([file for file in built_in_files().values() if file.kind in kinds])
 
-    @app.command(help=f"Print a built-in {noun} file.", epilog=f"Example: {name} show {example} > mine.toml")
+    @app.command(
+        help=f"Print a built-in {noun} file.", epilog=f"Example: {name} show {example} > mine.toml"
+    )
     def show(name: BuiltInName) -> None:
         typer.echo(built_in(name, kinds).text, nl=False)
 
     @app.command(
-        help=f"Copy a built-in {noun} file, to be changed.", epilog=f"Example: {name} new mine.toml --like {example}"
+        help=f"Copy a built-in {noun} file, to be changed.",
+        epilog=f"Example: {name} new mine.toml --like {example}",
     )
-    def new(file: NewFile, like: Like = example, overwrite: Overwrite = False, quiet: Quiet = False) -> None:
+    def new(
+        file: NewFile, like: Like = example, overwrite: Overwrite = False, quiet: Quiet = False
+    ) -> None:
         _write(
             file,
             _named(built_in(like, kinds).text, file.stem, like),
@@ -89,7 +122,9 @@ def _commands(noun: str, of_what: str, example: str) -> typer.Typer:
         help=f"Check a {noun} file. The exit code is 2 if it has errors; all are listed.",
         epilog=f"Example: {name} check mine.toml",
     )
-    def check(file: FileName, settings: Settings = None, json: AsJson = False, quiet: Quiet = False) -> None:
+    def check(
+        file: FileName, settings: Settings = None, json: AsJson = False, quiet: Quiet = False
+    ) -> None:
         _print_check(file, settings, kinds, json, quiet)
 
     return app
@@ -100,7 +135,9 @@ def _named(text: str, name: str, like: str) -> str:
     if not re.fullmatch(r"\w[\w .-]{0,99}", name):  # "-" among others
         return text
     text = re.sub(r'(?m)^name = ".*"', f'name = "{name}"', text, count=1)
-    return re.sub(r'(?m)^description = ".*"', f'description = "Copy of {like}, changed"', text, count=1)
+    return re.sub(
+        r'(?m)^description = ".*"', f'description = "Copy of {like}, changed"', text, count=1
+    )
 
 
 def _write(file: Path, text: str, note: str, overwrite: bool, quiet: bool) -> None:
@@ -125,7 +162,9 @@ def _print_list(files: Sequence[BuiltIn]) -> None:
     show([table], quiet=False)
 
 
-def _print_check(file: str, settings: Sequence[str] | None, kinds: Sequence[str], json: bool, quiet: bool) -> None:
+def _print_check(
+    file: str, settings: Sequence[str] | None, kinds: Sequence[str], json: bool, quiet: bool
+) -> None:
     """Check a file of one of these kinds; print its name, fingerprint, schedule and warnings."""
     from infoset.experiments.common.input_file import load_problem
     from infoset.experiments.common.output import to_json
@@ -145,13 +184,22 @@ def _print_check(file: str, settings: Sequence[str] | None, kinds: Sequence[str]
         read = load_scenario(file, settings)
         head: dict[str, Any] = {"scenario_hash": fingerprint(read)}
         found = {"schedule": schedule_json(read), "possible_miss": possible_miss_json(read)}
-        warnings, facts = all_warnings(read), flight_facts(read)
+        warnings = all_warnings(read)
+        facts = flight_facts(read)
     else:
         read = load_problem(file, settings)
-        head, found = {"kind": read.kind, "problem_hash": fingerprint(read)}, {}
-        warnings, facts = [], []
+        head = {"kind": read.kind, "problem_hash": fingerprint(read)}
+        found = {}
+        warnings = []
+        facts = []
     if json:
-        contents = {"versions": versions(), "name": read.name, **head, **found, "warnings": warnings}
+        contents = {
+            "versions": versions(),
+            "name": read.name,
+            **head,
+            **found,
+            "warnings": warnings,
+        }
         typer.echo(to_json(contents), nl=False)
     elif not quiet:
         typer.echo("\n".join([f"ok  {read.name}  {fingerprint(read)}", *facts]))
@@ -161,7 +209,10 @@ def _print_check(file: str, settings: Sequence[str] | None, kinds: Sequence[str]
 scenarios = _commands(SCENARIO, "A scenario is an interception.", "own-scenario")
 
 
-@scenarios.command("from-states", epilog="Example: infoset scenarios from-states two-states --sigma 3 --out mine.toml")
+@scenarios.command(
+    "from-states",
+    epilog="Example: infoset scenarios from-states two-states --sigma 3 --out mine.toml",
+)
 def from_states(
     file: FileName,
     out: Out,
@@ -180,9 +231,16 @@ def from_states(
 
     model = load_scenario(like)
     found = scenario_of(file, model, sigma, KnownTarget(body_radius_m, disturbance), files_in or ())
-    note = f"with the sensors and the engine of {model.name}; change them, then: infoset scenarios check {out}"
+    note = (
+        f"with the sensors and the engine of {model.name}; change them, then: infoset scenarios "
+        f"check {out}"
+    )
     _write(out, found.text, note, overwrite, quiet)
     say_warnings([*found.warnings, *all_warnings(found.scenario)], quiet, found.notes)
 
 
-problems = _commands("problem", "A problem is one of rendezvous, pursuit or estimation, or a trajectory.", "service-2")
+problems = _commands(
+    "problem",
+    "A problem is one of rendezvous, pursuit or estimation, or a trajectory.",
+    "service-2",
+)

@@ -13,7 +13,14 @@ import typer
 from rich.text import Text
 
 from infoset.experiments.common.output import output_of, to_json
-from infoset.experiments.common.printed_numbers import Comparison, Paper, PrintedNumber, Progress, Verdict, read_paper
+from infoset.experiments.common.printed_numbers import (
+    Comparison,
+    Paper,
+    PrintedNumber,
+    Progress,
+    Verdict,
+    read_paper,
+)
 from infoset.experiments.common.screen import Part, progress_bar, show
 from infoset.experiments.multipoint.command import Multipoint
 from infoset.experiments.pursuit.command import Pursuit
@@ -22,7 +29,9 @@ from infoset.sim.versions import versions
 
 PAPERS = ("interception", "pareto", "multipoint", "reachability", "pursuit")
 COMMANDS: Mapping[str, type] = {"multipoint": Multipoint, "pursuit": Pursuit}
-"""Options of the commands whose results are compared, by paper; the other papers have a module `published`."""
+"""Options of the commands whose results are compared, by paper; the other papers have a module
+`published`.
+"""
 DISAGREED = 1
 """Exit code if a number that should agree does not."""
 
@@ -32,7 +41,8 @@ def reproduce_paper(paper: Paper, progress: Progress) -> tuple[Comparison, ...]:
     if paper.name not in COMMANDS:
         ours = import_module(f"infoset.experiments.{paper.name}.published").compute(progress)
     else:
-        command, ours = import_module(f"infoset.experiments.{paper.name}.run").COMMAND, {}
+        command = import_module(f"infoset.experiments.{paper.name}.run").COMMAND
+        ours = {}
         for done, (source, numbers) in enumerate(paper.tables.items(), start=1):
             report = command.report(COMMANDS[paper.name](**paper.options[source]))
             results = json.loads(to_json(command.to_json(report)))
@@ -54,13 +64,18 @@ def run(options: Reproduce) -> None:
     papers = [read_paper(name) for name in PAPERS if options.paper in (None, name)]
     with output_of(options) as written, progress_bar(options.quiet) as begin:
         compared = [reproduce_paper(paper, begin(paper.name)) for paper in papers]
-        summary = [_summary(paper, numbers) for paper, numbers in zip(papers, compared, strict=True)]
+        summary = [
+            _summary(paper, numbers) for paper, numbers in zip(papers, compared, strict=True)
+        ]
         written.deliver("--json", to_json({"versions": versions(), "papers": summary}))
     show(_lines(papers, compared), options.quiet or written.stdout_taken)
     wrong = [each for numbers in compared for each in numbers if each.verdict is Verdict.DISAGREED]
     for each in wrong:
         number = each.number
-        typer.echo(f"disagreed: {number.source}, {number.name}: {number.printed}, ours {each.ours.value}", err=True)
+        typer.echo(
+            f"disagreed: {number.source}, {number.name}: {number.printed}, ours {each.ours.value}",
+            err=True,
+        )
     if wrong:
         raise typer.Exit(DISAGREED)
 
@@ -77,7 +92,10 @@ def _summary(paper: Paper, numbers: Sequence[Comparison]) -> dict[str, object]:
         "remarks": list(paper.remarks),
         "numbers": [
             {
-                **{key: getattr(each.number, key) for key in ("source", "name", "printed", "corrected", "note")},
+                **{
+                    key: getattr(each.number, key)
+                    for key in ("source", "name", "printed", "corrected", "note")
+                },
                 "ours": each.ours.value if math.isfinite(each.ours.value) else None,
                 "other_model": each.ours.other,
                 "agrees_from": each.band[0],
@@ -99,7 +117,9 @@ def _lines(papers: Sequence[Paper], compared: Sequence[Sequence[Comparison]]) ->
         yield from (f"* {remark}" for remark in paper.remarks)
         yield ""
     for paper, numbers in zip(papers, compared, strict=True):
-        counts = ", ".join(f"{count} {verdict}" for verdict, count in _count(numbers).items() if count)
+        counts = ", ".join(
+            f"{count} {verdict}" for verdict, count in _count(numbers).items() if count
+        )
         yield f"{paper.name}: {len(numbers)} numbers: {counts}"
 
 
@@ -109,15 +129,20 @@ def _rows(numbers: Sequence[Comparison], notes: Sequence[str]) -> Iterator[str]:
     titles = ("", "published", "ours", "other model" if any(row[3] for row in rows) else "")
     widths = [max(len(row[column]) for row in (titles, *rows)) for column in range(4)]
     sources = [each.number.source for each in numbers]
-    for source, before, row in zip(["", *sources], ["", "", *sources], [(*titles, "verdict"), *rows], strict=False):
+    for source, before, row in zip(
+        ["", *sources], ["", "", *sources], [(*titles, "verdict"), *rows], strict=False
+    ):
         if source != before:
             yield f"{source}:"
-        name, *cells = (f"{cell:>{width}}" for cell, width in zip(row, widths, strict=False) if width)
+        name, *cells = (
+            f"{cell:>{width}}" for cell, width in zip(row, widths, strict=False) if width
+        )
         yield "  ".join(["", f"{row[0]:<{len(name)}}", *cells, row[4]])
 
 
 def _row(each: Comparison, notes: Sequence[str]) -> tuple[str, ...]:
-    number, ours = each.number, each.ours
+    number = each.number
+    ours = each.ours
     verdict = each.verdict.value
     if ours.spread is not None:
         verdict += f", most of ours: {ours.spread[0]:.3g} to {ours.spread[1]:.3g}"

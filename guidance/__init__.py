@@ -1,4 +1,6 @@
-"""Guidance: strategies that turn an information set into impulses, the thruster, and measurement noise."""
+"""Guidance: strategies that turn an information set into impulses, the thruster, and measurement
+noise.
+"""
 
 from infoset.guidance.estimate import MissEstimate
 from infoset.guidance.game_noise import GameNoise

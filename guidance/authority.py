@@ -11,7 +11,8 @@ from infoset.guidance.thruster import Thruster
 
 
 def correctable_later_m(situation: Situation, range_m: Floats) -> Floats:
-    """Return the miss (m) that impulses after this step can still correct, if the object is now at `range_m`.
+    """Return the miss (m) that impulses after this step can still correct, if the object is now at
+    `range_m`.
 
     It is the sum of mu2 x_j/e over the later impulses with x_j > 0, as many as the budget allows.
 
@@ -20,20 +21,27 @@ def correctable_later_m(situation: Situation, range_m: Floats) -> Floats:
     range_m : ndarray, shape (..., B, S)
         Ranges of hypotheses.
     """
-    thruster, e, step_s = situation.thruster, situation.closing_speed_m_s, situation.step_s
+    thruster = situation.thruster
+    e = situation.closing_speed_m_s
+    step_s = situation.step_s
     budget = situation.budget_left_m_s[:, None]
     if situation.later_times_s is not None:
-        return correctable_m(situation.later_times_s - situation.time_s, thruster, budget, range_m / e)
+        return correctable_m(
+            situation.later_times_s - situation.time_s, thruster, budget, range_m / e
+        )
     to_go_s = range_at_impulse(range_m, e, situation.lead_s) / e
     steps = np.ceil(to_go_s / step_s) - 1.0
     full = np.clip(np.floor(budget / thruster.max_impulse_m_s), 0.0, np.maximum(steps, 0.0))
-    return np.asarray(thruster.max_impulse_m_s * (full * to_go_s - step_s * 0.5 * full * (full + 1.0)))
+    return np.asarray(
+        thruster.max_impulse_m_s * (full * to_go_s - step_s * 0.5 * full * (full + 1.0))
+    )
 
 
 def correctable_m(
     times_s: Floats, thruster: Thruster, budget: Floats, to_go_s: Floats, first: Integers | int = 0
 ) -> Floats:
-    """Return the miss (m) that impulses can correct: as many as the budget allows, the last one with its rest.
+    """Return the miss (m) that impulses can correct: as many as the budget allows, the last one
+    with its rest.
 
     Parameters
     ----------
@@ -53,7 +61,8 @@ def correctable_m(
     sums_s = np.append(0.0, np.cumsum(times_s))
     next_s = np.append(times_s, 0.0)[end]
     return np.asarray(
-        thruster.max_impulse_m_s * (full * to_go_s - (sums_s[end] - sums_s[first])) + rest * (to_go_s - next_s)
+        thruster.max_impulse_m_s * (full * to_go_s - (sums_s[end] - sums_s[first]))
+        + rest * (to_go_s - next_s)
     )
 
 
@@ -64,9 +73,14 @@ def max_correctable_m(
     first: Integers | int = 0,
     budget: Floats | float | None = None,
 ) -> Floats:
-    """Return `correctable_m` with the errors of execution in favour of the engine: it never corrects more.
+    """Return `correctable_m` with the errors of execution in favour of the engine: it never
+    corrects more.
 
     The default budget is no limit.
     """
-    limit = np.asarray(thruster.max_impulse_m_s * (len(times_s) + 1.0) if budget is None else budget)
-    return (1.0 + thruster.execution_error_relative) * correctable_m(times_s, thruster, limit, to_go_s, first)
+    limit = np.asarray(
+        thruster.max_impulse_m_s * (len(times_s) + 1.0) if budget is None else budget
+    )
+    return (1.0 + thruster.execution_error_relative) * correctable_m(
+        times_s, thruster, limit, to_go_s, first
+    )

@@ -22,7 +22,8 @@ class MissEstimate:
 
     Notes
     -----
-    The rate of the line of sight at the impulse is miss / (c tau^2), with the closing speed c and the time to go tau.
+    The rate of the line of sight at the impulse is miss / (c tau^2), with the closing speed c and
+    the time to go tau.
     """
 
     miss_m: Floats
@@ -30,9 +31,12 @@ class MissEstimate:
     to_go_s: Floats
 
     def correction_m_s(self, dead_zone_m: Floats | float = 0.0) -> Floats:
-        """Return the impulse that corrects the part of the miss outside a dead zone, m/s; zero at the closest approach.
+        """Return the impulse that corrects the part of the miss outside a dead zone, m/s; zero at
+        the closest approach.
 
         `dead_zone_m` is the half-width of the zone, a number or shape (C, B).
         """
         outside_m = self.miss_m - np.clip(self.miss_m, -dead_zone_m, dead_zone_m)
-        return np.divide(outside_m, self.to_go_s, out=np.zeros_like(outside_m), where=self.to_go_s > 0.0)
+        return np.divide(
+            outside_m, self.to_go_s, out=np.zeros_like(outside_m), where=self.to_go_s > 0.0
+        )

@@ -17,21 +17,25 @@ TIE_TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class GameNoise:
-    """Measurements that keep the point of maximum predicted miss in the set, and as much of the set as possible.
+    """Measurements that keep the point of maximum predicted miss in the set, and as much of the set
+    as possible.
 
     Parameters
     ----------
     tie : TieRule
-        Which extreme is kept when both are equal in modulus, as they are at almost every step under U_s.
+        Which extreme is kept when both are equal in modulus, as they are at almost every step under
+        U_s.
     tie_draws : ndarray, shape (C, B, steps)
-        Uniform in [-1, 1], used by `TieRule.RANDOM`: the upper extreme where the draw is not negative.
+        Uniform in [-1, 1], used by `TieRule.RANDOM`: the upper extreme where the draw is not
+        negative.
     shift_m : ndarray, shape (C, steps), or None
-        Shift of the measured position across x in each step with `TieRule.UPPER`, m, limited by the error bound; the
-        last one holds for later steps. With `TieRule.LOWER` it has the other sign. These two rules then do not choose
-        the angle by the set. None is no shift.
+        Shift of the measured position across x in each step with `TieRule.UPPER`, m, limited by the
+        error bound; the last one holds for later steps. With `TieRule.LOWER` it has the other sign.
+        These two rules then do not choose the angle by the set. None is no shift.
     target_side : ndarray, shape (C, B), or None
-        Sign of the acceleration of each target, 1 or -1, if it is constant. The shift of these two rules then has the
-        other sign along each axis, which is worse: errors and target move the true state to the same side.
+        Sign of the acceleration of each target, 1 or -1, if it is constant. The shift of these two
+        rules then has the other sign along each axis, which is worse: errors and target move the
+        true state to the same side.
 
     Raises
     ------
@@ -40,14 +44,15 @@ class GameNoise:
 
     Notes
     -----
-    The errors that keep an extreme have one sign in most steps, so that the true state stays near the middle of a wide
-    set. Before a cut-off, errors that change from one bound to the other are worse: the true state is then at an end of
-    the set (`infoset.sim.closed_form.worst_shift_m`).
+    The errors that keep an extreme have one sign in most steps, so that the true state stays near
+    the middle of a wide set. Before a cut-off, errors that change from one bound to the other are
+    worse: the true state is then at an end of the set (`infoset.sim.closed_form.worst_shift_m`).
 
-    Each axis has its own extremes and its own worse one; the measured angles are chosen for each axis. In space, the
-    range has the rule of the plane, for the corner (worse extreme of y, worse extreme of z) of the rectangle of
-    predicted misses of each section: the point to keep is in the section where this corner has the maximum modulus,
-    the other extreme in that of the opposite corner.
+    Each axis has its own extremes and its own worse one; the measured angles are chosen for each
+    axis. In space, the range has the rule of the plane, for the corner (worse extreme of y, worse
+    extreme of z) of the rectangle of predicted misses of each section: the point to keep is in the
+    section where this corner has the maximum modulus, the other extreme in that of the opposite
+    corner.
 
     References
     ----------
@@ -74,24 +79,31 @@ class GameNoise:
         for name, sensor in sight.sensors.items():
             true = sensor.true_value(sight)
             if isinstance(sensor, BearingSensor):
-                chosen = self._shifted(sensor, sight, _angle(sensor, sight, angles, miss, upper_is_worse))
+                chosen = self._shifted(
+                    sensor, sight, _angle(sensor, sight, angles, miss, upper_is_worse)
+                )
             elif isinstance(sensor, RangeSensor):
                 chosen = _range(sensor, sight, predicted, miss, upper_is_worse)
             else:
-                upper, lower = sensor.true_value(miss.upper_point), sensor.true_value(miss.lower_point)
+                upper = sensor.true_value(miss.upper_point)
+                lower = sensor.true_value(miss.lower_point)
                 chosen = sensor.nearest(sight, np.where(upper_is_worse, upper, lower))
             measured[name] = np.where(miss.exists, chosen, true)
         return measured
 
     @property
     def truth_side(self) -> Floats:
-        """Side to which the shift moves the true state, shape () or (C, B): 1 or -1, 0 for no shift."""
+        """Side to which the shift moves the true state, shape () or (C, B): 1 or -1, 0 for no
+        shift.
+        """
         sides = {} if self.shift_m is None else {TieRule.UPPER: -1.0, TieRule.LOWER: 1.0}
         side = np.array(sides.get(self.tie, 0.0))
         return side if self.target_side is None else np.where(side == 0.0, 0.0, self.target_side)
 
     def _shifted(self, sensor: BearingSensor, sight: LineOfSight, chosen: Floats) -> Floats:
-        """Return the measured angles with the shift of this step where there is one, and the chosen ones elsewhere."""
+        """Return the measured angles with the shift of this step where there is one, and the chosen
+        ones elsewhere.
+        """
         if self.shift_m is None:
             return chosen
         side = self.truth_side
@@ -100,9 +112,12 @@ class GameNoise:
         return np.where(side == 0.0, chosen, shifted)
 
     def _upper_is_worse(self, miss: PredictedMiss, step: int) -> Flags:
-        upper, lower = np.abs(miss.upper_m), np.abs(miss.lower_m)
+        upper = np.abs(miss.upper_m)
+        lower = np.abs(miss.lower_m)
         tie = np.abs(upper - lower) <= TIE_TOLERANCE * (miss.upper_m - miss.lower_m)
-        at_tie: Flags | bool = self.tie is TieRule.UPPER or (self.tie is TieRule.ALTERNATE and step % 2 == 0)
+        at_tie: Flags | bool = self.tie is TieRule.UPPER or (
+            self.tie is TieRule.ALTERNATE and step % 2 == 0
+        )
         if self.tie is TieRule.RANDOM:
             at_tie = draws_of_step("tie_draws", self.tie_draws, step, tie.shape) >= 0.0
         return np.where(tie, at_tie, upper > lower)
@@ -110,7 +125,9 @@ class GameNoise:
 
 @dataclass(frozen=True)
 class SwitchingNoise(GameNoise):
-    """Game noise that keeps the extreme prescribed for each step: the upper one where `tie_draws` is not negative."""
+    """Game noise that keeps the extreme prescribed for each step: the upper one where `tie_draws`
+    is not negative.
+    """
 
     def _upper_is_worse(self, miss: PredictedMiss, step: int) -> Flags:
         return draws_of_step("tie_draws", self.tie_draws, step, miss.upper_m.shape) >= 0.0
@@ -123,7 +140,8 @@ def _angle(
     miss: PredictedMiss,
     upper_is_worse: Flags,
 ) -> Floats:
-    upper, lower = miss.upper_point, miss.lower_point
+    upper = miss.upper_point
+    lower = miss.lower_point
     worst = np.where(upper_is_worse, upper.alpha_rad, lower.alpha_rad)
     other = np.where(upper_is_worse, lower.alpha_rad, upper.alpha_rad)
     reach = sensor.error_bounds(np.where(upper_is_worse, upper.range_m, lower.range_m))
@@ -141,13 +159,20 @@ def _angle(
 
 
 def _range(
-    sensor: RangeSensor, sight: LineOfSight, predicted: InformationSetView, miss: PredictedMiss, upper_is_worse: Flags
+    sensor: RangeSensor,
+    sight: LineOfSight,
+    predicted: InformationSetView,
+    miss: PredictedMiss,
+    upper_is_worse: Flags,
 ) -> Floats:
-    upper, lower, error = miss.upper_point.range_m, miss.lower_point.range_m, sensor.relative_error
+    upper = miss.upper_point.range_m
+    lower = miss.lower_point.range_m
+    error = sensor.relative_error
     if len(upper_is_worse) > 1:
         worst, other = _ranges_of_corners(predicted, upper_is_worse)
     else:  # the corners of an interval are its ends
-        worst, other = np.where(upper_is_worse, upper, lower)[0], np.where(upper_is_worse, lower, upper)[0]
+        worst = np.where(upper_is_worse, upper, lower)[0]
+        other = np.where(upper_is_worse, lower, upper)[0]
     minimum, maximum = predicted.stored_range_interval_m()
     return keep_point(
         worst >= other,
@@ -160,15 +185,20 @@ def _range(
     )
 
 
-def _ranges_of_corners(predicted: InformationSetView, upper_is_worse: Flags) -> tuple[Floats, Floats]:
+def _ranges_of_corners(
+    predicted: InformationSetView, upper_is_worse: Flags
+) -> tuple[Floats, Floats]:
     """Return the ranges of the sections of the worst corner and of the opposite one, m, each (B,).
 
-    Corners on the other side of zero count as negative, so that the rule is that of the plane if an axis is exactly
-    zero.
+    Corners on the other side of zero count as negative, so that the rule is that of the plane if an
+    axis is exactly zero.
     """
     lower, upper = predicted.predicted_miss_by_section_m()
-    is_upper, ranges = upper_is_worse[..., None], predicted.ranges_m
-    living, rows, side = predicted.living & (ranges != 0.0), np.arange(len(ranges)), np.where(is_upper, 1.0, -1.0)
+    is_upper = upper_is_worse[..., None]
+    ranges = predicted.ranges_m
+    living = predicted.living & (ranges != 0.0)
+    rows = np.arange(len(ranges))
+    side = np.where(is_upper, 1.0, -1.0)
     worst, other = (
         np.copysign(np.hypot(*corner), (side * corner).sum(axis=0))
         for corner in (np.where(is_upper, upper, lower), np.where(is_upper, lower, upper))
@@ -188,10 +218,11 @@ def keep_point(
     lower: Floats,
     upper: Floats,
 ) -> Floats:
-    """Return the measured values in [lower, upper] that keep a point, and otherwise as much of the set as possible.
+    """Return the measured values in [lower, upper] that keep a point, and otherwise as much of the
+    set as possible.
 
-    A measured value agrees with an interval of values; "top" and "bottom" are the ends of that interval. All arrays
-    have the shape (..., B).
+    A measured value agrees with an interval of values; "top" and "bottom" are the ends of that
+    interval. All arrays have the shape (..., B).
 
     Parameters
     ----------
@@ -200,7 +231,8 @@ def keep_point(
     point_at_top, point_at_bottom : ndarray
         Measured values whose interval ends at the point, above or below.
     min_at_bottom, max_at_top : ndarray
-        Measured values whose interval begins at the minimum value of the set, or ends at its maximum.
+        Measured values whose interval begins at the minimum value of the set, or ends at its
+        maximum.
     lower, upper : ndarray
         Measured values that the true value allows.
 

@@ -11,21 +11,28 @@ from infoset.arrays import Floats
 from infoset.guidance.scripted_noise import RandomNoise
 
 _SMALLEST = 2.0**-54
-"""Half of the smallest distance of a random number from an end of [0, 1]: the quantile of a Gaussian is finite."""
+"""Half of the smallest distance of a random number from an end of [0, 1]: the quantile of a
+Gaussian is finite.
+"""
 
 
 def share_cut(sigma: float) -> float:
-    """Return the share of a Gaussian of standard deviation `sigma`, in units of the bound, that lies outside it."""
+    """Return the share of a Gaussian of standard deviation `sigma`, in units of the bound, that
+    lies outside it.
+    """
     return float(2.0 * ndtr(-1.0 / sigma))
 
 
 def truncated_gaussian(uniform: Floats, sigma: float) -> Floats:
     """Return numbers of a Gaussian of standard deviation `sigma`, truncated to [-1, 1].
 
-    They are the quantiles of numbers that are uniform in [-1, 1]. The negative number has the negative quantile.
+    They are the quantiles of numbers that are uniform in [-1, 1]. The negative number has the
+    negative quantile.
     """
     size = np.abs(uniform)
-    tail = 0.5 * (1.0 - size) + size * ndtr(-1.0 / sigma)  # the probability of a larger error of this sign
+    tail = 0.5 * (1.0 - size) + size * ndtr(
+        -1.0 / sigma
+    )  # the probability of a larger error of this sign
     return np.asarray(np.copysign(np.minimum(-sigma * ndtri(tail), 1.0), uniform))
 
 
@@ -41,8 +48,9 @@ def correlated_uniform(uniform: Floats, correlation: float) -> Floats:
 
     Notes
     -----
-    The underlying process is that of Gauss and Markov: x_0 = w_0 and x_k = c x_(k-1) + sqrt(1 - c^2) w_k for the
-    correlation c and independent standard Gaussian w_k. It is stationary, and its autocorrelation after k steps is c^k.
+    The underlying process is that of Gauss and Markov: x_0 = w_0 and x_k = c x_(k-1) + sqrt(1 -
+    c^2) w_k for the correlation c and independent standard Gaussian w_k. It is stationary, and its
+    autocorrelation after k steps is c^k.
     """
     process = _quantile(uniform)
     process[..., 1:] *= np.sqrt(1.0 - correlation**2)
@@ -74,7 +82,9 @@ def gaussian_noise(
         As in `correlated_uniform`, for errors that are correlated in time; 0 is independent errors.
     """
     errors = {
-        name: truncated_gaussian(correlated_uniform(each, correlation) if correlation else each, sigma)
+        name: truncated_gaussian(
+            correlated_uniform(each, correlation) if correlation else each, sigma
+        )
         for name, each in uniform.items()
     }
     return RandomNoise(errors, None if bias is None else truncated_gaussian(bias, sigma))

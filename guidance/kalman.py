@@ -15,19 +15,22 @@ from infoset.model import SetModel
 from infoset.sensors import BearingSensor, RangeSensor
 
 Z, VZ, X, SPEED, ACCELERATION = range(5)
-"""Components of a state: lateral offset, its rate, range, closing speed and lateral acceleration."""
+"""Components of a state: lateral offset, its rate, range, closing speed and lateral
+acceleration.
+"""
 MEMBERS = 9
 """Number M of filters."""
 ROUNDING = 64.0 * 2.0**-52
-"""Rounding error of the variance of a component, relative to it: since the last measurement each element has gone
-through three products of matrices of up to 5 x 5, some 50 roundings."""
+"""Rounding error of the variance of a component, relative to it: since the last measurement each
+element has gone through three products of matrices of up to 5 x 5, some 50 roundings."""
 PRECISE = 2.0**-36
-"""Variance of a precise measurement, relative to the maximum variance of its expected value. A less precise measurement
-leaves at least 16 of the 52 bits of the covariance."""
+"""Variance of a precise measurement, relative to the maximum variance of its expected value. A less
+precise measurement leaves at least 16 of the 52 bits of the covariance."""
 
 
 class KalmanBank:
-    """A bank of M = 9 extended Kalman filters for each engagement and lateral axis, one for each interval of the range.
+    """A bank of M = 9 extended Kalman filters for each engagement and lateral axis, one for each
+    interval of the range.
 
     Parameters
     ----------
@@ -39,40 +42,45 @@ class KalmanBank:
     Attributes
     ----------
     mean, covariance : ndarray, shape (C, B, M, n) and (C, B, M, n, n)
-        Estimates of (z, V_z, x, closing speed), m and m/s, and of the acceleration, m/s^2, if n is 5.
+        Estimates of (z, V_z, x, closing speed), m and m/s, and of the acceleration, m/s^2, if n is
+        5.
     log_weight : ndarray, shape (C, B, M)
         Logarithms of the probabilities of the intervals, up to a constant.
 
     Notes
     -----
-    The state is (z, V_z, x, closing speed) with z' = V_z, x' = -closing speed, and the impulses as given. The variance
-    of a measurement is b^2/3, that of an error uniform within +-b, with b at the estimated range. The prior is uniform
-    within the initial bounds of the set. Angles alone show the range only through the impulses, and one linearisation
-    is poor for a wide prior of the range. Therefore each filter of the bank has an interval of the range, and its
-    weight is the likelihood of its measurements (a range-parameterised filter). The estimated miss is the one whose
-    correction minimises the expected square of the miss over the bank: E[m tau]/E[tau^2] times E[tau], with the time to
-    go tau from the impulse. Cost: about 30 NumPy operations on C B M stacked n x n matrices per step. Libraries such as
-    filterpy run one filter at a time, in a Python loop.
+    The state is (z, V_z, x, closing speed) with z' = V_z, x' = -closing speed, and the impulses as
+    given. The variance of a measurement is b^2/3, that of an error uniform within +-b, with b at
+    the estimated range. The prior is uniform within the initial bounds of the set. Angles alone
+    show the range only through the impulses, and one linearisation is poor for a wide prior of the
+    range. Therefore each filter of the bank has an interval of the range, and its weight is the
+    likelihood of its measurements (a range-parameterised filter). The estimated miss is the one
+    whose correction minimises the expected square of the miss over the bank: E[m tau]/E[tau^2]
+    times E[tau], with the time to go tau from the impulse. Cost: about 30 NumPy operations on C B M
+    stacked n x n matrices per step. Libraries such as filterpy run one filter at a time, in a
+    Python loop.
 
-    The acceleration a has a uniform prior within the bound nu of the set's model, and changes by a random walk with the
-    variance nu^2/3 over the nominal flight. A manoeuvre of constant size that starts at a random time within the flight
-    has this spectral density (Zarchan).
+    The acceleration a has a uniform prior within the bound nu of the set's model, and changes by a
+    random walk with the variance nu^2/3 over the nominal flight. A manoeuvre of constant size that
+    starts at a random time within the flight has this spectral density (Zarchan).
 
-    A camera with a constant centroid error has two parts of errors. The pixel part is the noise of the measurements;
-    the variance c^2/3 of the centroid part is added to that of the miss. Errors of the engine add the variance
-    (delta k)^2/3 to that of V_z after an impulse k.
+    A camera with a constant centroid error has two parts of errors. The pixel part is the noise of
+    the measurements; the variance c^2/3 of the centroid part is added to that of the miss. Errors
+    of the engine add the variance (delta k)^2/3 to that of V_z after an impulse k.
 
-    A measurement is *precise* if its variance R is nearly below the rounding of the variance of the expected value; R
-    is negligible for an angle that is measured without error. It is used as a linear equation of the state s, h s = c
-    with c of variance R: z = x tan(alpha) for an angle, which has no error of linearisation. Joseph's form would lose
-    the covariance P to rounding, and the filter updates a root S of it, P = S S' (Potter's form): with f = S'h the gain
-    is K = S f / (f'f + R), and S becomes S - K f' / (1 + (R / (f'f + R))^(1/2)). Where f'f + R is rounding, the filter
-    knows h s already, and the measurement does not change its state.
+    A measurement is *precise* if its variance R is nearly below the rounding of the variance of the
+    expected value; R is negligible for an angle that is measured without error. It is used as a
+    linear equation of the state s, h s = c with c of variance R: z = x tan(alpha) for an angle,
+    which has no error of linearisation. Joseph's form would lose the covariance P to rounding, and
+    the filter updates a root S of it, P = S S' (Potter's form): with f = S'h the gain is K = S f /
+    (f'f + R), and S becomes S - K f' / (1 + (R / (f'f + R))^(1/2)). Where f'f + R is rounding, the
+    filter knows h s already, and the measurement does not change its state.
 
     References
     ----------
-    Kalman (1960); Peach (1995), Bearings-only tracking using a set of range-parameterised extended Kalman filters;
-    Zarchan (2012), Tactical and Strategic Missile Guidance, chapter 9, for the acceleration.
+    Kalman (1960); Peach (1995), Bearings-only tracking using a set of range-parameterised extended
+    Kalman filters; Zarchan (2012), Tactical and Strategic Missile Guidance, chapter 9, for the
+    acceleration.
     """
 
     def __init__(self, shape: tuple[int, int], is_augmented: bool = False) -> None:
@@ -88,14 +96,16 @@ class KalmanBank:
         else:
             self._predict(situation)
         nearest = situation.closing_speed_m_s * situation.step_s * 0.1
-        z, x = self.mean[..., Z], np.maximum(self.mean[..., X], nearest)
+        z = self.mean[..., Z]
+        x = np.maximum(self.mean[..., X], nearest)
         meter = situation.sensors.get("range")
         if "range" in situation.new and isinstance(meter, RangeSensor):
             gradient = np.zeros_like(self.mean)
             gradient[..., X] = 1.0
             variance = (meter.relative_error * x) ** 2 / 3.0
             self._measure(situation, "range", self.mean[..., X], gradient, variance)
-            z, x = self.mean[..., Z], np.maximum(self.mean[..., X], nearest)
+            z = self.mean[..., Z]
+            x = np.maximum(self.mean[..., X], nearest)
         if "angle" in situation.new:
             gradient = np.zeros_like(self.mean)
             square = z * z + x * x
@@ -104,9 +114,13 @@ class KalmanBank:
             variance = _independent_error_rad(situation.information.model, x) ** 2 / 3.0
             precise = self._is_precise(gradient, variance)
             if precise.any():
-                alpha = np.where(situation.is_new("angle"), situation.measured["angle"], 0.0)[..., None]
-                # The equation z = x tan(alpha), times cos^2(alpha) / x, for an innovation in radians.
-                cosine, sine = np.cos(alpha), np.sin(alpha)
+                alpha = np.where(situation.is_new("angle"), situation.measured["angle"], 0.0)[
+                    ..., None
+                ]
+                # The equation z = x tan(alpha), times cos^2(alpha) / x, for an innovation in
+                # radians.
+                cosine = np.cos(alpha)
+                sine = np.sin(alpha)
                 expected = np.where(precise, alpha - cosine * (sine - z / x * cosine), expected)
                 gradient[..., Z] = np.where(precise, cosine * cosine / x, gradient[..., Z])
                 gradient[..., X] = np.where(precise, -sine * cosine / x, gradient[..., X])
@@ -115,10 +129,13 @@ class KalmanBank:
     def estimate(self, situation: Situation) -> MissEstimate:
         """Return the estimated miss over the bank."""
         ahead = self.mean[..., X] > 0.0
-        weight = np.where(ahead, np.exp(self.log_weight - self.log_weight.max(axis=-1, keepdims=True)), 0.0)
+        weight = np.where(
+            ahead, np.exp(self.log_weight - self.log_weight.max(axis=-1, keepdims=True)), 0.0
+        )
         total = weight.sum(axis=-1, keepdims=True)
         weight = np.divide(weight, total, out=np.zeros_like(weight), where=total > 0.0)
-        speed, velocity = self.mean[..., SPEED], self.mean[..., VZ]
+        speed = self.mean[..., SPEED]
+        velocity = self.mean[..., VZ]
         to_go = np.maximum(self.mean[..., X], 0.0) / speed
         miss = self.mean[..., Z] + velocity * to_go
         final_velocity = velocity
@@ -126,7 +143,12 @@ class KalmanBank:
             acceleration = self.mean[..., ACCELERATION]
             miss = miss + 0.5 * acceleration * to_go**2
             final_velocity = velocity + acceleration * to_go
-        gradient = [np.ones_like(miss), to_go, final_velocity / speed, -final_velocity * to_go / speed]
+        gradient = [
+            np.ones_like(miss),
+            to_go,
+            final_velocity / speed,
+            -final_velocity * to_go / speed,
+        ]
         if self._is_augmented:
             gradient.append(0.5 * to_go**2)
         by_state = np.stack(gradient, axis=-1)
@@ -136,10 +158,17 @@ class KalmanBank:
         mean = (weight * miss).sum(axis=-1)
         # Rounding may leave a small variance just below zero.
         spread = (weight * (np.maximum(variance, 0.0) + (miss - mean[..., None]) ** 2)).sum(axis=-1)
-        deviation = np.sqrt(spread + _constant_error_m(situation.information.model.angle_sensor) ** 2 / 3.0)
+        deviation = np.sqrt(
+            spread + _constant_error_m(situation.information.model.angle_sensor) ** 2 / 3.0
+        )
         lever = np.maximum(to_go - situation.lead_s, 0.0)
         square = (weight * lever**2).sum(axis=-1)
-        best = np.divide((weight * miss * lever).sum(axis=-1), square, out=np.zeros_like(mean), where=square > 0.0)
+        best = np.divide(
+            (weight * miss * lever).sum(axis=-1),
+            square,
+            out=np.zeros_like(mean),
+            where=square > 0.0,
+        )
         lever = (weight * lever).sum(axis=-1)
         return MissEstimate(best * lever, deviation, lever)
 
@@ -155,13 +184,25 @@ class KalmanBank:
         self.mean[..., X] = 0.5 * (edges[:-1] + edges[1:])
         self.mean[..., SPEED] = -0.5 * (bounds.vx_m_s[0] + bounds.vx_m_s[1])
         for axis, plane in enumerate(map(model.axis, model.axes)):
-            z_m, vz_m_s = plane.bounds.z_m, plane.bounds.vz_m_s
-            self.mean[axis, ..., Z], self.mean[axis, ..., VZ] = 0.5 * (z_m[0] + z_m[1]), 0.5 * (vz_m_s[0] + vz_m_s[1])
-            widths = [np.ptp(z_m), np.ptp(vz_m_s), stretch, np.ptp(bounds.vx_m_s), 2.0 * plane.acceleration_m_s2]
+            z_m = plane.bounds.z_m
+            vz_m_s = plane.bounds.vz_m_s
+            self.mean[axis, ..., Z], self.mean[axis, ..., VZ] = (
+                0.5 * (z_m[0] + z_m[1]),
+                0.5 * (vz_m_s[0] + vz_m_s[1]),
+            )
+            widths = [
+                np.ptp(z_m),
+                np.ptp(vz_m_s),
+                stretch,
+                np.ptp(bounds.vx_m_s),
+                2.0 * plane.acceleration_m_s2,
+            ]
             self.covariance[axis] = np.diag(np.square(widths[: self.mean.shape[-1]]) / 12.0)
 
     def _predict(self, situation: Situation) -> None:
-        step_s, model, size = situation.step_s, situation.information.model, self.mean.shape[-1]
+        step_s = situation.step_s
+        model = situation.information.model
+        size = self.mean.shape[-1]
         self.mean[..., VZ] -= situation.last_impulse_m_s[..., None]
         motion = np.eye(size)
         motion[Z, VZ], motion[X, SPEED] = step_s, -step_s
@@ -179,7 +220,14 @@ class KalmanBank:
         self.covariance = motion @ self.covariance @ motion.T
         self.covariance += variance[:, None, None, None, None] * np.outer(push, push)
 
-    def _measure(self, situation: Situation, sensor: str, expected: Floats, gradient: Floats, variance: Floats) -> None:
+    def _measure(
+        self,
+        situation: Situation,
+        sensor: str,
+        expected: Floats,
+        gradient: Floats,
+        variance: Floats,
+    ) -> None:
         """Update each filter with one scalar measurement, in Joseph's form, and its weight."""
         new = situation.is_new(sensor)
         innovation = np.where(new, situation.measured[sensor], 0.0)[..., None] - expected
@@ -190,7 +238,8 @@ class KalmanBank:
             new = new & ~precise
             variance = np.where(precise, 1.0, variance)
         spread = np.einsum("...ij,...j->...i", self.covariance, gradient)
-        # Rounding may leave a negative value where angles have reduced a variance by twenty decades.
+        # Rounding may leave a negative value where angles have reduced a variance by twenty
+        # decades.
         total = np.maximum(np.einsum("...i,...i->...", gradient, spread), 0.0) + variance
         gain = np.where(new[..., None], spread / total[..., None], 0.0)
         self.mean = self.mean + gain * innovation[..., None]
@@ -203,13 +252,18 @@ class KalmanBank:
     def _measure_precisely(
         self, where: Flags, innovation: Floats, expected: Floats, gradient: Floats, variance: Floats
     ) -> None:
-        """Update the filters of `where` with one scalar measurement, in Potter's form, and their weights."""
-        row, residual = gradient[where], innovation[where]
+        """Update the filters of `where` with one scalar measurement, in Potter's form, and their
+        weights.
+        """
+        row = gradient[where]
+        residual = innovation[where]
         root = _square_root(self.covariance[where])
         across = np.einsum("nij,ni->nj", root, row)
         square = (across * across).sum(axis=-1) + variance[where]
 
-        rounding = ROUNDING * self._largest_variance(gradient)[where] + (ROUNDING * expected[where]) ** 2
+        rounding = (
+            ROUNDING * self._largest_variance(gradient)[where] + (ROUNDING * expected[where]) ** 2
+        )
         total = np.maximum(square, rounding)
         across = np.where((square > rounding)[:, None], across, 0.0)
         gain = np.einsum("nij,nj->ni", root, across) / total[:, None]
@@ -225,26 +279,33 @@ class KalmanBank:
         return np.asarray(variance < PRECISE * self._largest_variance(gradient))
 
     def _largest_variance(self, gradient: Floats) -> Floats:
-        """Return the maximum variance h'Ph of an expected value, (sum |h_i| s_i)^2 with the deviations s_i of P."""
+        """Return the maximum variance h'Ph of an expected value, (sum |h_i| s_i)^2 with the
+        deviations s_i of P.
+        """
         deviations = np.sqrt(np.maximum(np.einsum("...ii->...i", self.covariance), 0.0))
         return np.asarray((np.abs(gradient) * deviations).sum(axis=-1) ** 2)
 
 
 def _square_root(covariance: Floats) -> Floats:
-    """Return a matrix S with S S' = P for each covariance P, shape (n, size, size); rounding may leave P indefinite."""
+    """Return a matrix S with S S' = P for each covariance P, shape (n, size, size); rounding may
+    leave P indefinite.
+    """
     deviations = np.sqrt(np.maximum(np.einsum("nii->ni", covariance), 0.0))
     scale = np.where(deviations > 0.0, deviations, 1.0)
     # The components have different units, and the rounding errors of their correlations have none.
     correlations = np.clip(covariance / scale[:, :, None] / scale[:, None, :], -1.0, 1.0)
     values, vectors = np.linalg.eigh(correlations)
-    return np.asarray(deviations[:, :, None] * vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :])
+    return np.asarray(
+        deviations[:, :, None] * vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
+    )
 
 
 def _independent_error_rad(model: SetModel, range_m: Floats) -> Floats:
-    """Return the bound of the part of an angle error that is independent between measurements, rad, shape (C, B, M).
+    """Return the bound of the part of an angle error that is independent between measurements, rad,
+    shape (C, B, M).
 
-    A line that falls with the range is positive up to the maximum possible distance, and an estimate can be beyond it.
-    The bound is therefore at least half of that at the maximum distance.
+    A line that falls with the range is positive up to the maximum possible distance, and an
+    estimate can be beyond it. The bound is therefore at least half of that at the maximum distance.
     """
     bound = np.empty_like(range_m)
     for axis, plane in enumerate(map(model.axis, model.axes)):
@@ -252,7 +313,9 @@ def _independent_error_rad(model: SetModel, range_m: Floats) -> Floats:
         bound[axis] = (
             sensor.constant_error_rad
             if sensor.has_constant_bias
-            else np.maximum(sensor.error_bound(range_m[axis]), 0.5 * sensor.error_bound(plane.bounds.farthest_m))
+            else np.maximum(
+                sensor.error_bound(range_m[axis]), 0.5 * sensor.error_bound(plane.bounds.farthest_m)
+            )
         )
     return bound
 
@@ -260,30 +323,34 @@ def _independent_error_rad(model: SetModel, range_m: Floats) -> Floats:
 def _constant_error_m(sensor: BearingSensor) -> float:
     """Return the bound of the part of the errors that is constant in a flight, m.
 
-    The angles then show a point at this lateral distance from the centre, which no measurement can tell from the
-    centre: the error of an estimated miss contains it unchanged.
+    The angles then show a point at this lateral distance from the centre, which no measurement can
+    tell from the centre: the error of an estimated miss contains it unchanged.
     """
     return sensor.centroid_error_m if sensor.has_constant_bias else 0.0
 
 
 @dataclass(frozen=True)
 class Kalman(Checked):
-    """Estimate as if errors were Gaussian, and correct the part of the expected miss outside a dead zone.
+    """Estimate as if errors were Gaussian, and correct the part of the expected miss outside a dead
+    zone.
 
     Parameters
     ----------
     dead_zone : float
         Half-width of the dead zone of the estimated miss, in standard deviations.
     last_s : float
-        Time to go below which there is no dead zone, s. With a cut-off, the time before the cut-off.
+        Time to go below which there is no dead zone, s. With a cut-off, the time before the
+        cut-off.
 
     Notes
     -----
-    `KalmanBank` describes the filters. The last decision before the arrival that the engine allows has no dead zone.
+    `KalmanBank` describes the filters. The last decision before the arrival that the engine allows
+    has no dead zone.
 
-    Limits: the filter guarantees nothing. Its deviations are those of independent errors; an error that keeps its sign,
-    or changes it on purpose, is within the bound but outside the theory. A uniform error has sharp ends, which contain
-    more information than its variance; an estimator of second moments cannot use it. The rate sensor is not used.
+    Limits: the filter guarantees nothing. Its deviations are those of independent errors; an error
+    that keeps its sign, or changes it on purpose, is within the bound but outside the theory. A
+    uniform error has sharp ends, which contain more information than its variance; an estimator of
+    second moments cannot use it. The rate sensor is not used.
     """
 
     dead_zone: NotNegative = 1.0
@@ -301,5 +368,9 @@ class Kalman(Checked):
         if not situation.may_fire:
             return np.zeros_like(situation.last_impulse_m_s)
         estimate = state.estimate(situation)
-        is_last = (situation.last_s - situation.lead_s <= self.last_s) | (estimate.to_go_s <= self.last_s)
-        return estimate.correction_m_s(np.where(is_last, 0.0, self.dead_zone * estimate.deviation_m))
+        is_last = (situation.last_s - situation.lead_s <= self.last_s) | (
+            estimate.to_go_s <= self.last_s
+        )
+        return estimate.correction_m_s(
+            np.where(is_last, 0.0, self.dead_zone * estimate.deviation_m)
+        )

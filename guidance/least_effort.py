@@ -25,25 +25,28 @@ class LeastEffort:
 
     Notes
     -----
-    A hypothesis is a label of the set, with the time to go tau and the interval [l, h] of possible misses. Its
-    *authority* A is the miss that later impulses can correct: the sum of mu2 tau_j over them, as many as schedule,
-    cut-off and budget allow, divided by 1 + eta, the maximum ratio of true and nominal closing speed. The *reference*
-    ref is the miss that no strategy can prevent (`unavoidable_m`). The *effort* rho is the share of the authority that
-    the hypothesis needs after the impulse u, if its worst miss is to become ref:
+    A hypothesis is a label of the set, with the time to go tau and the interval [l, h] of possible
+    misses. Its *authority* A is the miss that later impulses can correct: the sum of mu2 tau_j over
+    them, as many as schedule, cut-off and budget allow, divided by 1 + eta, the maximum ratio of
+    true and nominal closing speed. The *reference* ref is the miss that no strategy can prevent
+    (`unavoidable_m`). The *effort* rho is the share of the authority that the hypothesis needs
+    after the impulse u, if its worst miss is to become ref:
 
         rho(u) = (max(h - u tau, u tau - l) - ref) / A .
 
-    The impulse minimises the maximum rho of all hypotheses. If that is more than 1, it minimises the maximum excess
-    max(h - u tau, u tau - l) - A instead. After the last impulse A is zero, and the excess is the miss. An impulse that
-    keeps all excesses below a bound that later impulses can keep too guarantees this bound, and effort costs no more
-    impulses than this asks.
+    The impulse minimises the maximum rho of all hypotheses. If that is more than 1, it minimises
+    the maximum excess max(h - u tau, u tau - l) - A instead. After the last impulse A is zero, and
+    the excess is the miss. An impulse that keeps all excesses below a bound that later impulses can
+    keep too guarantees this bound, and effort costs no more impulses than this asks.
 
-    U_s makes the extreme misses of all hypotheses opposite, as if all were equally urgent. If the range is unknown, one
-    extreme may belong to a hypothesis with 20 s to go, for which later impulses can correct kilometres, and the other
-    one to the truth, 3 s away. If range and closing speed are known, there is one hypothesis, and U_s is optimal.
+    U_s makes the extreme misses of all hypotheses opposite, as if all were equally urgent. If the
+    range is unknown, one extreme may belong to a hypothesis with 20 s to go, for which later
+    impulses can correct kilometres, and the other one to the truth, 3 s away. If range and closing
+    speed are known, there is one hypothesis, and U_s is optimal.
 
-    Limits: the authority does not contain a budget that an adversary can drain, nor the widening of the set by large
-    impulses at a very uncertain speed. docs/strategies.md has the derivation and the measurements.
+    Limits: the authority does not contain a budget that an adversary can drain, nor the widening of
+    the set by large impulses at a very uncertain speed. docs/strategies.md has the derivation and
+    the measurements.
     """
 
     name = "least-effort"
@@ -53,7 +56,9 @@ class LeastEffort:
 
     def decide(self, situation: Situation, state: None) -> Floats:
         """Return the impulses with the minimax effort, m/s."""
-        view, e, most = situation.information, situation.closing_speed_m_s, situation.thruster.max_impulse_m_s
+        view = situation.information
+        e = situation.closing_speed_m_s
+        most = situation.thruster.max_impulse_m_s
         ranges = view.ranges_m
         pending = situation.pending_m(ranges / e)
         minimum, maximum = view.predicted_miss_by_section_m()
@@ -63,8 +68,11 @@ class LeastEffort:
         fastest = max(e, *(-vx for vx in view.model.bounds.vx_m_s)) / e
         authority = correctable_later_m(situation, ranges) / fastest
         to_go_s = range_at_impulse(ranges, e, situation.lead_s) / e
-        share, reference = 1.0 / np.maximum(authority, MIN_AUTHORITY_M), unavoidable_m(situation)[:, None, None]
-        impulse, effort = balanced((upper - reference) * share, (-lower - reference) * share, to_go_s * share, most)
+        share = 1.0 / np.maximum(authority, MIN_AUTHORITY_M)
+        reference = unavoidable_m(situation)[:, None, None]
+        impulse, effort = balanced(
+            (upper - reference) * share, (-lower - reference) * share, to_go_s * share, most
+        )
         if (effort > 1.0).any():
             urgent, _ = balanced(upper - authority, -lower - authority, to_go_s, most)
             impulse = np.where(effort > 1.0, urgent, impulse)
@@ -72,16 +80,19 @@ class LeastEffort:
 
 
 def unavoidable_m(situation: Situation) -> Floats:
-    """Return the reference of `LeastEffort`, m, shape (C,): a miss that errors of the angles can force.
+    """Return the reference of `LeastEffort`, m, shape (C,): a miss that errors of the angles can
+    force.
 
     It is zero with a schedule.
 
-    Two motions that differ by the sum of the error bounds at the first image, at the range x0, and at the range e tau
-    look alike until then. They arrive 2 e tau (h(e tau) + h(x0))/(1 - e tau/x0) apart, less if the first image and the
-    bounds of the velocity are nearer. Half of it, less what the impulses after tau can correct, is a miss of one of
-    the two.
+    Two motions that differ by the sum of the error bounds at the first image, at the range x0, and
+    at the range e tau look alike until then. They arrive 2 e tau (h(e tau) + h(x0))/(1 - e tau/x0)
+    apart, less if the first image and the bounds of the velocity are nearer. Half of it, less what
+    the impulses after tau can correct, is a miss of one of the two.
     """
-    whole, thruster, e = situation.information.model, situation.thruster, situation.closing_speed_m_s
+    whole = situation.information.model
+    thruster = situation.thruster
+    e = situation.closing_speed_m_s
     reference_m = np.zeros(len(whole.axes))
     if situation.later_times_s is not None:
         return reference_m
@@ -89,7 +100,8 @@ def unavoidable_m(situation: Situation) -> Floats:
     to_go_s: Floats = whole.step_s * np.arange(1.0, math.ceil(x0 / (e * whole.step_s)))
     correctable_m = thruster.max_impulse_m_s * (np.cumsum(to_go_s) - to_go_s)
     for axis, model in enumerate(map(whole.axis, whole.axes)):
-        box, h = model.bounds, model.angle_sensor.error_bound
+        box = model.bounds
+        h = model.angle_sensor.error_bound
         apart_m = e * to_go_s * (h(e * to_go_s) + h(x0)) / (1.0 - e * to_go_s / x0)
         widest_m = 0.5 * (min(np.ptp(box.z_m), 2.0 * h(x0) * x0) + np.ptp(box.vz_m_s) * x0 / e)
         reference_m[axis] = (np.minimum(apart_m, widest_m) - correctable_m).max(initial=0.0)
@@ -97,14 +109,17 @@ def unavoidable_m(situation: Situation) -> Floats:
 
 
 def _between(values: Floats) -> Floats:
-    """Return values of sections, shape (..., B, S), with `PARTS` - 1 interpolated ones between neighbours."""
+    """Return values of sections, shape (..., B, S), with `PARTS` - 1 interpolated ones between
+    neighbours.
+    """
     share = np.arange(PARTS) / PARTS
     inner = values[..., :-1, None] * (1.0 - share) + values[..., 1:, None] * share
     return np.concatenate([inner.reshape(*values.shape[:-1], -1), values[..., -1:]], axis=-1)
 
 
 def balanced(falling: Floats, rising: Floats, slopes: Floats, most: float) -> tuple[Floats, Floats]:
-    """Return the u, |u| <= most, where the maximum of falling - slopes u and rising + slopes u is smallest, and it.
+    """Return the u, |u| <= most, where the maximum of falling - slopes u and rising + slopes u is
+    smallest, and it.
 
     `falling` and `rising` have the shape (C, B, S), `slopes` (B, S), and the results (C, B).
     """
@@ -115,24 +130,31 @@ def balanced(falling: Floats, rising: Floats, slopes: Floats, most: float) -> tu
 
 
 @entry
-def balance_all(falling: Floats, rising: Floats, slopes: Floats, most: float, at: Floats, value: Floats) -> None:
+def balance_all(
+    falling: Floats, rising: Floats, slopes: Floats, most: float, at: Floats, value: Floats
+) -> None:
     """Write the results of `balanced` for one axis.
 
     At the minimum the maximum falling and rising lines are equal, or it is an end.
 
-    The next trial is where the two lines that are largest now intersect, or the middle of the interval that is left.
+    The next trial is where the two lines that are largest now intersect, or the middle of the
+    interval that is left.
     """
     for b in range(len(at)):
-        low, high, u = -most, most, 0.0
+        low = -most
+        high = most
+        u = 0.0
         for _ in range(TRIALS):
             fall = rise = -math.inf
             fall_slope = rise_slope = 0.0
             for s in range(falling.shape[1]):
                 slope = slopes[b, s]
                 if falling[b, s] - slope * u > fall:
-                    fall, fall_slope = falling[b, s] - slope * u, slope
+                    fall = falling[b, s] - slope * u
+                    fall_slope = slope
                 if rising[b, s] + slope * u > rise:
-                    rise, rise_slope = rising[b, s] + slope * u, slope
+                    rise = rising[b, s] + slope * u
+                    rise_slope = slope
             at[b], value[b] = u, max(fall, rise)
             if fall == rise or low == high:
                 break

@@ -18,8 +18,8 @@ from infoset.sensors import Measurements, Sensor
 class NoiseKind(Enum):
     """How measurement errors are chosen within their bounds.
 
-    RANDOM errors are uniform and independent, GAUSSIAN ones independent, CORRELATED ones Gaussian and correlated in
-    time; GAME errors are chosen against the guidance.
+    RANDOM errors are uniform and independent, GAUSSIAN ones independent, CORRELATED ones Gaussian
+    and correlated in time; GAME errors are chosen against the guidance.
     """
 
     RANDOM = "random"
@@ -44,18 +44,20 @@ class LineOfSight:
     Parameters
     ----------
     alpha_rad, omega_rad_s : ndarray, shape (C, B)
-        True line-of-sight angles atan2(z, x), in space atan2(y, x) and atan2(z, x), rad, and their rates, rad/s.
+        True line-of-sight angles atan2(z, x), in space atan2(y, x) and atan2(z, x), rad, and their
+        rates, rad/s.
     range_m : ndarray, shape (B,)
         True distance, m.
     sensors : mapping of str to Sensor
         Sensors that measure in this step, by name: "angle", "range", "rate".
     pending : sequence of (float, ndarray)
-        Impulses that are decided and not given yet: time from now, s, and impulse, m/s, shape (C, B).
+        Impulses that are decided and not given yet: time from now, s, and impulse, m/s, shape (C,
+        B).
     time_s : float
         Time since the start, s.
     uniform : mapping of str to ndarray
-        Random numbers of this step by sensor, with the shape of its measurements: independent, uniform in [-1, 1], and
-        the same for a run of a seed in every batch.
+        Random numbers of this step by sensor, with the shape of its measurements: independent,
+        uniform in [-1, 1], and the same for a run of a seed in every batch.
     """
 
     step: int
@@ -72,14 +74,16 @@ class LineOfSight:
         return self.alpha_rad.shape if sensor.is_lateral else self.range_m.shape
 
 
-def checked_measurements(measured: Measurements, sight: LineOfSight, noise: object) -> dict[str, Floats]:
+def checked_measurements(
+    measured: Measurements, sight: LineOfSight, noise: object
+) -> dict[str, Floats]:
     """Return the measurements of a noise as arrays; `real_array` describes the errors in numbers.
 
     Raises
     ------
     TypeError, ValueError
-        If the noise returned no mapping, measured with a sensor that does not measure in this step, or returned an
-        array of another shape than that of the measurements.
+        If the noise returned no mapping, measured with a sensor that does not measure in this step,
+        or returned an array of another shape than that of the measurements.
     """
     where = f"noise {type(noise).__name__} at step {sight.step}"
     if not isinstance(measured, Mapping):
@@ -91,29 +95,40 @@ def checked_measurements(measured: Measurements, sight: LineOfSight, noise: obje
     for name, values in measured.items():
         if name not in sight.sensors:
             raise ValueError(
-                f"{where}: sensor {name!r} does not measure at this step, only {sorted(sight.sensors)}; leave it out: "
-                f"got {shown(values)}"
+                f"{where}: sensor {name!r} does not measure at this step, only "
+                f"{sorted(sight.sensors)}; leave it out: got {shown(values)}"
             )
         shape = sight.shape(sight.sensors[name])
         if np.ndim(values) == 0:
-            raise ValueError(f"{where}: {name} must be an array of the shape {shape}: got {shown(values)}")
+            raise ValueError(
+                f"{where}: {name} must be an array of the shape {shape}: got {shown(values)}"
+            )
         checked[name] = real_array(f"{where}: {name}", values, shape)
     return checked
 
 
 def need_draws(name: str, draws: Floats) -> None:
-    """Raise ValueError if errors, in units of their bounds, are not in [-1, 1], or not of shape ([C,] B, steps)."""
+    """Raise ValueError if errors, in units of their bounds, are not in [-1, 1], or not of shape
+    ([C,] B, steps).
+    """
     if not isinstance(draws, np.ndarray) or draws.ndim not in (2, 3):
-        raise ValueError(f"{name} must have the shape (C, B, steps), or (B, steps) for ranges: got {np.shape(draws)}")
+        raise ValueError(
+            f"{name} must have the shape (C, B, steps), or (B, steps) for ranges: got "
+            f"{np.shape(draws)}"
+        )
     if not (np.abs(real_values(name, draws)) <= 1.0).all():  # refuses NaN as well
         raise ValueError(f"{name} must lie within [-1, 1], in units of the bound")
 
 
 def draws_of_step(name: str, draws: Floats, step: int, shape: tuple[int, ...]) -> Floats:
-    """Return the draws of one step; raise ValueError if there are none, or their shape is not that of measurements."""
+    """Return the draws of one step; raise ValueError if there are none, or their shape is not that
+    of measurements.
+    """
     steps = draws.shape[-1]
     if draws.shape[:-1] != shape:
-        raise ValueError(f"{name} must have the shape {(*shape, steps)} in this engagement: got {draws.shape}")
+        raise ValueError(
+            f"{name} must have the shape {(*shape, steps)} in this engagement: got {draws.shape}"
+        )
     if step >= steps:
         raise ValueError(f"{name} has {steps} steps, none for step {step}: give one for each step")
     return draws[..., step]
@@ -133,10 +148,12 @@ class MeasurementNoise(Protocol):
         Returns
         -------
         mapping of str to ndarray
-            Measured values by sensor: angles (rad) and rates (rad/s), shape (C, B), ranges (m), shape (B,). A sensor
-            that is left out gives no measurement in this step.
+            Measured values by sensor: angles (rad) and rates (rad/s), shape (C, B), ranges (m),
+            shape (B,). A sensor that is left out gives no measurement in this step.
         """
 
 
 NoiseSource = MeasurementNoise | Callable[[], MeasurementNoise]
-"""A noise of all batches of runs, or a class or function that is called for the noise of each batch."""
+"""A noise of all batches of runs, or a class or function that is called for the noise of each
+batch.
+"""

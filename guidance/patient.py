@@ -18,33 +18,40 @@ LAST_SECONDS_S = 3.0
 
 @dataclass(frozen=True)
 class Patient(Checked):
-    """Correct only what is certain, and what could not be corrected later; at the last impulses, act as U_s.
+    """Correct only what is certain, and what could not be corrected later; at the last impulses,
+    act as U_s.
 
     Parameters
     ----------
     share : float
-        Share of the correction that later impulses can give, from 0 to 1, on which the strategy relies. With 0 it is
-        U_s; with 1 it waits as long as it can.
+        Share of the correction that later impulses can give, from 0 to 1, on which the strategy
+        relies. With 0 it is U_s; with 1 it waits as long as it can.
 
     Notes
     -----
-    Every hypothesis of the set has a predicted miss. If the whole interval of misses is on one side of zero, every
-    hypothesis needs the correction of its near end: it is certain, and costs least when it is early. Only the worst
-    hypothesis needs the correction of the far end. Later measurements usually refute it, so the strategy waits as long
-    as a share of the correction that later impulses can give covers it: the sum of mu2 x_j/e over the remaining steps,
-    limited by the budget. The excess over that is corrected now; if both ends have an excess, the two are balanced.
+    Every hypothesis of the set has a predicted miss. If the whole interval of misses is on one side
+    of zero, every hypothesis needs the correction of its near end: it is certain, and costs least
+    when it is early. Only the worst hypothesis needs the correction of the far end. Later
+    measurements usually refute it, so the strategy waits as long as a share of the correction that
+    later impulses can give covers it: the sum of mu2 x_j/e over the remaining steps, limited by the
+    budget. The excess over that is corrected now; if both ends have an excess, the two are
+    balanced.
 
-    It acts as U_s in the last 3 s before the arrival, and in the last 3 s in which the engine can give impulses.
+    It acts as U_s in the last 3 s before the arrival, and in the last 3 s in which the engine can
+    give impulses.
 
-    Waiting saves the correction of noise, but the same correction costs more later, in proportion to 1/x. The larger
-    the share, the later a worst case is corrected, with more impulses at their limit.
+    Waiting saves the correction of noise, but the same correction costs more later, in proportion
+    to 1/x. The larger the share, the later a worst case is corrected, with more impulses at their
+    limit.
 
-    Limits: misses are bounded only, so probable and merely possible hypotheses have the same weight. The share alone
-    guarantees nothing: the interval includes future disturbances, but not future choices of the noise.
+    Limits: misses are bounded only, so probable and merely possible hypotheses have the same
+    weight. The share alone guarantees nothing: the interval includes future disturbances, but not
+    future choices of the noise.
 
     References
     ----------
-    Kumkov and Patsko (1997), section 6, for the interval and U_s. The rule of waiting is not theirs.
+    Kumkov and Patsko (1997), section 6, for the interval and U_s. The rule of waiting is not
+    theirs.
     """
 
     share: Annotated[float, Limits(minimum=0.0, maximum=1.0)] = 0.5
@@ -56,7 +63,9 @@ class Patient(Checked):
 
     def decide(self, situation: Situation, state: None) -> Floats:
         """Return the certain part of the correction, or the urgent part if it is larger, m/s."""
-        miss, e, lead_s = situation.predicted_miss, situation.closing_speed_m_s, situation.lead_s
+        miss = situation.predicted_miss
+        e = situation.closing_speed_m_s
+        lead_s = situation.lead_s
         symmetric = symmetric_impulse(miss, e, lead_s)
         if situation.last_s <= lead_s + LAST_SECONDS_S:
             return symmetric
@@ -80,4 +89,6 @@ class Patient(Checked):
 
 def _impulse(miss_m: Floats, range_m: Floats, closing_speed_m_s: float) -> Floats:
     """Return the impulse that corrects a miss at a range; zero where the range is not positive."""
-    return np.divide(miss_m * closing_speed_m_s, range_m, out=np.zeros_like(range_m), where=range_m > 0.0)
+    return np.divide(
+        miss_m * closing_speed_m_s, range_m, out=np.zeros_like(range_m), where=range_m > 0.0
+    )

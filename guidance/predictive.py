@@ -17,7 +17,8 @@ from infoset.limits import Checked, Limits
 class ManoeuvreState:
     """State of predictive guidance.
 
-    `due_s`, shape (C, B), is the time to go at which the next manoeuvre begins, s; infinite before the first estimate.
+    `due_s`, shape (C, B), is the time to go at which the next manoeuvre begins, s; infinite before
+    the first estimate.
     """
 
     estimator: KalmanBank
@@ -31,29 +32,32 @@ class Predictive(Checked):
     Parameters
     ----------
     spacing : float
-        The ratio of the times to go of two manoeuvres in a row, greater than 1, if the engine has no scheduled times.
+        The ratio of the times to go of two manoeuvres in a row, greater than 1, if the engine has
+        no scheduled times.
 
     Notes
     -----
-    The impulse is k = m / tau, with the estimated miss m and the time to go tau. If the engine has scheduled times
-    (`Thruster.impulses_s`), each of them corrects the whole miss. Otherwise the manoeuvres begin at the times to go
-    T/s, T/s^2, ..., with the estimated time T from the start to the arrival, and at the last time that the engine
-    allows. A manoeuvre that is greater than the maximum impulse of the engine continues in the next steps.
+    The impulse is k = m / tau, with the estimated miss m and the time to go tau. If the engine has
+    scheduled times (`Thruster.impulses_s`), each of them corrects the whole miss. Otherwise the
+    manoeuvres begin at the times to go T/s, T/s^2, ..., with the estimated time T from the start to
+    the arrival, and at the last time that the engine allows. A manoeuvre that is greater than the
+    maximum impulse of the engine continues in the next steps.
 
-    After a manoeuvre, its miss is the error of its estimate. With independent errors of angles this falls in proportion
-    to the time to go, or faster, so geometric times make the impulses after the first one of similar size. The three
-    targeting manoeuvres of Deep Impact, 90, 35 and 12.5 min before the impact, had ratios of 2.6 and 2.8.
+    After a manoeuvre, its miss is the error of its estimate. With independent errors of angles this
+    falls in proportion to the time to go, or faster, so geometric times make the impulses after the
+    first one of similar size. The three targeting manoeuvres of Deep Impact, 90, 35 and 12.5 min
+    before the impact, had ratios of 2.6 and 2.8.
 
-    Good where manoeuvres are few, and the engine is exact: each one is as small as its time allows. Limits: a manoeuvre
-    corrects the noise of its estimate too, and the last one decides the miss; between manoeuvres nothing is corrected.
-    The first one waits for measurements, so it costs s/(s - 1) times the impulse of an immediate correction. Nothing is
-    guaranteed.
+    Good where manoeuvres are few, and the engine is exact: each one is as small as its time allows.
+    Limits: a manoeuvre corrects the noise of its estimate too, and the last one decides the miss;
+    between manoeuvres nothing is corrected. The first one waits for measurements, so it costs s/(s
+    - 1) times the impulse of an immediate correction. Nothing is guaranteed.
 
     References
     ----------
-    Gil-Fernández, Prieto-Llanos, Panzeca and Drai, Autonomous GNC algorithms for NEO impactor missions, ISSFD, for
-    predictive guidance on a Kalman filter; Hawkins, Guo and Wie (2012), IJASS 13(2), 154-169. The geometric times are
-    not from there.
+    Gil-Fernández, Prieto-Llanos, Panzeca and Drai, Autonomous GNC algorithms for NEO impactor
+    missions, ISSFD, for predictive guidance on a Kalman filter; Hawkins, Guo and Wie (2012), IJASS
+    13(2), 154-169. The geometric times are not from there.
     """
 
     spacing: Annotated[float, Limits(above=1.0)] = 1.5
@@ -68,7 +72,8 @@ class Predictive(Checked):
         if not situation.may_fire:
             return np.zeros_like(state.due_s)
         estimate = state.estimator.estimate(situation)
-        whole, next_s = estimate.correction_m_s(), situation.next_s
+        whole = estimate.correction_m_s()
+        next_s = situation.next_s
         if situation.thruster.is_scheduled or next_s is None:
             return whole
         state.due_s = np.where(np.isinf(state.due_s), estimate.to_go_s / self.spacing, state.due_s)

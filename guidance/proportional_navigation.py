@@ -15,7 +15,9 @@ from infoset.limits import Checked, Limits, NotNegative
 
 @dataclass
 class PulseState:
-    """State of proportional navigation: the estimator, and the commands that were too small for an impulse so far."""
+    """State of proportional navigation: the estimator, and the commands that were too small for an
+    impulse so far.
+    """
 
     estimator: KalmanBank
     accumulated_m_s: Floats
@@ -23,40 +25,46 @@ class PulseState:
 
 @dataclass(frozen=True)
 class ProportionalNavigation(Checked):
-    """Command an acceleration proportional to the rate of the line of sight, in pulses with a dead band.
+    """Command an acceleration proportional to the rate of the line of sight, in pulses with a dead
+    band.
 
     Parameters
     ----------
     is_augmented : bool
-        Estimate the lateral acceleration of the target, and compensate for it (augmented proportional navigation).
+        Estimate the lateral acceleration of the target, and compensate for it (augmented
+        proportional navigation).
     ratio : float
         Navigation ratio N, greater than 2; 3 to 5 are usual.
     dead_band_m_s : float or None
-        Commands accumulate until their sum has this size, m/s; None is the minimum impulse of the engine.
+        Commands accumulate until their sum has this size, m/s; None is the minimum impulse of the
+        engine.
 
     Notes
     -----
-    The law is a = N c q, with the closing speed c and the rate q of the line of sight; the augmented law adds half of N
-    times the acceleration of the target. With the zero-effort miss m (which contains the acceleration of the target in
-    the augmented law) and the time to go tau, both are a = N m / tau^2. Continuous acceleration by this law makes m
-    proportional to tau^N, so m and, for N > 2, a become zero at the arrival.
+    The law is a = N c q, with the closing speed c and the rate q of the line of sight; the
+    augmented law adds half of N times the acceleration of the target. With the zero-effort miss m
+    (which contains the acceleration of the target in the augmented law) and the time to go tau,
+    both are a = N m / tau^2. Continuous acceleration by this law makes m proportional to tau^N, so
+    m and, for N > 2, a become zero at the arrival.
 
-    Impulses replace the acceleration until the next decision at the time to go tau': k = (m / tau) (1 - (tau'/tau)^N)
-    changes m as the acceleration would. For short steps this is N m/tau^2 times the step. With impulses at few allowed
-    times, it corrects nearly the whole miss at each of them, and the last allowed one corrects all of it. Commands
-    below the dead band accumulate, and their sum never exceeds m/tau, so an old command whose miss has disappeared is
-    not given.
+    Impulses replace the acceleration until the next decision at the time to go tau': k = (m / tau)
+    (1 - (tau'/tau)^N) changes m as the acceleration would. For short steps this is N m/tau^2 times
+    the step. With impulses at few allowed times, it corrects nearly the whole miss at each of them,
+    and the last allowed one corrects all of it. Commands below the dead band accumulate, and their
+    sum never exceeds m/tau, so an old command whose miss has disappeared is not given.
 
-    Good without a prediction of the motion: it needs the rate of the line of sight only, and its gain N/tau is small
-    far from the target, so it responds less to noise than a full correction at every step. Limits: it delays the
-    correction, so a known miss costs N/(N - 1) times the impulse of an immediate correction, and an acceleration of the
-    target costs N/(N - 2) times its size at the end of the flight without augmentation. Nothing is guaranteed.
+    Good without a prediction of the motion: it needs the rate of the line of sight only, and its
+    gain N/tau is small far from the target, so it responds less to noise than a full correction at
+    every step. Limits: it delays the correction, so a known miss costs N/(N - 1) times the impulse
+    of an immediate correction, and an acceleration of the target costs N/(N - 2) times its size at
+    the end of the flight without augmentation. Nothing is guaranteed.
 
     References
     ----------
-    Zarchan (2012), Tactical and Strategic Missile Guidance, chapters 2 and 8; Hawkins, Guo and Wie (2012), Spacecraft
-    guidance algorithms for asteroid intercept and rendezvous missions, IJASS 13(2), 154-169, for pulses (there by a
-    Schmitt trigger). The exact factor of an impulse and the accumulation are not from there.
+    Zarchan (2012), Tactical and Strategic Missile Guidance, chapters 2 and 8; Hawkins, Guo and Wie
+    (2012), Spacecraft guidance algorithms for asteroid intercept and rendezvous missions, IJASS
+    13(2), 154-169, for pulses (there by a Schmitt trigger). The exact factor of an impulse and the
+    accumulation are not from there.
     """
 
     is_augmented: bool = False
@@ -72,10 +80,15 @@ class ProportionalNavigation(Checked):
         state.estimator.update(situation)
         if not situation.may_fire:
             return np.zeros_like(state.accumulated_m_s)
-        estimate, next_s = state.estimator.estimate(situation), situation.next_s
+        estimate = state.estimator.estimate(situation)
+        next_s = situation.next_s
         whole = estimate.correction_m_s()
-        left_s = np.zeros_like(whole) if next_s is None else np.maximum(estimate.to_go_s - next_s, 0.0)
-        part = np.divide(left_s, estimate.to_go_s, out=np.zeros_like(whole), where=estimate.to_go_s > 0.0)
+        left_s = (
+            np.zeros_like(whole) if next_s is None else np.maximum(estimate.to_go_s - next_s, 0.0)
+        )
+        part = np.divide(
+            left_s, estimate.to_go_s, out=np.zeros_like(whole), where=estimate.to_go_s > 0.0
+        )
         command = state.accumulated_m_s + whole * (1.0 - part**self.ratio)
         command = np.clip(command, -np.abs(whole), np.abs(whole))
         dead_band_m_s = self.dead_band_m_s

@@ -39,5 +39,7 @@ def make_strategy(name: str) -> Strategy:
         If the name is not registered.
     """
     if name not in _STRATEGIES:
-        raise ValueError(f"no strategy is called '{name}'; there are: {', '.join(strategy_names())}")
+        raise ValueError(
+            f"no strategy is called '{name}'; there are: {', '.join(strategy_names())}"
+        )
     return _STRATEGIES[name]()

@@ -19,8 +19,8 @@ class ScriptedNoise:
     Parameters
     ----------
     errors : mapping of str to ndarray, shape (C, B, steps), for ranges (B, steps)
-        Errors by sensor, within [-1, 1]: an angle alpha + u h(d), a range d (1 + u b). A sensor without errors measures
-        the true value.
+        Errors by sensor, within [-1, 1]: an angle alpha + u h(d), a range d (1 + u b). A sensor
+        without errors measures the true value.
 
     Raises
     ------
@@ -42,10 +42,14 @@ class ScriptedNoise:
             need_draws(f"errors[{name!r}]", errors)
             shapes.add(errors.shape[-2:])
         if len(shapes) > 1:
-            raise ValueError(f"errors must have one shape (B, steps) for all sensors: got {sorted(shapes)}")
+            raise ValueError(
+                f"errors must have one shape (B, steps) for all sensors: got {sorted(shapes)}"
+            )
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurements:
-        """Return the measurements of a step; `errors_of_step` describes the errors that it raises."""
+        """Return the measurements of a step; `errors_of_step` describes the errors that it
+        raises.
+        """
         return measure_with_errors(sight, self.errors_of_step(sight))
 
     def errors_of_step(self, sight: LineOfSight) -> dict[str, Floats]:
@@ -57,7 +61,9 @@ class ScriptedNoise:
             If errors are missing for this step, or have another shape than the measurements.
         """
         return {
-            name: draws_of_step(f"errors[{name!r}]", self.errors[name], sight.step, sight.shape(sensor))
+            name: draws_of_step(
+                f"errors[{name!r}]", self.errors[name], sight.step, sight.shape(sensor)
+            )
             for name, sensor in sight.sensors.items()
             if name in self.errors
         }
@@ -72,8 +78,8 @@ class RandomNoise(ScriptedNoise):
     errors : mapping of str to ndarray, shape (C, B, steps), for ranges (B, steps)
         Draws by sensor, uniform in [-1, 1]; the error is the draw times the bound.
     bias : ndarray, shape (C, B), or None
-        Constant errors of the centroid part of a camera's bound, in units of that part; `errors` are then those of the
-        pixel part. None draws errors of the whole bound.
+        Constant errors of the centroid part of a camera's bound, in units of that part; `errors`
+        are then those of the pixel part. None draws errors of the whole bound.
 
     Raises
     ------
@@ -106,7 +112,9 @@ class RandomNoise(ScriptedNoise):
 
 
 def measure_with_errors(sight: LineOfSight, errors: Mapping[str, Floats]) -> dict[str, Floats]:
-    """Return the measurements of a step from errors in units of the bounds; a missing error is zero."""
+    """Return the measurements of a step from errors in units of the bounds; a missing error is
+    zero.
+    """
     return {
         name: sensor.measured(sight, errors[name]) if name in errors else sensor.true_value(sight)
         for name, sensor in sight.sensors.items()
@@ -114,7 +122,10 @@ def measure_with_errors(sight: LineOfSight, errors: Mapping[str, Floats]) -> dic
 
 
 def errors_made(sight: LineOfSight, measured: Measurements) -> dict[str, Floats]:
-    """Return the errors of measurements in units of the bounds: the inverse of `measure_with_errors`, to rounding."""
+    """Return the errors of measurements in units of the bounds: the inverse of
+    `measure_with_errors`, to rounding.
+    """
     return {
-        name: sight.sensors[name].limited(sight.sensors[name].error(sight, values)) for name, values in measured.items()
+        name: sight.sensors[name].limited(sight.sensors[name].error(sight, values))
+        for name, values in measured.items()
     }

@@ -19,13 +19,14 @@ from infoset.sensors import Measurements, Sensor
 class Situation:
     """Everything known on board at one step, for a batch of B engagements.
 
-    Predicted misses, measured angles, rates and impulses have the shape (C, B), for C lateral axes: z in a plane, y and
-    z in space.
+    Predicted misses, measured angles, rates and impulses have the shape (C, B), for C lateral axes:
+    z in a plane, y and z in space.
 
     Parameters
     ----------
     predicted_miss : PredictedMiss
-        Interval of the miss without further impulses, with the points of the set that reach its ends.
+        Interval of the miss without further impulses, with the points of the set that reach its
+        ends.
     budget_left_m_s : ndarray, shape (B,)
         Impulse budget left, m/s.
     thruster : Thruster
@@ -33,8 +34,9 @@ class Situation:
     closing_speed_m_s : float
         The nominal closing speed e, m/s.
     measured : mapping of str to ndarray
-        Last measured values by sensor, "angle" (rad) and "rate" (rad/s), shape (C, B), and "range" (m), shape (B,); a
-        sensor that has not measured yet is missing, and NaN is the value of an engagement without a measurement so far.
+        Last measured values by sensor, "angle" (rad) and "rate" (rad/s), shape (C, B), and "range"
+        (m), shape (B,); a sensor that has not measured yet is missing, and NaN is the value of an
+        engagement without a measurement so far.
     last_impulse_m_s : ndarray, shape (C, B)
         Impulses of the previous step, m/s.
     information : InformationSetView
@@ -50,10 +52,11 @@ class Situation:
     lead_s : float
         Time from a decision to its impulse, s.
     later_times_s : ndarray, shape (n,), or None
-        Times since the start at which impulses of later decisions can be given, s; None is every later step.
+        Times since the start at which impulses of later decisions can be given, s; None is every
+        later step.
     pending : tuple of (float, ndarray)
-        Impulses that are decided and not given yet: time from now, s, and impulse, m/s, shape (C, B). `predicted_miss`
-        contains their effect, and `information` does not.
+        Impulses that are decided and not given yet: time from now, s, and impulse, m/s, shape (C,
+        B). `predicted_miss` contains their effect, and `information` does not.
     """
 
     time_s: float
@@ -84,17 +87,26 @@ class Situation:
         """Time from now to the next decision after this step, s; None without one."""
         if self.later_times_s is None:
             return self.step_s
-        return float(self.later_times_s[0]) - self.lead_s - self.time_s if self.later_times_s.size else None
+        return (
+            float(self.later_times_s[0]) - self.lead_s - self.time_s
+            if self.later_times_s.size
+            else None
+        )
 
     @property
     def last_s(self) -> float:
-        """Time from now to the last impulse that can be given, s; infinite if there is no last one."""
+        """Time from now to the last impulse that can be given, s; infinite if there is no last
+        one.
+        """
         if self.later_times_s is None:
             return math.inf
-        return float(self.later_times_s[-1]) - self.time_s if self.later_times_s.size else self.lead_s
+        return (
+            float(self.later_times_s[-1]) - self.time_s if self.later_times_s.size else self.lead_s
+        )
 
     def pending_m(self, time_to_go_s: Floats) -> Floats:
-        """Return the changes of predicted misses by the pending impulses, m, which are to be subtracted from them.
+        """Return the changes of predicted misses by the pending impulses, m, which are to be
+        subtracted from them.
 
         Parameters
         ----------

@@ -11,21 +11,25 @@ from infoset.guidance.situation import Situation
 from infoset.limits import shown
 
 
-def checked_impulses(wanted: object, situation: Situation, tracking: Flags, strategy: object) -> Floats:
-    """Return the impulses of a strategy as an array; raise ValueError for numbers that are not real or not finite.
+def checked_impulses(
+    wanted: object, situation: Situation, tracking: Flags, strategy: object
+) -> Floats:
+    """Return the impulses of a strategy as an array; raise ValueError for numbers that are not real
+    or not finite.
 
     The impulses of engagements that are not `tracking`, shape (B,), need not be finite.
     """
-    values, shape = np.asarray(wanted), situation.last_impulse_m_s.shape
+    values = np.asarray(wanted)
+    shape = situation.last_impulse_m_s.shape
     real = values.dtype.kind in "fiu" and not isinstance(wanted, np.ma.MaskedArray)
     if real and values.shape == shape:
         finite = np.isfinite(values)
         if finite.all() or (finite | ~tracking).all():
             return values.astype(np.float64, copy=False)
     raise ValueError(
-        f"strategy {type(strategy).__name__} must return finite impulses (m/s) of the shape {shape}, one for each "
-        f"lateral axis and engagement, real and not masked: at step {situation.step} it returned shape {values.shape}, "
-        f"{shown(wanted)}"
+        f"strategy {type(strategy).__name__} must return finite impulses (m/s) of the shape "
+        f"{shape}, one for each lateral axis and engagement, real and not masked: at step "
+        f"{situation.step} it returned shape {values.shape}, {shown(wanted)}"
     )
 
 

@@ -8,9 +8,11 @@ from infoset.guidance.symmetric_impulse import symmetric_impulse
 
 
 class SymmetricMiss:
-    """Keep the predicted-miss interval symmetric about zero, which minimises the maximum possible miss.
+    """Keep the predicted-miss interval symmetric about zero, which minimises the maximum possible
+    miss.
 
-    It reacts to noise: every measurement moves the middle of the interval, and every move is corrected.
+    It reacts to noise: every measurement moves the middle of the interval, and every move is
+    corrected.
 
     References
     ----------
@@ -24,4 +26,6 @@ class SymmetricMiss:
 
     def decide(self, situation: Situation, state: None) -> Floats:
         """Return k_s of equation (15), m/s."""
-        return symmetric_impulse(situation.predicted_miss, situation.closing_speed_m_s, situation.lead_s)
+        return symmetric_impulse(
+            situation.predicted_miss, situation.closing_speed_m_s, situation.lead_s
+        )

@@ -33,26 +33,28 @@ class Thruster:
     execution_error_relative : float
         Bound delta of |given / commanded - 1|: a commanded impulse k is executed as k (1 + error).
     pointing_error_rad : float
-        Bound psi of the angle between the given and the commanded impulse, across the x axis. For space only.
+        Bound psi of the angle between the given and the commanded impulse, across the x axis. For
+        space only.
     last_impulse_s : float or None
-        Time before the nominal arrival after which no impulse is given, s (cut-off); None is no cut-off.
+        Time before the nominal arrival after which no impulse is given, s (cut-off); None is no
+        cut-off.
     impulses_s : tuple of float
-        Times before the nominal arrival at which impulses can be given, s, decreasing. Without times and period,
-        impulses can be given at every step.
+        Times before the nominal arrival at which impulses can be given, s, decreasing. Without
+        times and period, impulses can be given at every step.
     impulse_period_s : float or None
-        Time between two impulses, s, counted back from `last_impulse_s`: the same as a list of these times in
-        `impulses_s`. At least a step.
+        Time between two impulses, s, counted back from `last_impulse_s`: the same as a list of
+        these times in `impulses_s`. At least a step.
     first_impulse_s : float or None
-        Time before the nominal arrival from which impulses can be given, s; with a period, the impulse nearest to it
-        is the first one. None is the first possible step.
+        Time before the nominal arrival from which impulses can be given, s; with a period, the
+        impulse nearest to it is the first one. None is the first possible step.
     delay_steps : int
         Number of steps from the decision to the impulse. The budget is reserved at the decision.
 
     Raises
     ------
     TypeError, ValueError
-        If a value is not a number within its limits, mu1 exceeds mu2, the times do not decrease, or two of the keys of
-        times contradict each other.
+        If a value is not a number within its limits, mu1 exceeds mu2, the times do not decrease, or
+        two of the keys of times contradict each other.
 
     Notes
     -----
@@ -78,13 +80,14 @@ class Thruster:
         check_fields(self)
         if self.min_impulse_m_s > self.max_impulse_m_s:
             raise ValueError(
-                f"Thruster: min_impulse_m_s must not exceed max_impulse_m_s, {self.max_impulse_m_s:g}: "
-                f"got {self.min_impulse_m_s!r}"
+                "Thruster: min_impulse_m_s must not exceed max_impulse_m_s, "
+                f"{self.max_impulse_m_s:g}: got {self.min_impulse_m_s!r}"
             )
         for time_s, next_s in pairwise(self.impulses_s):
             if next_s >= time_s:
                 raise ValueError(
-                    f"Thruster: impulses_s, times before the arrival, must decrease: got {next_s!r} after {time_s!r}"
+                    "Thruster: impulses_s, times before the arrival, must decrease: got "
+                    f"{next_s!r} after {time_s!r}"
                 )
         self._check_period()
 
@@ -93,18 +96,20 @@ class Thruster:
         for name in ("impulse_period_s", "first_impulse_s"):
             if self.impulses_s and getattr(self, name) is not None:
                 raise ValueError(
-                    f"Thruster: {name} and impulses_s exclude each other, because impulses_s has the times of all "
-                    f"impulses: leave one of them out: got {getattr(self, name)!r}"
+                    f"Thruster: {name} and impulses_s exclude each other, because impulses_s has "
+                    f"the times of all impulses: leave one of them out: got {getattr(self, name)!r}"
                 )
         if self.impulse_period_s is not None and self.last_impulse_s is None:
             raise ValueError(
-                "Thruster: impulse_period_s is counted back from last_impulse_s: set last_impulse_s, the time of the "
-                f"last impulse before the arrival: got {self.impulse_period_s!r}"
+                "Thruster: impulse_period_s is counted back from last_impulse_s: set "
+                "last_impulse_s, the time of the last impulse before the arrival: got "
+                f"{self.impulse_period_s!r}"
             )
         if self.first_impulse_s is not None and self.first_impulse_s < (self.last_impulse_s or 0.0):
             raise ValueError(
-                "Thruster: first_impulse_s must be at least last_impulse_s, because both are times before the arrival: "
-                f"got {self.first_impulse_s!r} and {self.last_impulse_s!r}"
+                "Thruster: first_impulse_s must be at least last_impulse_s, because both are "
+                f"times before the arrival: got {self.first_impulse_s!r} and "
+                f"{self.last_impulse_s!r}"
             )
 
     @property
@@ -113,7 +118,8 @@ class Thruster:
         return bool(self.impulses_s) or self.impulse_period_s is not None
 
     def impulse_steps(self, arrival_s: float, step_s: float) -> Sequence[int] | None:
-        """Return the steps in which impulses can be given, increasing; None is every step from `delay_steps`.
+        """Return the steps in which impulses can be given, increasing; None is every step from
+        `delay_steps`.
 
         Parameters
         ----------
@@ -123,22 +129,25 @@ class Thruster:
         Raises
         ------
         ValueError
-            If there is no such step, a time of `impulses_s` or `first_impulse_s` is before the first step in which an
-            impulse can be given, or two of `impulses_s` are in one step. The message names the key to change.
+            If there is no such step, a time of `impulses_s` or `first_impulse_s` is before the
+            first step in which an impulse can be given, or two of `impulses_s` are in one step. The
+            message names the key to change.
         """
         if self.last_impulse_s is None and self.first_impulse_s is None and not self.impulses_s:
             return None
         last = steps_between(arrival_s, self.last_impulse_s or 0.0, step_s)
         if self.impulses_s:
-            steps: Sequence[int] = [step for step in self._listed_steps(arrival_s, step_s) if step <= last]
+            steps: Sequence[int] = [
+                step for step in self._listed_steps(arrival_s, step_s) if step <= last
+            ]
         elif self.impulse_period_s is not None:
             steps = self._periodic_steps(self.impulse_period_s, arrival_s, step_s)
         else:
             steps = range(self._first_step(arrival_s, step_s), last + 1)
         if not steps:
             raise ValueError(
-                f"thruster.last_impulse_s excludes all impulses: {self._first_text(arrival_s, step_s)}: "
-                f"got {self.last_impulse_s!r}"
+                "thruster.last_impulse_s excludes all impulses: "
+                f"{self._first_text(arrival_s, step_s)}: got {self.last_impulse_s!r}"
             )
         return steps
 
@@ -148,29 +157,33 @@ class Thruster:
         for i, step in enumerate(steps):
             if step < self.delay_steps:
                 raise ValueError(
-                    f"thruster.impulses_s: {self._first_text(arrival_s, step_s)}; give later times or fewer "
-                    f"delay_steps: got {self.impulses_s[i]!r}"
+                    f"thruster.impulses_s: {self._first_text(arrival_s, step_s)}; give later times "
+                    f"or fewer delay_steps: got {self.impulses_s[i]!r}"
                 )
             if i > 0 and step == steps[i - 1]:
                 raise ValueError(
-                    f"thruster.impulses_s: two impulses in one step of {step_s:g} s: got {self.impulses_s[i - 1]!r} "
-                    f"and {self.impulses_s[i]!r}"
+                    f"thruster.impulses_s: two impulses in one step of {step_s:g} s: got "
+                    f"{self.impulses_s[i - 1]!r} and {self.impulses_s[i]!r}"
                 )
         return steps
 
     def _periodic_steps(self, period_s: float, arrival_s: float, step_s: float) -> list[int]:
         """Return the steps of impulses every period, counted back from the cut-off."""
         if period_s < step_s * (1.0 - ROUNDING):
-            raise ValueError(f"thruster.impulse_period_s must be at least a step, {step_s:g} s: got {period_s!r}")
-        self._first_step(arrival_s, step_s)  # raises ValueError if it is before the first possible step
+            raise ValueError(
+                f"thruster.impulse_period_s must be at least a step, {step_s:g} s: got {period_s!r}"
+            )
+        self._first_step(
+            arrival_s, step_s
+        )  # raises ValueError if it is before the first possible step
         first_s = arrival_s if self.first_impulse_s is None else self.first_impulse_s
         last_s = self.last_impulse_s or 0.0
         # The first impulse is the one nearest to first_impulse_s.
         number = 1 - steps_between(last_s, first_s, period_s)
         if number > MAX_IMPULSES:
             raise ValueError(
-                f"thruster.impulse_period_s gives {number} impulses, more than {MAX_IMPULSES}; write a longer period "
-                f"or a later first_impulse_s: got {period_s!r}"
+                f"thruster.impulse_period_s gives {number} impulses, more than {MAX_IMPULSES}; "
+                f"write a longer period or a later first_impulse_s: got {period_s!r}"
             )
         times_s = (last_s + place * period_s for place in reversed(range(number)))
         steps = (steps_between(arrival_s, time_s, step_s) for time_s in times_s)
@@ -178,25 +191,31 @@ class Thruster:
         return [*dict.fromkeys(step for step in steps if step >= self.delay_steps)]
 
     def _first_step(self, arrival_s: float, step_s: float) -> int:
-        """Return the step of `first_impulse_s`, or the first step in which an impulse can be given."""
+        """Return the step of `first_impulse_s`, or the first step in which an impulse can be
+        given.
+        """
         if self.first_impulse_s is None:
             return self.delay_steps
         step = steps_between(arrival_s, self.first_impulse_s, step_s)
         if step < self.delay_steps:
             raise ValueError(
-                f"thruster.first_impulse_s: {self._first_text(arrival_s, step_s)}; give a later time or fewer "
-                f"delay_steps: got {self.first_impulse_s!r}"
+                f"thruster.first_impulse_s: {self._first_text(arrival_s, step_s)}; give a later "
+                f"time or fewer delay_steps: got {self.first_impulse_s!r}"
             )
         return step
 
     def _first_text(self, arrival_s: float, step_s: float) -> str:
         """Return when the first impulse can be given, for messages."""
-        return f"the first impulse can be given {arrival_s - self.delay_steps * step_s:g} s before the nominal arrival"
+        return (
+            f"the first impulse can be given {arrival_s - self.delay_steps * step_s:g} s before "
+            "the nominal arrival"
+        )
 
     def give(self, wanted_m_s: Floats, budget_left_m_s: Floats) -> Floats:
         """Return the impulses that the engine gives, m/s.
 
-        Zero if |wanted| < mu1 or n < mu1, otherwise `wanted` with its modulus limited to min(mu2, n).
+        Zero if |wanted| < mu1 or n < mu1, otherwise `wanted` with its modulus limited to min(mu2,
+        n).
 
         Parameters
         ----------
@@ -205,8 +224,10 @@ class Thruster:
         budget_left_m_s : ndarray, shape (B,)
             Budget n that is left.
         """
-        size, limit = modulus(wanted_m_s), np.minimum(self.max_impulse_m_s, budget_left_m_s)
-        given, over = wanted_m_s, size > limit
+        size = modulus(wanted_m_s)
+        limit = np.minimum(self.max_impulse_m_s, budget_left_m_s)
+        given = wanted_m_s
+        over = size > limit
         if some(over):
             given = np.where(over, wanted_m_s / np.maximum(size, MIN_FLOAT) * limit, wanted_m_s)
             # Rounding must not make the modulus greater than the limit.
@@ -215,7 +236,9 @@ class Thruster:
         idle = (size < self.min_impulse_m_s) | (budget_left_m_s < self.min_impulse_m_s)
         return np.where(idle, 0.0, given)
 
-    def executed(self, impulse_m_s: Floats, size: Floats | None, direction: Floats | None) -> Floats:
+    def executed(
+        self, impulse_m_s: Floats, size: Floats | None, direction: Floats | None
+    ) -> Floats:
         """Return impulses as they are executed, m/s.
 
         Parameters
@@ -223,7 +246,8 @@ class Thruster:
         impulse_m_s : ndarray, shape (C, B)
             Commanded impulses.
         size, direction : ndarray, shape (B,), or None
-            Errors of the modulus, and of the direction from y toward z, in units of their bounds; None is zero.
+            Errors of the modulus, and of the direction from y toward z, in units of their bounds;
+            None is zero.
         """
         if size is not None:
             impulse_m_s = impulse_m_s * (1.0 + self.execution_error_relative * size)

@@ -14,17 +14,20 @@ class ZeroEffortMiss:
 
     Notes
     -----
-    The middle of a section is the middle m of its interval of predicted misses, with the width of the interval as its
-    weight w. This approximates the centroid of the set without its vertices. The impulse minimises the weighted sum of
-    the squared misses of the middles: k = e sum(w m x) / sum(w x^2). (The middle of the whole interval gives U_s.)
+    The middle of a section is the middle m of its interval of predicted misses, with the width of
+    the interval as its weight w. This approximates the centroid of the set without its vertices.
+    The impulse minimises the weighted sum of the squared misses of the middles: k = e sum(w m x) /
+    sum(w x^2). (The middle of the whole interval gives U_s.)
 
-    Limits: like U_s, it corrects every change of the middle, so it reacts to noise and spends as much. Unlike U_s, it
-    leaves the ends of the interval unequal, so it does not minimise the maximum possible miss.
+    Limits: like U_s, it corrects every change of the middle, so it reacts to noise and spends as
+    much. Unlike U_s, it leaves the ends of the interval unequal, so it does not minimise the
+    maximum possible miss.
 
     References
     ----------
-    Zarchan (2012), Tactical and Strategic Missile Guidance, chapter 2, for guidance by the zero-effort miss. Its use on
-    the middle of a set is not from the literature; it is a baseline for comparison.
+    Zarchan (2012), Tactical and Strategic Missile Guidance, chapter 2, for guidance by the
+    zero-effort miss. Its use on the middle of a set is not from the literature; it is a baseline
+    for comparison.
     """
 
     name = "zero-effort-miss"
@@ -35,7 +38,8 @@ class ZeroEffortMiss:
     def decide(self, situation: Situation, state: None) -> Floats:
         """Return the impulse that makes the miss of the middle zero, m/s."""
         lower, upper = situation.information.predicted_miss_by_section_m()
-        living, e = situation.information.living, situation.closing_speed_m_s
+        living = situation.information.living
+        e = situation.closing_speed_m_s
         ranges = situation.information.ranges_m
         # The addition keeps the weights positive if every section is a single point.
         width = upper - lower + np.finfo(np.float64).tiny

@@ -1,9 +1,10 @@
 """Guidance with measurement errors that are bounded and have no known distribution.
 
-Start with `load_scenario` and `simulate` (engagements), `InformationSet` (a batch of sets carried through measurements,
-impulses and time), `LinearObserver` (the same for a linear system of your own), or `Polytope` and `ConvexPolygons`
-(operations on sets). The packages `infoset.guidance`, `infoset.sim`, `infoset.rendezvous` and `infoset.experiments`
-have further names. Each name is loaded when it is first used.
+Start with `load_scenario` and `simulate` (engagements), `InformationSet` (a batch of sets carried
+through measurements, impulses and time), `LinearObserver` (the same for a linear system of your
+own), or `Polytope` and `ConvexPolygons` (operations on sets). The packages `infoset.guidance`,
+`infoset.sim`, `infoset.rendezvous` and `infoset.experiments` have further names. Each name is
+loaded when it is first used.
 """
 
 from __future__ import annotations
@@ -36,7 +37,15 @@ if TYPE_CHECKING:
     from infoset.information_set import InformationSet, InformationSetView
     from infoset.model import InitialSet, Model, Recovery, SetModel, SetSettings, StateBox
     from infoset.observer.linear_observer import Estimate, Inconsistency, LinearObserver
-    from infoset.sensors import AngleSensor, BearingSensor, Bias, Camera, RangeSensor, RateSensor, Sensor
+    from infoset.sensors import (
+        AngleSensor,
+        BearingSensor,
+        Bias,
+        Camera,
+        RangeSensor,
+        RateSensor,
+        Sensor,
+    )
     from infoset.set_queries import Section
     from infoset.sim import GuaranteeWarning, find_worst, fly_one, lower_bound, simulate
 
@@ -63,7 +72,15 @@ _MODULES = {
     "infoset.information_set": ("InformationSet", "InformationSetView"),
     "infoset.model": ("InitialSet", "Model", "Recovery", "SetModel", "SetSettings", "StateBox"),
     "infoset.observer.linear_observer": ("Estimate", "Inconsistency", "LinearObserver"),
-    "infoset.sensors": ("AngleSensor", "BearingSensor", "Bias", "Camera", "RangeSensor", "RateSensor", "Sensor"),
+    "infoset.sensors": (
+        "AngleSensor",
+        "BearingSensor",
+        "Bias",
+        "Camera",
+        "RangeSensor",
+        "RateSensor",
+        "Sensor",
+    ),
     "infoset.set_queries": ("Section",),
     "infoset.sim": ("GuaranteeWarning", "find_worst", "fly_one", "lower_bound", "simulate"),
 }
@@ -113,11 +130,14 @@ __all__ = [
 class CheckoutFinder:
     """Find the packages inside this one where their folders are beside its folder.
 
-    Python's own search looks for `infoset.sim` in the folder ``infoset``, where an installation has it.
+    Python's own search looks for `infoset.sim` in the folder ``infoset``, where an installation has
+    it.
     """
 
     @classmethod
-    def find_spec(cls, name: str, _path: object = None, _target: object = None) -> ModuleSpec | None:
+    def find_spec(
+        cls, name: str, _path: object = None, _target: object = None
+    ) -> ModuleSpec | None:
         """Return where a package is; None for every name but those of the packages."""
         parent, _, package = name.rpartition(".")
         if parent != __name__ or package not in PACKAGES:

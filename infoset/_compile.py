@@ -10,16 +10,23 @@ import numpy as np
 from infoset.kernels import Kernels
 
 _kernels = Kernels("nnan", "nsz")
-compiled, entry = _kernels.compiled, _kernels.entry
-allocation_free, inlined, pasted = _kernels.allocation_free, _kernels.inlined, _kernels.pasted
+compiled = _kernels.compiled
+entry = _kernels.entry
+allocation_free = _kernels.allocation_free
+inlined = _kernels.inlined
+pasted = _kernels.pasted
 
 
 @cache
 def record_of(fields: type) -> np.dtype[Any]:
-    """Return the type of array elements with the fields of a class; kernels take the address of such a record."""
+    """Return the type of array elements with the fields of a class; kernels take the address of
+    such a record.
+    """
     kinds = {float: np.float64, int: np.int64, bool: np.bool_}
     # Next to a pair of types NumPy ignores `align`.
-    aligned = np.dtype([(name, kinds[kind]) for name, kind in get_type_hints(fields).items()], align=True)
+    aligned = np.dtype(
+        [(name, kinds[kind]) for name, kind in get_type_hints(fields).items()], align=True
+    )
     return np.dtype((np.record, aligned))
 
 
@@ -33,5 +40,6 @@ def constants(number: int) -> tuple[int, ...]:
 
 (ZERO,) = constants(1)
 """Start of a count that is passed from kernel to kernel."""
-FALSE, TRUE = cast(bool, np.bool_(False)), cast(bool, np.bool_(True))
+FALSE = cast(bool, np.bool_(False))
+TRUE = cast(bool, np.bool_(True))
 """The same for flags."""

@@ -1,19 +1,22 @@
-"""The rule for times before the nominal arrival on a grid of steps: a time means the nearest step."""
+"""The rule for times before the nominal arrival on a grid of steps: a time means the nearest
+step.
+"""
 
 from __future__ import annotations
 
 import math
 
 ROUNDING = 1e-9
-"""Part of a step by which a computed number of steps may be wrong: a flight has at most 1e5 steps, and a subtraction
-and a division round their number by at most 4e-11. Times of a file are decimals with far fewer digits."""
+"""Part of a step by which a computed number of steps may be wrong: a flight has at most 1e5 steps,
+and a subtraction and a division round their number by at most 4e-11. Times of a file are decimals
+with far fewer digits."""
 
 
 def steps_between(start_s: float, time_s: float, step_s: float) -> int:
     """Return the number of steps from a time to the step nearest to another time.
 
-    Of two steps that are equally near it is the earlier one. No step is at or after the nominal arrival. The number
-    is negative if the nearest step is before the start.
+    Of two steps that are equally near it is the earlier one. No step is at or after the nominal
+    arrival. The number is negative if the nearest step is before the start.
 
     Parameters
     ----------

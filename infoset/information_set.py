@@ -26,18 +26,20 @@ class InformationSetView(SetQueries):
 
 
 class InformationSet(InformationSetView):
-    """All states (alpha, omega, x) that agree with the measurements and impulses so far, for a batch of engagements.
+    """All states (alpha, omega, x) that agree with the measurements and impulses so far, for a
+    batch of engagements.
 
     Parameters
     ----------
     guarantee : bool
-        Whether to compute the guaranteed miss Phi. Only the guaranteed model with a box as initial set has one. A
-        run takes 1.1 to 1.9 times as long, with a rate sensor 1.4 to 9 times.
+        Whether to compute the guaranteed miss Phi. Only the guaranteed model with a box as initial
+        set has one. A run takes 1.1 to 1.9 times as long, with a rate sensor 1.4 to 9 times.
 
     Raises
     ------
     TypeError, ValueError
-        If the model is not a `SetModel`, the batch is not a positive whole number, or the model has no labels.
+        If the model is not a `SetModel`, the batch is not a positive whole number, or the model has
+        no labels.
 
     Examples
     --------
@@ -55,8 +57,8 @@ class InformationSet(InformationSetView):
 
     Notes
     -----
-    The order inside one step: `measure_range`, `measure_angle`, `measure_rate`, `shift`, `drop_below_threshold`,
-    `predict`.
+    The order inside one step: `measure_range`, `measure_angle`, `measure_rate`, `shift`,
+    `drop_below_threshold`, `predict`.
     """
 
     def __init__(self, model: SetModel, batch: int = 1, *, guarantee: bool = True) -> None:
@@ -66,19 +68,21 @@ class InformationSet(InformationSetView):
         super().__init__(SetState(model, batch, guarantee))
 
     def guaranteed_miss(self) -> tuple[Floats, Flags]:
-        """Return the guaranteed miss Phi: an upper bound of the true miss if all errors are within their bounds.
+        """Return the guaranteed miss Phi: an upper bound of the true miss if all errors are within
+        their bounds.
 
         Returns
         -------
         phi_m : ndarray, shape (B,)
             m; zero while no label has passed below the range threshold.
         exists : ndarray of bool, shape (B,)
-            Whether the bound is valid: some label has passed below the threshold, the model is guaranteed, and the data
-            never contradicted it.
+            Whether the bound is valid: some label has passed below the threshold, the model is
+            guaranteed, and the data never contradicted it.
 
         Notes
         -----
-        Phi bounds the miss of the labels below the threshold. The label of the true state is one of them at arrival.
+        Phi bounds the miss of the labels below the threshold. The label of the true state is one of
+        them at arrival.
         """
         state = self._state
         if state.phi is None:
@@ -98,7 +102,8 @@ class InformationSet(InformationSetView):
         *,
         alpha_rad: ArrayLike | None = None,
     ) -> None:
-        """Remove the ranges that contradict a range measurement: keep x_m/(1 + b) <= x <= x_m/(1 - b).
+        """Remove the ranges that contradict a range measurement: keep x_m/(1 + b) <= x <= x_m/(1 -
+        b).
 
         Parameters
         ----------
@@ -109,8 +114,9 @@ class InformationSet(InformationSetView):
         where : array_like of bool, shape () or (B,)
             Engagements with a measurement.
         alpha_rad : array_like, shape () or (C, B), or None
-            Angles measured at the same time. In the guaranteed model the measured distance is x / cos(alpha); without
-            a measured angle, alpha is bounded by the maximum possible displacement across x.
+            Angles measured at the same time. In the guaranteed model the measured distance is x /
+            cos(alpha); without a measured angle, alpha is bounded by the maximum possible
+            displacement across x.
 
         Raises
         ------
@@ -119,13 +125,15 @@ class InformationSet(InformationSetView):
 
         Notes
         -----
-        A range measurement narrows the interval of labels and leaves the polygons of the others unchanged.
+        A range measurement narrows the interval of labels and leaves the polygons of the others
+        unchanged.
         """
         PART.need("relative_error", relative_error)
         measured = real_array("range_m", range_m, (self.batch,))
         if some(measured < 0.0):
             raise ValueError(f"range_m must not be negative: got {shown(range_m)}")
-        state, active = self._state, self._active(where)
+        state = self._state
+        active = self._active(where)
         travelled = self.model.closing_speed_m_s * self.time_s
         slack = section_life.CUT_SLACK * (measured + travelled)
         eta = self.model.speed_error
@@ -141,18 +149,26 @@ class InformationSet(InformationSetView):
             self._recover(emptied, None, *before)
 
     def _min_cosine(self, measured_rad: ArrayLike | None) -> Floats:
-        """Lower bound of x over the distance, shape (B,): from measured angles, or from the maximum velocity."""
-        state, travelled = self._state, self.model.closing_speed_m_s * self.time_s
+        """Lower bound of x over the distance, shape (B,): from measured angles, or from the maximum
+        velocity.
+        """
+        state = self._state
+        travelled = self.model.closing_speed_m_s * self.time_s
         if measured_rad is not None:
-            alpha, steepest = self._lateral("alpha_rad", measured_rad), np.empty((2, self.batch))
-            section_passes.steepest_all(alpha, state.law.label_max - travelled, state.table, steepest)
+            alpha = self._lateral("alpha_rad", measured_rad)
+            steepest = np.empty((2, self.batch))
+            section_passes.steepest_all(
+                alpha, state.law.label_max - travelled, state.table, steepest
+            )
             return np.asarray(np.cos(steepest[0]) * np.cos(steepest[1]))
         box = self.model.bounds
         impulses = self._state.history.total_impulse() * (1.0 + self.model.execution_error_relative)
         disturbance = float(np.hypot.reduce([law.disturbance for law in state.laws]))
         fastest = impulses + box.lateral_speed_m_s + disturbance * self.time_s
         offset = box.offset_m + fastest * self.time_s
-        nearest = np.maximum((self._state.lower_label - travelled) * (1.0 - self.model.speed_error), 0.0)
+        nearest = np.maximum(
+            (self._state.lower_label - travelled) * (1.0 - self.model.speed_error), 0.0
+        )
         return np.asarray(np.cos(np.arctan2(offset, nearest)))
 
     def measure_angle(self, alpha_rad: ArrayLike, where: ArrayLike = True) -> None:
@@ -166,15 +182,22 @@ class InformationSet(InformationSetView):
             Engagements with a measurement.
         """
         measured = self._lateral("alpha_rad", alpha_rad)
-        state, active = self._state, self._active(where)
+        state = self._state
+        active = self._active(where)
         event = state.history.record(ANGLE, measured, active)
         before = state.lower_label.copy(), state.upper_label.copy()
-        elapsed, sections, laws = state.history.elapsed, state.sections, state.table
-        if section_passes.step_all(active, measured, event, elapsed, section_passes.MOVED, sections, laws):
+        elapsed = state.history.elapsed
+        sections = state.sections
+        laws = state.table
+        if section_passes.step_all(
+            active, measured, event, elapsed, section_passes.MOVED, sections, laws
+        ):
             emptied = self._refine_if_few(active, emptied=SetStatus.EMPTY)
             self._recover(emptied, event, *before)
 
-    def measure_rate(self, omega_rad_s: ArrayLike, error_rad_s: float, where: ArrayLike = True) -> None:
+    def measure_rate(
+        self, omega_rad_s: ArrayLike, error_rad_s: float, where: ArrayLike = True
+    ) -> None:
         """Cut every section by a measurement of the line-of-sight rate: |omega - omega_m| <= error.
 
         Parameters
@@ -192,7 +215,8 @@ class InformationSet(InformationSetView):
         """
         NOT_NEGATIVE.need("error_rad_s", error_rad_s)
         measured = self._lateral("omega_rad_s", omega_rad_s)
-        state, active = self._state, self._active(where)
+        state = self._state
+        active = self._active(where)
         error = error_rad_s * (1.0 + BOUND_SLACK)
         event = state.history.record(RATE, measured, active, error)
         before = state.lower_label.copy(), state.upper_label.copy()
@@ -225,13 +249,17 @@ class InformationSet(InformationSetView):
         ndarray of bool, shape (B, S)
             Stored sections that were removed.
         """
-        state, active, min_label = self._state, self.tracking, self._min_label_next()
+        state = self._state
+        active = self.tracking
+        min_label = self._min_label_next()
         computes_phi = self._computes_phi
         if state.phi is not None:
-            state.phi.leave(computes_phi, state.lower_label, state.upper_label, state.sections, state.history)
+            state.phi.leave(
+                computes_phi, state.lower_label, state.upper_label, state.sections, state.history
+            )
         if self.model.is_guaranteed:
-            # A label between the stored ones may pass the threshold. The status must not depend on whether Phi is
-            # computed.
+            # A label between the stored ones may pass the threshold. The status must not depend on
+            # whether Phi is computed.
             state.some_left |= active & (state.lower_label < min_label)
         np.maximum(state.lower_label, min_label, out=state.lower_label, where=computes_phi)
         if state.min_label >= min_label:
@@ -257,7 +285,8 @@ class InformationSet(InformationSetView):
     def predict(self) -> None:
         """Predict the set over one step, for all disturbances within the bound.
 
-        The exact set of disturbances is a thin lens in (V, z). As in the paper, the segment between its ends is used.
+        The exact set of disturbances is a thin lens in (V, z). As in the paper, the segment between
+        its ends is used.
         """
         self._state.predict(self.tracking)
 
@@ -279,7 +308,9 @@ class InformationSet(InformationSetView):
         return np.asarray(self.tracking & flags("where", where, (self.batch,)))
 
     def _refine_if_few(self, active: Flags, emptied: SetStatus) -> Flags:
-        """Make a new grid where too few sections are left. Set the status of empty sets; return where to recover."""
+        """Make a new grid where too few sections are left. Set the status of empty sets; return
+        where to recover.
+        """
         empty = active & (self.section_counts < self.model.fewest_sections)
         if not some(empty):
             return empty
@@ -292,14 +323,16 @@ class InformationSet(InformationSetView):
         return empty
 
     def _recover(self, empty: Flags, event: int | None, lower: Floats, upper: Floats) -> None:
-        """Discard the measurement that emptied a set: restore the last consistent set, predict and enlarge it.
+        """Discard the measurement that emptied a set: restore the last consistent set, predict and
+        enlarge it.
 
-        `event` is None for a range, which the history does not contain. `lower` and `upper`, shape (B,), are the limits
-        of the labels before the measurement, m.
+        `event` is None for a range, which the history does not contain. `lower` and `upper`, shape
+        (B,), are the limits of the labels before the measurement, m.
         """
         if not some(empty):
             return
-        state, history = self._state, self._state.history
+        state = self._state
+        history = self._state.history
         for b in np.flatnonzero(empty & (state.lost_step < 0)):
             state.lost_step[b] = history.elapsed
             state.lost_label[b] = self._nearest_to_living(int(b), event, lower[b], upper[b])
@@ -308,10 +341,13 @@ class InformationSet(InformationSetView):
         if event is not None:
             history.retract(event, empty)
         history.record(WIDENING, applies=empty)
-        # The sections that this measurement emptied live again; the refinement below recomputes their polygons.
+        # The sections that this measurement emptied live again; the refinement below recomputes
+        # their polygons.
         slots = state.sections.slots
         stored = np.arange(slots.shape[1]) < state.sections.used[:, None]
-        killed = (slots["died"] == section_life.ALIVE) | (slots["died"] == (-1 if event is None else event))
+        killed = (slots["died"] == section_life.ALIVE) | (
+            slots["died"] == (-1 if event is None else event)
+        )
         slots["living"][empty] = (stored & killed)[empty]
         state.lower_label[empty], state.upper_label[empty] = lower[empty], upper[empty]
         state.status[empty] = SetStatus.TRACKING.value
@@ -320,7 +356,8 @@ class InformationSet(InformationSetView):
 
     def _nearest_to_living(self, b: int, event: int | None, lower: float, upper: float) -> float:
         """Label, m, whose section was closest to the band of a measurement that emptied the set."""
-        state, sections = self._state, self._state.sections
+        state = self._state
+        sections = self._state.sections
         slots = sections.slots[b, : sections.used[b]]
         killed = slots["died"] == event
         if event is not None and killed.any():

@@ -1,7 +1,9 @@
-"""Decorators that compile kernels with Numba, the folder of the machine code, and the notice about compiling.
+"""Decorators that compile kernels with Numba, the folder of the machine code, and the notice about
+compiling.
 
-The name of the folder contains a hash of the sources that a kernel is compiled from, so stale machine code is never
-loaded. Numba itself compares only the file that defines a kernel, not the files of the functions that it calls.
+The name of the folder contains a hash of the sources that a kernel is compiled from, so stale
+machine code is never loaded. Numba itself compares only the file that defines a kernel, not the
+files of the functions that it calls.
 """
 
 from __future__ import annotations
@@ -28,7 +30,9 @@ CONFIG: Any = config
 """Numba's decorator and configuration, with the options that their types leave out."""
 HERE = Path(__file__).parent
 BESIDE = ("guidance", "sim", "rendezvous", "experiments")
-"""Packages of the project whose folders are beside this one in a checkout, and inside it in an installation."""
+"""Packages of the project whose folders are beside this one in a checkout, and inside it in an
+installation.
+"""
 VARIABLE = "NUMBA_CACHE_DIR"
 LOGGER = logging.getLogger("infoset.kernels")
 """Logger of the notice; without any configuration of logging it is printed on stderr."""
@@ -37,14 +41,20 @@ _IMPORT = re.compile(r"^\s*from (infoset(?:\.\w+)*) import (\([^)]*\)|.*)", re.M
 
 
 class Kernels:
-    """Decorators that compile the kernels of a package: without the GIL, divisions unchecked as in C.
+    """Decorators that compile the kernels of a package: without the GIL, divisions unchecked as in
+    C.
 
     `fastmath` has the liberties that LLVM may take with floating-point numbers.
     """
 
     def __init__(self, *fastmath: str) -> None:
         # Nothing needs the function that Numba writes to call a kernel from C.
-        options = {"nogil": True, "error_model": "numpy", "fastmath": set(fastmath), "no_cfunc_wrapper": True}
+        options = {
+            "nogil": True,
+            "error_model": "numpy",
+            "fastmath": set(fastmath),
+            "no_cfunc_wrapper": True,
+        }
         self._options = options
         self._inner_options = {**options, "_nrt": False, "no_cpython_wrapper": True}
 
@@ -53,17 +63,19 @@ class Kernels:
         return self._stored(function)
 
     def entry(self, function: F) -> F:
-        """Compile a kernel that allocates no array, nor does anything it calls; its machine code is stored on disk.
+        """Compile a kernel that allocates no array, nor does anything it calls; its machine code is
+        stored on disk.
 
         Without Numba's atomic reference counts, which may cost more than the work.
         """
         return self._stored(function, _nrt=False)
 
     def allocation_free(self, function: F) -> F:
-        """Compile a kernel that allocates no array and that only kernels call; it is stored with them.
+        """Compile a kernel that allocates no array and that only kernels call; it is stored with
+        them.
 
-        Numba writes no function to call it from Python, which would be a quarter of the time to compile: a call from
-        Python crashes the process. Tests call it through `tests.kernels`.
+        Numba writes no function to call it from Python, which would be a quarter of the time to
+        compile: a call from Python crashes the process. Tests call it through `tests.kernels`.
         """
         kernel: F = JIT(**self._inner_options)(function)
         return kernel
@@ -76,14 +88,15 @@ class Kernels:
     def pasted(self, function: F) -> F:
         """Paste a kernel into the code of those that call it, before it is compiled.
 
-        For kernels that return addresses of records in a tuple, which a compiled function cannot, and for a large one
-        that is called in one place, which would be compiled twice.
+        For kernels that return addresses of records in a tuple, which a compiled function cannot,
+        and for a large one that is called in one place, which would be compiled twice.
         """
         kernel: F = JIT(inline="always", **self._inner_options)(function)
         return kernel
 
     def _stored(self, function: F, **options: object) -> F:
-        folder, before = cache_folder(function), CONFIG.CACHE_DIR
+        folder = cache_folder(function)
+        before = CONFIG.CACHE_DIR
         CONFIG.CACHE_DIR = str(folder or "")
         try:
             kernel: F = JIT(cache=folder is not None, **self._options, **options)(function)
@@ -95,15 +108,19 @@ class Kernels:
 def cache_folder(kernel: Callable[..., object]) -> Path | None:
     """Return the folder for the machine code of a kernel's module; None if it cannot be written.
 
-    It is in NUMBA_CACHE_DIR, else in the user's cache folder: machine code must not come from a folder in which other
-    users can write.
+    It is in NUMBA_CACHE_DIR, else in the user's cache folder: machine code must not come from a
+    folder in which other users can write.
     """
-    module, file = kernel.__module__, Path(kernel.__code__.co_filename)
+    module = kernel.__module__
+    file = Path(kernel.__code__.co_filename)
     try:
         root = Path(os.environ.get(VARIABLE) or _user_folder())
         folder = root / f"{module}-{_hash_of_sources(file)}"
         folder.mkdir(parents=True, exist_ok=True)
-    except (OSError, RuntimeError):  # a read-only folder, a user without a home, code without a file
+    except (
+        OSError,
+        RuntimeError,
+    ):  # a read-only folder, a user without a home, code without a file
         return None
     return folder if os.access(folder, os.W_OK) else None
 
@@ -113,9 +130,11 @@ def _user_folder() -> Path:
 
 
 def _hash_of_sources(file: Path) -> str:
-    """Return a hash of a source file and of all files of the project that it imports, directly or not.
+    """Return a hash of a source file and of all files of the project that it imports, directly or
+    not.
 
-    The texts are in the order of their contents, so that it does not depend on the folder of the project.
+    The texts are in the order of their contents, so that it does not depend on the folder of the
+    project.
     """
     files = [file]
     for source in files:
@@ -128,7 +147,9 @@ def _imports(file: Path) -> tuple[Path, ...]:
     """Return the files of the project that a source file imports."""
     return tuple(
         dict.fromkeys(
-            path for package, names in _IMPORT.findall(_text(file)) for path in _modules(_path_of(package), names)
+            path
+            for package, names in _IMPORT.findall(_text(file))
+            for path in _modules(_path_of(package), names)
         )
     )
 
@@ -170,7 +191,8 @@ class _Compiled:
 
 
 class CompileNotice(event.Listener):
-    """The notice about compiling: one line at the first kernel of a command or a process, one at the end of a command.
+    """The notice about compiling: one line at the first kernel of a command or a process, one at
+    the end of a command.
 
     Numba holds a lock while it compiles a kernel and, within it, those that it calls.
     """
@@ -194,7 +216,9 @@ class CompileNotice(event.Listener):
             self._announce(cache_folder(function))
 
     def on_end(self, event: Any) -> None:
-        """Add the time of a kernel that Python called; it contains that of the kernels within it."""
+        """Add the time of a kernel that Python called; it contains that of the kernels within
+        it.
+        """
         function = event.data["dispatcher"].py_func
         if not function.__module__.startswith("infoset."):
             return
@@ -204,7 +228,9 @@ class CompileNotice(event.Listener):
 
     @contextlib.contextmanager
     def of(self, purpose: str) -> Iterator[None]:
-        """Name what the kernels are for; at the end of the context, say which were compiled and how long it took."""
+        """Name what the kernels are for; at the end of the context, say which were compiled and how
+        long it took.
+        """
         self.purpose = purpose
         self._compiled = _Compiled()
         try:
@@ -221,10 +247,15 @@ class CompileNotice(event.Listener):
 
     def _announce(self, folder: Path | None) -> None:
         if folder is None:
-            how = f"in every process, because the cache folder cannot be written: set {VARIABLE} to a folder that can"
+            how = (
+                f"in every process, because the cache folder cannot be written: set {VARIABLE} to "
+                "a folder that can"
+            )
         else:
             how = f"once; later runs load the machine code from {folder.parent}"
-        LOGGER.warning("compiling the numerical kernels%s (up to about 25 s), %s", self._of_what(), how)
+        LOGGER.warning(
+            "compiling the numerical kernels%s (up to about 25 s), %s", self._of_what(), how
+        )
 
     def _of_what(self) -> str:
         return f" of {self.purpose}" if self.purpose else ""

@@ -1,4 +1,6 @@
-"""Limits of numbers: declared once, at the field of a dataclass, for its constructor and for file readers."""
+"""Limits of numbers: declared once, at the field of a dataclass, for its constructor and for file
+readers.
+"""
 
 from __future__ import annotations
 
@@ -27,13 +29,18 @@ class _Rule(ABC):
         """Return why a value is refused, or None."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
-        """Return the schema of a field for readers of files: its type, and this rule for each of its values."""
+        """Return the schema of a field for readers of files: its type, and this rule for each of
+        its values.
+        """
         from pydantic_core import core_schema
 
         is_pair = source == tuple[float, float]
 
         def checked(value: Any) -> Any:
-            problem = next(filter(None, map(self.problem, value if isinstance(value, tuple) else (value,))), None)
+            problem = next(
+                filter(None, map(self.problem, value if isinstance(value, tuple) else (value,))),
+                None,
+            )
             if problem is None and is_pair and value[0] > value[1]:
                 problem = "must be a pair [minimum, maximum], and is reversed"
             if problem is not None:
@@ -81,10 +88,12 @@ class Limits(_Rule):
     def need(self, name: str, value: object) -> None:
         """Raise an error, which starts with `name`, if a value is not a number within these limits.
 
-        TypeError for a value that is not a float or an integer, or not an integer where it must be one (a bool is
-        neither), ValueError for one outside the limits.
+        TypeError for a value that is not a float or an integer, or not an integer where it must be
+        one (a bool is neither), ValueError for one outside the limits.
         """
-        kinds = (int, np.integer) if self.whole else (int, float, np.integer)  # single precision would round
+        kinds = (
+            (int, np.integer) if self.whole else (int, float, np.integer)
+        )  # single precision would round
         if isinstance(value, bool) or not isinstance(value, kinds):
             wanted = "an integer" if self.whole else "a real number, a float or an integer"
             raise TypeError(f"{name} must be {wanted}: got {shown(value)}")
@@ -117,10 +126,10 @@ class Line(_Rule):
             return f"must have at most {self.longest} characters"
         if not value.isprintable():
             return "must be one line without control characters"
-        if self.names_files and (value[:1] in ("", "-", ".", " ") or set('/\\:*?"<>|$') & set(value)):
-            return (
-                'must begin with a letter or a digit, without any of / \\ : * ? " < > | $, because files have this name'
-            )
+        if self.names_files and (
+            value[:1] in ("", "-", ".", " ") or set('/\\:*?"<>|$') & set(value)
+        ):
+            return 'must begin with a letter or a digit, without any of / \\ : * ? " < > | $, because files have this name'
         return None
 
 
@@ -134,13 +143,15 @@ Part = Annotated[float, PART]
 
 
 def check_fields(owner: object) -> None:
-    """Check the values of a dataclass against the annotations of its fields; raise TypeError or ValueError.
+    """Check the values of a dataclass against the annotations of its fields; raise TypeError or
+    ValueError.
 
-    Numbers are annotated with `Limits`, intervals are pairs (minimum, maximum) of such numbers, ``tuple[float, ...]``
-    is any number of them; enumerations, other dataclasses and text are checked by type. The message has the name of the
-    field, the value, and what is allowed.
+    Numbers are annotated with `Limits`, intervals are pairs (minimum, maximum) of such numbers,
+    ``tuple[float, ...]`` is any number of them; enumerations, other dataclasses and text are
+    checked by type. The message has the name of the field, the value, and what is allowed.
 
-    NumPy's numbers are replaced by Python's, so that equal dataclasses are written to files as equal text.
+    NumPy's numbers are replaced by Python's, so that equal dataclasses are written to files as
+    equal text.
     """
     kind: Any = type(owner)
     for field, hint in _hints(kind).items():
@@ -152,7 +163,9 @@ def check_fields(owner: object) -> None:
 
 
 def plain_number(value: Any) -> Any:
-    """Return a number of NumPy, or a tuple with such numbers, as Python's numbers; other values as they are."""
+    """Return a number of NumPy, or a tuple with such numbers, as Python's numbers; other values as
+    they are.
+    """
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, tuple):
@@ -163,7 +176,9 @@ def plain_number(value: Any) -> Any:
 
 
 class Checked:
-    """A dataclass whose constructor refuses values of wrong types and outside the limits of their fields."""
+    """A dataclass whose constructor refuses values of wrong types and outside the limits of their
+    fields.
+    """
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -196,34 +211,44 @@ def _check(name: str, value: Any, hint: Any) -> None:
     for number in value:
         limits.need(name, number)
     if is_pair and value[0] > value[1]:
-        raise ValueError(f"{name} must be a pair (minimum, maximum), and is reversed: got {shown(value)}")
+        raise ValueError(
+            f"{name} must be a pair (minimum, maximum), and is reversed: got {shown(value)}"
+        )
 
 
 def real_values(name: str, value: ArrayLike) -> Floats:
     """Return an array of real numbers, finite or not, of any shape; `name` is for the message.
 
-    A TypeError is raised if it is masked, complex, or does not hold numbers, a ValueError if its rows have different
-    lengths.
+    A TypeError is raised if it is masked, complex, or does not hold numbers, a ValueError if its
+    rows have different lengths.
     """
     try:
         values = value if isinstance(value, np.ndarray) else np.asarray(value)
     except ValueError:
-        raise ValueError(f"{name} must be an array, its rows of equal length: got {shown(value)}") from None
+        raise ValueError(
+            f"{name} must be an array, its rows of equal length: got {shown(value)}"
+        ) from None
     if isinstance(values, np.ma.MaskedArray):
         raise TypeError(f"{name} must be real numbers, not masked: got {shown(value)}")
     if values.dtype.kind not in "fiu":
-        raise TypeError(f"{name} must be real numbers, not of the type {values.dtype}: got {shown(value)}")
+        raise TypeError(
+            f"{name} must be real numbers, not of the type {values.dtype}: got {shown(value)}"
+        )
     return np.asarray(values, dtype=np.float64)
 
 
 def real_array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
-    """Return finite real numbers as an array of a shape, from such an array or from one number for all elements.
+    """Return finite real numbers as an array of a shape, from such an array or from one number for
+    all elements.
 
-    A TypeError is raised as by `real_values`, a ValueError if a number is not finite, or the shape is different.
+    A TypeError is raised as by `real_values`, a ValueError if a number is not finite, or the shape
+    is different.
     """
     values = real_values(name, value)
     if values.shape not in ((), shape):
-        raise ValueError(f"{name} must be a number or have the shape {shape}: got the shape {values.shape}")
+        raise ValueError(
+            f"{name} must be a number or have the shape {shape}: got the shape {values.shape}"
+        )
     if not np.isfinite(values).all():
         raise ValueError(f"{name} must be finite: got {shown(value)}")
     return values if values.shape == shape else np.ascontiguousarray(np.broadcast_to(values, shape))
@@ -232,13 +257,16 @@ def real_array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
 def flags(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Flags:
     """Return flags as an array of a shape, or a single flag for all elements.
 
-    A TypeError is raised if they are not of the type bool, or masked, a ValueError if the shape is different.
+    A TypeError is raised if they are not of the type bool, or masked, a ValueError if the shape is
+    different.
     """
     values = np.asarray(value)
     if isinstance(value, np.ma.MaskedArray) or values.dtype != np.bool_:
         raise TypeError(f"{name} must be True, False or an array of them: got {shown(value)}")
     if values.shape not in ((), shape):
-        raise ValueError(f"{name} must be a flag or have the shape {shape}: got the shape {values.shape}")
+        raise ValueError(
+            f"{name} must be a flag or have the shape {shape}: got the shape {values.shape}"
+        )
     return values
 
 

@@ -15,14 +15,18 @@ Interval = tuple[float, float]
 
 MAX_SECTIONS = 10_000
 CENTROID_ERRORS_AT_THRESHOLD = 10.0
-"""Minimum range threshold in centroid errors of the camera; at shorter ranges its error bound is not a small angle."""
+"""Minimum range threshold in centroid errors of the camera; at shorter ranges its error bound is
+not a small angle.
+"""
 
 _APPROACH = Limits(below=0.0)
 _SECTIONS = Limits(minimum=1, maximum=MAX_SECTIONS, whole=True)
 
 
 WHOLE_STEPS_TOLERANCE = 1e-9
-"""Relative error of the number of steps between two measurements, for periods that are rounded decimals."""
+"""Relative error of the number of steps between two measurements, for periods that are rounded
+decimals.
+"""
 MIN_RANGE = 1e-9
 """Minimum range as a share of the maximum label; at a range of zero there is no angle."""
 
@@ -30,8 +34,9 @@ MIN_RANGE = 1e-9
 class Model(Enum):
     """What the set allows for.
 
-    PAPER is the published procedure, whose set may lose the true state. GUARANTEED allows for errors of the closing
-    speed, gravity, manoeuvres, errors of the engine and rounding, and its set contains the true state.
+    PAPER is the published procedure, whose set may lose the true state. GUARANTEED allows for
+    errors of the closing speed, gravity, manoeuvres, errors of the engine and rounding, and its set
+    contains the true state.
     """
 
     PAPER = "paper"
@@ -41,8 +46,8 @@ class Model(Enum):
 class InitialSet(Enum):
     """Shape of a section at the start.
 
-    RECTANGLE is a rectangle in (omega, alpha), as in the paper, and belongs to the paper's model; BOX is a rectangle in
-    (z, V).
+    RECTANGLE is a rectangle in (omega, alpha), as in the paper, and belongs to the paper's model;
+    BOX is a rectangle in (z, V).
     """
 
     RECTANGLE = "rectangle"
@@ -52,8 +57,8 @@ class InitialSet(Enum):
 class Recovery(Enum):
     """What happens to a set that a measurement leaves empty, because it contradicts the model.
 
-    WIDENED ignores the measurement and enlarges the last consistent set by a disturbance. NONE leaves the set empty, as
-    in the published procedure.
+    WIDENED ignores the measurement and enlarges the last consistent set by a disturbance. NONE
+    leaves the set empty, as in the published procedure.
     """
 
     WIDENED = "widened"
@@ -69,15 +74,17 @@ class StateBox:
     z_m, x_m : tuple of float
         Minimum and maximum lateral offset and range, m.
     vz_m_s, vx_m_s : tuple of float
-        Minimum and maximum relative velocity along z and x, m/s (vx is negative: the object approaches).
+        Minimum and maximum relative velocity along z and x, m/s (vx is negative: the object
+        approaches).
     y_m, vy_m_s : tuple of float, or None
-        Offset, m, and velocity, m/s, along the second lateral axis; both make the box spatial, None is a plane.
+        Offset, m, and velocity, m/s, along the second lateral axis; both make the box spatial, None
+        is a plane.
 
     Raises
     ------
     TypeError, ValueError
-        If an interval is not a pair of numbers within their limits, or is reversed, or only one of `y_m` and `vy_m_s`
-        is set.
+        If an interval is not a pair of numbers within their limits, or is reversed, or only one of
+        `y_m` and `vy_m_s` is set.
     """
 
     z_m: Annotated[Interval, NUMBER]
@@ -91,7 +98,9 @@ class StateBox:
         check_fields(self)
         if (self.y_m is None) != (self.vy_m_s is None):
             missing = "y_m" if self.y_m is None else "vy_m_s"
-            raise ValueError(f"StateBox: y_m and vy_m_s must both be set, or neither: {missing} is missing")
+            raise ValueError(
+                f"StateBox: y_m and vy_m_s must both be set, or neither: {missing} is missing"
+            )
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -119,10 +128,15 @@ class StateBox:
     def farthest_m(self) -> float:
         """Maximum distance until x = 0, m.
 
-        Without impulses the distance is a convex function of time: it is largest at the start or at the end.
+        Without impulses the distance is a convex function of time: it is largest at the start or at
+        the end.
         """
-        offset, maximum = self.offset_m, self.x_m[1]
-        return max(math.hypot(maximum, offset), offset + self.lateral_speed_m_s * (maximum / -self.vx_m_s[1]))
+        offset = self.offset_m
+        maximum = self.x_m[1]
+        return max(
+            math.hypot(maximum, offset),
+            offset + self.lateral_speed_m_s * (maximum / -self.vx_m_s[1]),
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,10 +148,11 @@ class SetSettings:
     model : Model
         What the set allows for.
     initial_set : InitialSet or None
-        Shape of a section at the start; None is RECTANGLE in the paper's model and BOX in the guaranteed one, whose
-        only shape it is.
+        Shape of a section at the start; None is RECTANGLE in the paper's model and BOX in the
+        guaranteed one, whose only shape it is.
     sections : int
-        Number of x-sections at the start, on a uniform grid over the possible ranges, ends included.
+        Number of x-sections at the start, on a uniform grid over the possible ranges, ends
+        included.
     fewest_sections : int
         If fewer sections are left, replay makes a new grid of 2 fewest_sections + 1.
     recovery : Recovery
@@ -145,16 +160,16 @@ class SetSettings:
     range_threshold_m : float
         Hypotheses whose range is about to fall below this value eps leave the set, m.
     disturbance_m_s2 : float
-        Bound of the acceleration along z, m/s^2: nu of the fictitious one in the paper's model, that of the target's
-        manoeuvres in the guaranteed model.
+        Bound of the acceleration along z, m/s^2: nu of the fictitious one in the paper's model,
+        that of the target's manoeuvres in the guaranteed model.
     disturbance_y_m_s2 : float or None
         The same bound along y; None is the value along z. For space only.
 
     Raises
     ------
     TypeError, ValueError
-            If a value is not within its limits, `sections` is less than `fewest_sections`, or a set of the guaranteed
-            model starts in the paper's rectangle.
+            If a value is not within its limits, `sections` is less than `fewest_sections`, or a set
+            of the guaranteed model starts in the paper's rectangle.
     """
 
     model: Model = Model.GUARANTEED
@@ -169,10 +184,13 @@ class SetSettings:
     def __post_init__(self) -> None:
         check_fields(self)
         if self.sections < self.fewest_sections:
-            raise ValueError(f"sections must be at least fewest_sections, {self.fewest_sections}: got {self.sections}")
+            raise ValueError(
+                f"sections must be at least fewest_sections, {self.fewest_sections}: got "
+                f"{self.sections}"
+            )
         if self.is_guaranteed and self.initial_set is InitialSet.RECTANGLE:
-            # The rectangle takes angles for their tangents: x arctan(z/x) is less than z, and a corner of the box of
-            # the starts is outside.
+            # The rectangle takes angles for their tangents: x arctan(z/x) is less than z, and a
+            # corner of the box of the starts is outside.
             raise ValueError(
                 'initial_set = "rectangle" belongs to model = "paper": the rectangle does not contain all possible '
                 'starts, as model = "guaranteed" must; leave initial_set out, or write model = "paper"'
@@ -208,11 +226,13 @@ class SetModel(SetSettings):
     gravity_y_m_s2 : float or None
         The same bound along y; None is the value along z. For space only.
     gravity_speed_change : float
-        Bound of the relative change of the closing speed by gravity; used by the guaranteed model only.
+        Bound of the relative change of the closing speed by gravity; used by the guaranteed model
+        only.
     execution_error_relative : float
         Bound of |given / commanded - 1| of an impulse; used by the guaranteed model only.
     pointing_error_rad : float
-        Bound of the angle between the given and the commanded impulse; used by the guaranteed model in space only.
+        Bound of the angle between the given and the commanded impulse; used by the guaranteed model
+        in space only.
     **settings
         Fields of `SetSettings`.
 
@@ -247,16 +267,17 @@ class SetModel(SetSettings):
             ):
                 if is_set:
                     raise ValueError(
-                        f"SetModel: {name} holds a value of an engagement in space, and bounds have no y_m and vy_m_s: "
-                        "set them, or leave the value out"
+                        f"SetModel: {name} holds a value of an engagement in space, and bounds "
+                        "have no y_m and vy_m_s: set them, or leave the value out"
                     )
         self.check_period(self.angle_sensor)
         self.check_start("bounds", self.bounds)
         nearest_m = CENTROID_ERRORS_AT_THRESHOLD * self.angle_sensor.centroid_error_m
         if self.range_threshold_m < nearest_m:
             raise ValueError(
-                f"SetModel: range_threshold_m must be at least {CENTROID_ERRORS_AT_THRESHOLD:g} times "
-                f"{self.angle_sensor.table}.centroid_error_m, {nearest_m:g} m: got {self.range_threshold_m!r}"
+                f"SetModel: range_threshold_m must be at least {CENTROID_ERRORS_AT_THRESHOLD:g} "
+                f"times {self.angle_sensor.table}.centroid_error_m, {nearest_m:g} m: got "
+                f"{self.range_threshold_m!r}"
             )
 
     @property
@@ -274,7 +295,10 @@ class SetModel(SetSettings):
     @cached_property
     def _planar(self) -> dict[str, SetModel]:
         """The planar models of a model in space."""
-        along_y = (_of(self.disturbance_y_m_s2, self.disturbance_m_s2), _of(self.gravity_y_m_s2, self.gravity_m_s2))
+        along_y = (
+            _of(self.disturbance_y_m_s2, self.disturbance_m_s2),
+            _of(self.gravity_y_m_s2, self.gravity_m_s2),
+        )
         along_z = (self.disturbance_m_s2, self.gravity_m_s2)
         return {
             name: replace(
@@ -307,7 +331,8 @@ class SetModel(SetSettings):
             )
 
     def check_start(self, name: str, box: StateBox) -> None:
-        """Refuse starts below the range threshold, or where the error bound of the angle is not positive.
+        """Refuse starts below the range threshold, or where the error bound of the angle is not
+        positive.
 
         `name` is that of the box, for the message.
 
@@ -318,14 +343,14 @@ class SetModel(SetSettings):
         """
         if self.range_threshold_m >= box.x_m[0]:
             raise ValueError(
-                f"range_threshold_m must be less than the minimum range of {name}, {box.x_m[0]:g} m: "
-                f"got {self.range_threshold_m!r}"
+                f"range_threshold_m must be less than the minimum range of {name}, {box.x_m[0]:g} "
+                f"m: got {self.range_threshold_m!r}"
             )
         bound = min(self.angle_sensor.axis(name).error_bound(box.farthest_m) for name in box.axes)
         if not bound > 0.0:
             raise ValueError(
-                f"{self.angle_sensor.table}: its error bound must be positive up to the maximum distance of {name}, "
-                f"{box.farthest_m:g} m: got {bound:.3g} rad there"
+                f"{self.angle_sensor.table}: its error bound must be positive up to the maximum "
+                f"distance of {name}, {box.farthest_m:g} m: got {bound:.3g} rad there"
             )
 
     @property
@@ -352,7 +377,9 @@ class SetModel(SetSettings):
 
     @property
     def min_range_m(self) -> float:
-        """Minimum range of a hypothesis, m: the threshold, and more than the rounding error of zero."""
+        """Minimum range of a hypothesis, m: the threshold, and more than the rounding error of
+        zero.
+        """
         return max(self.range_threshold_m, MIN_RANGE * self.label_limits_m[1])
 
     @property
@@ -368,8 +395,9 @@ class SetModel(SetSettings):
         eta = self.speed_error
         if eta >= 1.0:
             raise ValueError(
-                "SetModel: the guaranteed model needs a closing speed known to better than 100 %: bounds.vx_m_s and "
-                f"gravity_speed_change let it differ by {eta:.3g} of closing_speed_m_s, {self.closing_speed_m_s:g} m/s"
+                "SetModel: the guaranteed model needs a closing speed known to better than 100 %: "
+                f"bounds.vx_m_s and gravity_speed_change let it differ by {eta:.3g} of "
+                f"closing_speed_m_s, {self.closing_speed_m_s:g} m/s"
             )
         return minimum / (1.0 + eta), maximum / (1.0 - eta)
 

@@ -20,7 +20,9 @@ MaskedFloats = np.ma.MaskedArray[tuple[int], np.dtype[np.float64]]
 MaskedIntegers = np.ma.MaskedArray[tuple[int], np.dtype[np.int64]]
 
 MIN_RANGE_M = 1e-25
-"""Minimum range of a section mapped to (omega, alpha): e/x^2 is within `MAXIMUM` up to the speed of light."""
+"""Minimum range of a section mapped to (omega, alpha): e/x^2 is within `MAXIMUM` up to the speed of
+light.
+"""
 
 
 @dataclass(frozen=True)
@@ -34,8 +36,8 @@ class Section:
     closing_speed_m_s : float
         Nominal closing speed e, m/s.
     polygons : ConvexPolygons, shape (C,)
-        Velocities and offsets along each lateral axis that agree with the history, m/s and m: (V, z) in a plane,
-        (V_y, y) and (V, z) in space, where the section is the product of both.
+        Velocities and offsets along each lateral axis that agree with the history, m/s and m: (V,
+        z) in a plane, (V_y, y) and (V, z) in space, where the section is the product of both.
     """
 
     label_m: float
@@ -45,11 +47,13 @@ class Section:
 
     @property
     def omega_alpha(self) -> ConvexPolygons:
-        """The section in the plane of omega = (V + e z/x)/x, rad/s, and alpha = z/x, rad, of each axis, shape (C,).
+        """The section in the plane of omega = (V + e z/x)/x, rad/s, and alpha = z/x, rad, of each
+        axis, shape (C,).
 
         The range x must be at least `MIN_RANGE_M`.
         """
-        x, e = self.range_m, self.closing_speed_m_s
+        x = self.range_m
+        e = self.closing_speed_m_s
         Limits(minimum=MIN_RANGE_M).need("range_m", x)
         return self.polygons.linear_map(np.array([[1.0 / x, e / x**2], [0.0, 1.0 / x]]))
 
@@ -69,7 +73,8 @@ class SetQueries:
     """
 
     def __init__(self, state: SetState) -> None:
-        self.model, self._state = state.model, state
+        self.model = state.model
+        self._state = state
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -98,12 +103,16 @@ class SetQueries:
 
     @property
     def inconsistent(self) -> Flags:
-        """Whether the data contradicted the model, so that the set became empty at some step, shape (B,)."""
+        """Whether the data contradicted the model, so that the set became empty at some step, shape
+        (B,).
+        """
         return np.asarray(self._state.lost_step >= 0)
 
     @property
     def inconsistency(self) -> tuple[MaskedIntegers, MaskedFloats]:
-        """Step at which each set first became empty, and its label closest to living, m; masked if it never did."""
+        """Step at which each set first became empty, and its label closest to living, m; masked if
+        it never did.
+        """
         never = ~self.inconsistent
         return (
             np.ma.MaskedArray(self._state.lost_step.copy(), mask=never),
@@ -135,16 +144,21 @@ class SetQueries:
         return self._state.section_counts
 
     def stored_range_interval_m(self) -> tuple[Floats, Floats]:
-        """Return the minimum and the maximum range of the living sections, m; zeros where none lives."""
-        ranges, living = self.ranges_m, self.living
-        tracked, rows = living.any(axis=1), np.arange(len(ranges))
+        """Return the minimum and the maximum range of the living sections, m; zeros where none
+        lives.
+        """
+        ranges = self.ranges_m
+        living = self.living
+        tracked = living.any(axis=1)
+        rows = np.arange(len(ranges))
         # The labels increase with the slot.
         minimum = ranges[rows, living.argmax(axis=1)]
         maximum = ranges[rows, -1 - living[:, ::-1].argmax(axis=1)]
         return np.where(tracked, minimum, 0.0), np.where(tracked, maximum, 0.0)
 
     def min_and_max_alpha(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Return the minimum and the maximum line-of-sight angle of the living sections, and their ranges.
+        """Return the minimum and the maximum line-of-sight angle of the living sections, and their
+        ranges.
 
         Returns
         -------
@@ -168,28 +182,42 @@ class SetQueries:
         """
         exists, ends = self._state.widest(pending)
         lower, upper = ([ends[..., end, column] for column in range(4)] for end in (0, 1))
-        return PredictedMiss(exists, lower[0], upper[0], ExtremePoints(*lower[1:]), ExtremePoints(*upper[1:]))
+        return PredictedMiss(
+            exists, lower[0], upper[0], ExtremePoints(*lower[1:]), ExtremePoints(*upper[1:])
+        )
 
     def predicted_miss_by_section_m(self) -> tuple[Floats, Floats]:
-        """Return minimum and maximum predicted miss of each section, m, each (C, B, S); zeros if it is empty."""
-        summaries, living = self._state.summaries, self.living
-        lower, upper = summaries[..., section_life.LOWER_MISS], summaries[..., section_life.UPPER_MISS]
+        """Return minimum and maximum predicted miss of each section, m, each (C, B, S); zeros if it
+        is empty.
+        """
+        summaries = self._state.summaries
+        living = self.living
+        lower = summaries[..., section_life.LOWER_MISS]
+        upper = summaries[..., section_life.UPPER_MISS]
         return np.where(living, lower, 0.0), np.where(living, upper, 0.0)
 
     def sections(self, engagement: int = 0) -> list[Section]:
         """Return the living sections of one engagement in order of increasing range."""
         self._need_engagement(engagement)
-        state, axes = self._state, range(len(self.axes))
-        labels, ranges = state.labels[engagement].tolist(), self.ranges_m[engagement].tolist()
+        state = self._state
+        axes = range(len(self.axes))
+        labels = state.labels[engagement].tolist()
+        ranges = self.ranges_m[engagement].tolist()
         return [
-            self._section(labels[s], ranges[s], [state.polygon(axis, engagement, s) for axis in axes])
+            self._section(
+                labels[s], ranges[s], [state.polygon(axis, engagement, s) for axis in axes]
+            )
             for s in np.flatnonzero(self.living[engagement]).tolist()
         ]
 
     def _section(self, label_m: float, range_m: float, outlines: list[Floats]) -> Section:
         """Return a section from the vertices along each axis."""
-        polygons = [ConvexPolygons.unchecked(vertices, np.array(len(vertices))) for vertices in outlines]
-        return Section(label_m, range_m, self.model.closing_speed_m_s, ConvexPolygons.stack(polygons))
+        polygons = [
+            ConvexPolygons.unchecked(vertices, np.array(len(vertices))) for vertices in outlines
+        ]
+        return Section(
+            label_m, range_m, self.model.closing_speed_m_s, ConvexPolygons.stack(polygons)
+        )
 
     def section_at(self, label_m: float, engagement: int = 0) -> Section:
         """Return the section at any label, computed by replaying the history.
@@ -210,7 +238,8 @@ class SetQueries:
         """
         NUMBER.need("label_m", label_m)
         self._need_engagement(engagement)
-        state, label = self._state, float(label_m)
+        state = self._state
+        label = float(label_m)
         past = past_of(state.history, state.table)
         died = replay_label(label, engagement, past)
         outlines = [np.empty((0, 2)) for _ in self.axes]
@@ -223,7 +252,10 @@ class SetQueries:
     def _need_engagement(self, engagement: int) -> None:
         WHOLE.need("engagement", engagement)
         if engagement >= self.batch:
-            raise IndexError(f"engagement must be less than {self.batch}, the number of engagements: got {engagement}")
+            raise IndexError(
+                f"engagement must be less than {self.batch}, the number of engagements: got "
+                f"{engagement}"
+            )
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self.batch} at t = {self.time_s:g} s>"

@@ -1,4 +1,6 @@
-"""Steps of Dormand and Prince's method of order 8 for any right-hand side: compiled, with SciPy's coefficients."""
+"""Steps of Dormand and Prince's method of order 8 for any right-hand side: compiled, with SciPy's
+coefficients.
+"""
 
 from __future__ import annotations
 
@@ -15,16 +17,21 @@ STAGES = 12
 _NODES = np.ascontiguousarray(DOP853.C[:STAGES])
 _WEIGHTS = np.vstack([DOP853.A[:STAGES, :STAGES], DOP853.B])
 """Coefficients of the stages, one row per stage, and of the step."""
-_THIRD, _FIFTH = np.ascontiguousarray(DOP853.E3[:STAGES]), np.ascontiguousarray(DOP853.E5[:STAGES])
+_THIRD = np.ascontiguousarray(DOP853.E3[:STAGES])
+_FIFTH = np.ascontiguousarray(DOP853.E5[:STAGES])
 
 
-def step_of(rates: Callable[[float, Floats, Floats, Any, Floats, Floats], None]) -> Callable[..., None]:
-    """Compile one step for a compiled right-hand side `rates(t, y, z, parameters, dy, dz)` that fills dy and dz.
+def step_of(
+    rates: Callable[[float, Floats, Floats, Any, Floats, Floats], None],
+) -> Callable[..., None]:
+    """Compile one step for a compiled right-hand side `rates(t, y, z, parameters, dy, dz)` that
+    fills dy and dz.
 
-    The result is a compiled `step(t, h, first, y, z, parameters, ky, kz, y_next, z_next)`. It fills the stages from
-    `first` on, ky (12, n) and kz (12, rows, columns), and the state at t + h, which shares no memory with y, (n,), and
-    z, (rows, columns). `first` is 1 where t and y are those of the call before. The state is y + h sum_k b_k k_k, whose
-    error `error_of_step` estimates, and z + (h b_1) k_1 + (h b_2) k_2 ...
+    The result is a compiled `step(t, h, first, y, z, parameters, ky, kz, y_next, z_next)`. It fills
+    the stages from `first` on, ky (12, n) and kz (12, rows, columns), and the state at t + h, which
+    shares no memory with y, (n,), and z, (rows, columns). `first` is 1 where t and y are those of
+    the call before. The state is y + h sum_k b_k k_k, whose error `error_of_step` estimates, and z
+    + (h b_1) k_1 + (h b_2) k_2 ...
     """
 
     @allocation_free
@@ -40,7 +47,9 @@ def step_of(rates: Callable[[float, Floats, Floats, Any, Floats, Floats], None])
         y_next: Floats,
         z_next: Floats,
     ) -> None:
-        flat, flat_next, flat_slopes = z.reshape(-1), z_next.reshape(-1), kz.reshape(STAGES, -1)
+        flat = z.reshape(-1)
+        flat_next = z_next.reshape(-1)
+        flat_slopes = kz.reshape(STAGES, -1)
         for stage in range(first, STAGES + 1):
             for i in range(len(y)):
                 y_next[i] = 0.0
@@ -67,7 +76,9 @@ def step_of(rates: Callable[[float, Floats, Floats, Any, Floats, Floats], None])
 
 @allocation_free
 def error_of_step(y: Floats, y_next: Floats, ky: Floats, tolerance: float, h: float) -> float:
-    """Return the error of a step in y over the tolerance, relative and absolute (Hairer, Norsett and Wanner, II.10)."""
+    """Return the error of a step in y over the tolerance, relative and absolute (Hairer, Norsett
+    and Wanner, II.10).
+    """
     third = fifth = 0.0
     for i in range(len(y)):
         scale = tolerance * (1.0 + max(abs(y[i]), abs(y_next[i])))

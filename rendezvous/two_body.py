@@ -1,4 +1,6 @@
-"""Motion under the gravity of one point: osculating elements, and coasting along any conic for many states at once."""
+"""Motion under the gravity of one point: osculating elements, and coasting along any conic for many
+states at once.
+"""
 
 from __future__ import annotations
 
@@ -12,25 +14,35 @@ from numpy.typing import ArrayLike
 from infoset.rendezvous._arrays import Floats
 
 _STRAIGHT = 1e-15
-"""A motion is straight if the square of its transverse speed is below this share of that of its speed: rounding."""
+"""A motion is straight if the square of its transverse speed is below this share of that of its
+speed: rounding.
+"""
 _NEARLY_PARABOLIC = 1e-5
-"""Conics whose binding is smaller have the time of a parabola to the perigee, to this relative error."""
-_STUMPFF_SERIES = np.array([[(-1) ** k / math.factorial(order + 2 * k) for order in (2, 3)] for k in range(10)])
-"""Coefficients of Stumpff's c_2 and c_3 up to the power 9: the next term is below 1 / 22! for arguments up to 1."""
+"""Conics whose binding is smaller have the time of a parabola to the perigee, to this relative
+error.
+"""
+_STUMPFF_SERIES = np.array(
+    [[(-1) ** k / math.factorial(order + 2 * k) for order in (2, 3)] for k in range(10)]
+)
+"""Coefficients of Stumpff's c_2 and c_3 up to the power 9: the next term is below 1 / 22! for
+arguments up to 1.
+"""
 _MAX_ROUNDS = 200
 """Newton's method needs about 10 rounds, and bisection 60 for 60 bits."""
 
 
 @dataclass(frozen=True)
 class OrbitalElements:
-    """Elements of an ellipse or a hyperbola, and the true anomaly; `raan` is the right ascension of the ascending node.
+    """Elements of an ellipse or a hyperbola, and the true anomaly; `raan` is the right ascension of
+    the ascending node.
 
     The semi-major axis of a hyperbola is negative.
 
     Raises
     ------
     ValueError
-        If the semi-major axis and the eccentricity belong to neither, or the true anomaly is beyond the asymptotes.
+        If the semi-major axis and the eccentricity belong to neither, or the true anomaly is beyond
+        the asymptotes.
     """
 
     semi_major_axis_m: float
@@ -45,9 +57,10 @@ class OrbitalElements:
         is_hyperbola = self.semi_major_axis_m < 0.0 and self.eccentricity > 1.0
         if not (is_ellipse or is_hyperbola):
             raise ValueError(
-                "an ellipse has a semi-major axis above 0 and an eccentricity from 0 to below 1, a hyperbola a "
-                "semi-major axis below 0 and an eccentricity above 1, not "
-                f"{self.semi_major_axis_m:g} m and {self.eccentricity:g}; give a parabola by position and velocity"
+                "an ellipse has a semi-major axis above 0 and an eccentricity from 0 to below 1, "
+                "a hyperbola a semi-major axis below 0 and an eccentricity above 1, not "
+                f"{self.semi_major_axis_m:g} m and {self.eccentricity:g}; give a parabola by "
+                "position and velocity"
             )
         if not 1.0 + self.eccentricity * math.cos(self.true_anomaly_rad) > 0.0:
             raise ValueError(
@@ -57,9 +70,12 @@ class OrbitalElements:
             )
 
     def state(self, gravitational_parameter_m3_s2: float) -> tuple[Floats, Floats]:
-        """Return position (m) and velocity (m/s), shapes (3,), in the inertial frame of the elements."""
+        """Return position (m) and velocity (m/s), shapes (3,), in the inertial frame of the
+        elements.
+        """
         latus_rectum = self.semi_major_axis_m * (1.0 - self.eccentricity**2)
-        cosine, sine = np.cos(self.true_anomaly_rad), np.sin(self.true_anomaly_rad)
+        cosine = np.cos(self.true_anomaly_rad)
+        sine = np.sin(self.true_anomaly_rad)
         radius = latus_rectum / (1.0 + self.eccentricity * cosine)
         speed = np.sqrt(gravitational_parameter_m3_s2 / latus_rectum)
         (cn, sn), (ci, si), (cp, sp) = (
@@ -73,35 +89,54 @@ class OrbitalElements:
         return position, speed * (-sine * toward_perigee + (self.eccentricity + cosine) * ahead)
 
 
-def semi_major_axis_m(position_m: Floats, velocity_m_s: Floats, gravitational_parameter_m3_s2: float) -> float:
-    """Return the osculating semi-major axis, m: negative for a hyperbola, infinite for a parabola."""
-    inverse = 2.0 / np.linalg.norm(position_m) - velocity_m_s @ velocity_m_s / gravitational_parameter_m3_s2
+def semi_major_axis_m(
+    position_m: Floats, velocity_m_s: Floats, gravitational_parameter_m3_s2: float
+) -> float:
+    """Return the osculating semi-major axis, m: negative for a hyperbola, infinite for a
+    parabola.
+    """
+    inverse = (
+        2.0 / np.linalg.norm(position_m)
+        - velocity_m_s @ velocity_m_s / gravitational_parameter_m3_s2
+    )
     return float(1.0 / inverse) if inverse != 0.0 else float("inf")
 
 
-def perigee_m(position_m: Floats, velocity_m_s: Floats, gravitational_parameter_m3_s2: float) -> float:
-    """Return the minimum distance from the planet's centre on the osculating orbit, m; zero for a radial fall."""
+def perigee_m(
+    position_m: Floats, velocity_m_s: Floats, gravitational_parameter_m3_s2: float
+) -> float:
+    """Return the minimum distance from the planet's centre on the osculating orbit, m; zero for a
+    radial fall.
+    """
     inward = float(position_m @ velocity_m_s)
-    momentum_squared = float((position_m @ position_m) * (velocity_m_s @ velocity_m_s)) - inward * inward
+    momentum_squared = (
+        float((position_m @ position_m) * (velocity_m_s @ velocity_m_s)) - inward * inward
+    )
     latus_rectum = max(0.0, momentum_squared) / gravitational_parameter_m3_s2
     axis = semi_major_axis_m(position_m, velocity_m_s, gravitational_parameter_m3_s2)
     return latus_rectum / (1.0 + math.sqrt(max(0.0, 1.0 - latus_rectum / axis)))
 
 
-def orbit_fault(position_m: Floats, velocity_m_s: Floats, mu_m3_s2: float, planet_radius_m: float) -> str | None:
-    """Return why a craft cannot stay on the orbit of a state: it is no ellipse, or meets the planet; None if it can."""
+def orbit_fault(
+    position_m: Floats, velocity_m_s: Floats, mu_m3_s2: float, planet_radius_m: float
+) -> str | None:
+    """Return why a craft cannot stay on the orbit of a state: it is no ellipse, or meets the
+    planet; None if it can.
+    """
     if not position_m.any():
         return "the position is the centre of the planet"
     axis = semi_major_axis_m(position_m, velocity_m_s, mu_m3_s2)
     if not 0.0 < axis < math.inf:
-        return "the orbit is a parabola or a hyperbola: the velocity is not below the escape velocity"
+        return (
+            "the orbit is a parabola or a hyperbola: the velocity is not below the escape velocity"
+        )
     perigee = perigee_m(position_m, velocity_m_s, mu_m3_s2)
     if perigee <= 1e-6 * axis:
         return "the orbit is a fall along a line through the planet's centre"
     if perigee <= planet_radius_m:
         return (
-            f"the orbit meets the planet: its perigee is {perigee / 1e3:.6g} km from the centre, and the planet's "
-            f"radius is {planet_radius_m / 1e3:.6g} km"
+            f"the orbit meets the planet: its perigee is {perigee / 1e3:.6g} km from the centre, "
+            f"and the planet's radius is {planet_radius_m / 1e3:.6g} km"
         )
     return None
 
@@ -111,14 +146,19 @@ class _Start(NamedTuple):
 
     unit_s: Floats
     binding: Floats
-    """Distance over semi-major axis: positive on an ellipse, zero on a parabola, negative on a hyperbola."""
+    """Distance over semi-major axis: positive on an ellipse, zero on a parabola, negative on a
+    hyperbola.
+    """
     outward: Floats
     """Radial speed."""
     transverse_squared: Floats
 
 
 def closest_approach_m(
-    position_m: Floats, velocity_m_s: Floats, gravitational_parameter_m3_s2: float, duration_s: float
+    position_m: Floats,
+    velocity_m_s: Floats,
+    gravitational_parameter_m3_s2: float,
+    duration_s: float,
 ) -> float:
     """Return the minimum distance from the planet's centre, m, while a craft coasts.
 
@@ -130,14 +170,22 @@ def closest_approach_m(
     # Between two perigees the distance has no minimum but the ends.
     end = position_m
     if math.isfinite(duration_s):
-        end = coast(np.concatenate([position_m, velocity_m_s]), duration_s, gravitational_parameter_m3_s2)[:3]
+        end = coast(
+            np.concatenate([position_m, velocity_m_s]), duration_s, gravitational_parameter_m3_s2
+        )[:3]
     return float(min(np.linalg.norm(position_m), np.linalg.norm(end)))
 
 
 def flight_fault(
-    position_m: Floats, velocity_m_s: Floats, mu_m3_s2: float, planet_radius_m: float, duration_s: float
+    position_m: Floats,
+    velocity_m_s: Floats,
+    mu_m3_s2: float,
+    planet_radius_m: float,
+    duration_s: float,
 ) -> str | None:
-    """Return why a craft cannot coast for a duration, along any conic: it meets the planet; None if it can."""
+    """Return why a craft cannot coast for a duration, along any conic: it meets the planet; None if
+    it can.
+    """
     if not position_m.any():
         return "the position is the centre of the planet"
     distance_m = closest_approach_m(position_m, velocity_m_s, mu_m3_s2, duration_s)
@@ -150,20 +198,24 @@ def flight_fault(
 
 
 def coast(states: Floats, duration_s: ArrayLike, gravitational_parameter_m3_s2: float) -> Floats:
-    """Return `states` (r, v), shape (..., 6), about the attracting point, after coasting; `duration_s` may be negative.
+    """Return `states` (r, v), shape (..., 6), about the attracting point, after coasting;
+    `duration_s` may be negative.
 
-    Lagrange's f and g functions of the universal anomaly, which are the same for ellipses, parabolas and hyperbolas.
+    Lagrange's f and g functions of the universal anomaly, which are the same for ellipses,
+    parabolas and hyperbolas.
 
     Raises
     ------
     ValueError
-        If a state is at the attracting point or not finite, or falls straight through the point in the duration.
+        If a state is at the attracting point or not finite, or falls straight through the point in
+        the duration.
 
     References
     ----------
     Battin, An Introduction to the Mathematics and Methods of Astrodynamics, AIAA 1999, section 4.5.
     """
-    position, velocity = states[..., :3], states[..., 3:]
+    position = states[..., :3]
+    velocity = states[..., 3:]
     start = _scaled_start(position, velocity, gravitational_parameter_m3_s2)
     duration = np.asarray(duration_s, dtype=np.float64) / start.unit_s
     direction = np.where(duration < 0.0, -1.0, 1.0)
@@ -171,7 +223,9 @@ def coast(states: Floats, duration_s: ArrayLike, gravitational_parameter_m3_s2: 
 
     is_straight = start.transverse_squared <= _STRAIGHT * (2.0 - start.binding)
     if (is_straight & (_to_perigee(ahead) <= np.abs(duration))).any():
-        raise ValueError("a state falls straight into the attracting point; give it a transverse velocity")
+        raise ValueError(
+            "a state falls straight into the attracting point; give it a transverse velocity"
+        )
 
     anomaly = direction * _universal_anomaly(start.binding, ahead.outward, np.abs(duration))
     first, second, _ = _stumpff(start.binding * anomaly**2)
@@ -192,7 +246,9 @@ def coast(states: Floats, duration_s: ArrayLike, gravitational_parameter_m3_s2: 
     )
 
 
-def _scaled_start(position: Floats, velocity: Floats, gravitational_parameter_m3_s2: float) -> _Start:
+def _scaled_start(
+    position: Floats, velocity: Floats, gravitational_parameter_m3_s2: float
+) -> _Start:
     radius = np.linalg.norm(position, axis=-1)
     with np.errstate(divide="ignore", invalid="ignore"):
         unit_s = np.sqrt(radius**3 / gravitational_parameter_m3_s2)
@@ -208,7 +264,9 @@ def _scaled_start(position: Floats, velocity: Floats, gravitational_parameter_m3
 
 def _to_perigee(start: _Start) -> Floats:
     """Time to the next perigee; infinite after the only one of a parabola or a hyperbola."""
-    binding, outward, transverse_squared = start.binding, start.outward, start.transverse_squared
+    binding = start.binding
+    outward = start.outward
+    transverse_squared = start.transverse_squared
     size = np.abs(binding)
     rate = np.maximum(size, _NEARLY_PARABOLIC) ** 1.5
     eccentricity = np.sqrt(np.maximum(1.0 - binding * transverse_squared, 0.0))
@@ -230,9 +288,11 @@ def _period(binding: Floats) -> Floats:
 
 
 def _universal_anomaly(binding: Floats, outward: Floats, duration: Floats) -> Floats:
-    """Solve Kepler's equation for the universal anomaly, without whole revolutions; `duration` is not negative.
+    """Solve Kepler's equation for the universal anomaly, without whole revolutions; `duration` is
+    not negative.
 
-    Newton's method in a bracket, which is halved where a step leaves it: time increases with the anomaly.
+    Newton's method in a bracket, which is halved where a step leaves it: time increases with the
+    anomaly.
     """
     period = _period(binding)
     rest = np.mod(duration, period)
@@ -264,7 +324,9 @@ def _time_of(anomaly: Floats, binding: Floats, outward: Floats) -> tuple[Floats,
     first, second, third = _stumpff(binding * anomaly**2)
     advance = anomaly * first
     turn = anomaly**2 * second
-    return advance + outward * turn + anomaly**3 * third, 1.0 + outward * advance + (1.0 - binding) * turn
+    return advance + outward * turn + anomaly**3 * third, 1.0 + outward * advance + (
+        1.0 - binding
+    ) * turn
 
 
 def _stumpff(square: Floats) -> tuple[Floats, Floats, Floats]:

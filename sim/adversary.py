@@ -1,6 +1,8 @@
-"""Search for the start, the measurement errors and the target's accelerations with the maximum miss of a strategy.
+"""Search for the start, the measurement errors and the target's accelerations with the maximum miss
+of a strategy.
 
-A simulated miss is a lower bound of what the strategy can guarantee. It does not prove that no greater one exists.
+A simulated miss is a lower bound of what the strategy can guarantee. It does not prove that no
+greater one exists.
 """
 
 from __future__ import annotations
@@ -33,7 +35,9 @@ from infoset.sim.target import constant_side
 WORST_FOUND = "worst-found"
 """Name of the noise with the errors that a search found, in records."""
 CHUNK = 250
-"""Maximum number of engagements in a batch; the cost of a step without any engagement is that of 30 to 40 of them."""
+"""Maximum number of engagements in a batch; the cost of a step without any engagement is that of 30
+to 40 of them.
+"""
 GENERATION = 100
 """Engagements between two selections."""
 ELITE = 24
@@ -50,11 +54,12 @@ class Objective(Enum):
     """What a search maximises: the value of an engagement."""
 
     ANY_STATE = "any-state"
-    """The maximum miss of a state that the set contained when control ended for its label (`infoset.sim.label_ends`).
+    """The maximum miss of a state that the set contained when control ended for its label
+    (`infoset.sim.label_ends`).
 
-    All these states agree with what was measured until then, so that the truth can be chosen among them afterwards. The
-    sections contain at least all states that agree with the measurements. Where the set became empty, the miss of the
-    simulated truth counts.
+    All these states agree with what was measured until then, so that the truth can be chosen among
+    them afterwards. The sections contain at least all states that agree with the measurements.
+    Where the set became empty, the miss of the simulated truth counts.
     """
     FIXED_TRUTH = "fixed-truth"
     """The miss of the simulated true state."""
@@ -83,12 +88,13 @@ class WorstEngagement:
     accelerations_m_s2 : ndarray, shape (C, 1, steps), or None
         Accelerations of the target, m/s^2. None if the target is that of the scenario.
     max_acceleration_m_s2 : mapping of str to float
-        Maximum acceleration of the searched targets by lateral axis, m/s^2; empty if the target is that of the
-        scenario.
+        Maximum acceleration of the searched targets by lateral axis, m/s^2; empty if the target is
+        that of the scenario.
     construction : str
         Kind of the first plan from which the engagement was derived.
     sets_emptied : int
-        Number of simulated engagements whose set became empty. If it is zero, `keep_set` makes no difference.
+        Number of simulated engagements whose set became empty. If it is zero, `keep_set` makes no
+        difference.
     history : tuple of (int, float)
         Evaluations and maximum value so far, m, at each increase.
     """
@@ -119,8 +125,12 @@ class WorstEngagement:
         return self.any_state_miss_m if self.objective is Objective.ANY_STATE else self.miss_m
 
     def start(self) -> dict[str, float]:
-        """Return the start by the names of `StateBox`: z_m, x_m, vz_m_s, vx_m_s; in space also y_m, vy_m_s."""
-        return start_of(self.scenario, np.concatenate([self.result.position_m[0], self.result.velocity_m_s[0]]))
+        """Return the start by the names of `StateBox`: z_m, x_m, vz_m_s, vx_m_s; in space also y_m,
+        vy_m_s.
+        """
+        return start_of(
+            self.scenario, np.concatenate([self.result.position_m[0], self.result.velocity_m_s[0]])
+        )
 
     def record(self, strategy: Strategy | None = None) -> Record:
         """Simulate the engagement again and return its record.
@@ -128,10 +138,13 @@ class WorstEngagement:
         Parameters
         ----------
         strategy : Strategy or None
-            None is the scenario's. A strategy different from that of the search has a different miss.
+            None is the scenario's. A strategy different from that of the search has a different
+            miss.
         """
         target = self.accelerations_m_s2
-        record = fly_one(self.scenario, seed=self.seed, strategy=strategy, noise=self.noise, target_m_s2=target)
+        record = fly_one(
+            self.scenario, seed=self.seed, strategy=strategy, noise=self.noise, target_m_s2=target
+        )
         return replace(record, noise=WORST_FOUND)
 
 
@@ -146,7 +159,8 @@ def find_worst(
     threads: int = 1,
     progress: Callable[[float], None] | None = None,
 ) -> WorstEngagement:
-    """Search possible starts, errors within their bounds, and accelerations of the target, for the maximum miss.
+    """Search possible starts, errors within their bounds, and accelerations of the target, for the
+    maximum miss.
 
     Parameters
     ----------
@@ -161,8 +175,8 @@ def find_worst(
     seed : int
         Root seed. The same seed and budget give the same engagement for any number of threads.
     keep_set : bool
-        Count only engagements whose set never became empty. In the model `paper` a set can become empty at the start;
-        then nothing is corrected, and the miss says nothing about the strategy.
+        Count only engagements whose set never became empty. In the model `paper` a set can become
+        empty at the start; then nothing is corrected, and the miss says nothing about the strategy.
     progress : callable or None
         Called with the fraction done, from 0 to 1.
 
@@ -175,17 +189,19 @@ def find_worst(
 
     Notes
     -----
-    A quarter of the budget is for first plans: game noise with its four tie rules and, before a cut-off or
-    scheduled impulses, its shift; and noise that keeps the upper or the lower extreme in a random or blockwise order.
-    The errors become those of the plan. The plans with the maximum misses are then changed, by blocks of errors,
-    switching times or coordinates of the start, and compete with their changes. In the first part of the search, the
-    number of plans from one first plan is limited. In space, both axes have errors of their own, and a change of the
-    angle errors is along one axis or both.
+    A quarter of the budget is for first plans: game noise with its four tie rules and, before a
+    cut-off or scheduled impulses, its shift; and noise that keeps the upper or the lower extreme in
+    a random or blockwise order. The errors become those of the plan. The plans with the maximum
+    misses are then changed, by blocks of errors, switching times or coordinates of the start, and
+    compete with their changes. In the first part of the search, the number of plans from one first
+    plan is limited. In space, both axes have errors of their own, and a change of the angle errors
+    is along one axis or both.
 
-    In the guaranteed model the targets accelerate at the bound of the model, `set_model.disturbance_m_s2`, with signs
-    that belong to the plan, constant or in blocks. They replace the target of the
-    scenario; if its acceleration is greater than the bound, they accelerate as much. In the model `paper` the bound is
-    fictitious, and the target is that of the scenario.
+    In the guaranteed model the targets accelerate at the bound of the model,
+    `set_model.disturbance_m_s2`, with signs that belong to the plan, constant or in blocks. They
+    replace the target of the scenario; if its acceleration is greater than the bound, they
+    accelerate as much. In the model `paper` the bound is fictitious, and the target is that of the
+    scenario.
 
     References
     ----------
@@ -210,21 +226,31 @@ class _Search:
     guarantee = False
 
     def __init__(
-        self, scenario: Scenario, strategy: Strategy | None, objective: Objective, seed: int, keep_set: bool
+        self,
+        scenario: Scenario,
+        strategy: Strategy | None,
+        objective: Objective,
+        seed: int,
+        keep_set: bool,
     ) -> None:
         self.scenario = replace(scenario, dispersion=scenario.set_model.bounds, covariance=None)
         self.evaluations = self.sets_emptied = 0
         self.history: list[tuple[int, float]] = []
         self.elite: Plans | None = None
-        self._objective, self._seed, self._keep_set = objective, seed, keep_set
+        self._objective = objective
+        self._seed = seed
+        self._keep_set = keep_set
         self._strategy = strategy or make_strategy(scenario.strategy)
         self._strategy_name = scenario.strategy if strategy is None else type(strategy).__name__
         self._shift_m = worst_shift_m(scenario)
-        # All other random numbers are those of run 0, so that the worst engagement can be repeated alone.
+        # All other random numbers are those of run 0, so that the worst engagement can be repeated
+        # alone.
         self._draws = functools.cache(lambda size: draw(self.scenario, [0] * size, seed))
         self._planner = Planner(self.scenario, self._draws(1).steps, seed)
 
-    def run(self, budget: int, pool: ThreadPoolExecutor, progress: Callable[[float], None] | None) -> None:
+    def run(
+        self, budget: int, pool: ThreadPoolExecutor, progress: Callable[[float], None] | None
+    ) -> None:
         flights = _in_chunks(*self._planner.first(max(1, round(FIRST_SHARE * budget))))
         while flights:
             for plans, emptied in pool.map(self._evaluate, *zip(*flights, strict=True)):
@@ -239,8 +265,11 @@ class _Search:
 
     def worst(self) -> WorstEngagement:
         if self.elite is None or not np.isfinite(self.elite.value[0]):
-            raise NothingCountsError("in every simulated engagement the set became empty, or the miss was not finite")
-        best, planner = self.elite.take(slice(0, 1)), self._planner
+            raise NothingCountsError(
+                "in every simulated engagement the set became empty, or the miss was not finite"
+            )
+        best = self.elite.take(slice(0, 1))
+        planner = self._planner
         flight = self.engagements(best)
         while flight.flying:
             flight.advance()
@@ -248,7 +277,9 @@ class _Search:
         start = start_of(self.scenario, best.start[0])
         maximum = planner.acceleration_m_s2
         return WorstEngagement(
-            scenario=replace(self.scenario, dispersion=StateBox(**{name: (x, x) for name, x in start.items()})),
+            scenario=replace(
+                self.scenario, dispersion=StateBox(**{name: (x, x) for name, x in start.items()})
+            ),
             seed=self._seed,
             strategy=self._strategy_name,
             objective=self._objective,
@@ -257,7 +288,9 @@ class _Search:
             noise=self._scripted(best),
             accelerations_m_s2=self._target_m_s2(best),
             max_acceleration_m_s2=(
-                dict(zip(self.scenario.set_model.axes, maximum.tolist(), strict=True)) if maximum.any() else {}
+                dict(zip(self.scenario.set_model.axes, maximum.tolist(), strict=True))
+                if maximum.any()
+                else {}
             ),
             construction=planner.constructions[int(best.lineage[0])],
             changes=int(best.changes[0]),
@@ -271,16 +304,29 @@ class _Search:
         position_m, velocity_m_s = (part.copy() for part in np.split(plans.start, 2, axis=1))
         draws = replace(self._draws(len(plans)), position_m=position_m, velocity_m_s=velocity_m_s)
         noise: MeasurementNoise = self._scripted(plans)
-        target_m_s2, side = self._target_m_s2(plans), constant_side(self.scenario.target, draws.target)
+        target_m_s2 = self._target_m_s2(plans)
+        side = constant_side(self.scenario.target, draws.target)
         if constructions is not None:
             side = side if target_m_s2 is None else by_axis(plans.sides[:, :, 0])
-            noise = _Recorded(constructions.noise(self._shift_m, side), plans, self._planner.sensors)
-        strategy, guarantee = self._strategy, self.guarantee
-        return Engagements(self.scenario, draws, strategy, noise=noise, target_m_s2=target_m_s2, guarantee=guarantee)
+            noise = _Recorded(
+                constructions.noise(self._shift_m, side), plans, self._planner.sensors
+            )
+        strategy = self._strategy
+        guarantee = self.guarantee
+        return Engagements(
+            self.scenario,
+            draws,
+            strategy,
+            noise=noise,
+            target_m_s2=target_m_s2,
+            guarantee=guarantee,
+        )
 
     def _scripted(self, plans: Plans) -> ScriptedNoise:
         sensors = enumerate(self._planner.sensors)
-        return ScriptedNoise({sensor.name: by_axis(plans.errors[:, row], sensor) for row, sensor in sensors})
+        return ScriptedNoise(
+            {sensor.name: by_axis(plans.errors[:, row], sensor) for row, sensor in sensors}
+        )
 
     def _target_m_s2(self, plans: Plans) -> Floats | None:
         maximum = self._planner.acceleration_m_s2
@@ -288,7 +334,11 @@ class _Search:
 
     def value_m(self, flight: Engagements, results: Results) -> Floats:
         """Return what the search maximises, m, shape (B,)."""
-        return flight.any_state_miss_m(results) if self._objective is Objective.ANY_STATE else results.miss_m
+        return (
+            flight.any_state_miss_m(results)
+            if self._objective is Objective.ANY_STATE
+            else results.miss_m
+        )
 
     def _evaluate(self, plans: Plans, constructions: Constructions | None) -> tuple[Plans, int]:
         """Return plans with their values, and the number of engagements whose set became empty."""
@@ -298,7 +348,9 @@ class _Search:
         results = flight.results(np.arange(len(plans)))
         value = self.value_m(flight, results)
         counts = np.isfinite(value) & ~(self._keep_set & results.set_emptied)
-        return replace(plans, value=np.where(counts, value, -np.inf)), int(results.set_emptied.sum())
+        return replace(plans, value=np.where(counts, value, -np.inf)), int(
+            results.set_emptied.sum()
+        )
 
     def _select(self, plans: Plans, young: bool) -> None:
         """Update the elite and the history with new flights."""
@@ -321,7 +373,9 @@ class _Search:
 
 @dataclass(frozen=True)
 class _Recorded:
-    """Game noise whose errors are written into plans: `ScriptedNoise` with them repeats the measurements."""
+    """Game noise whose errors are written into plans: `ScriptedNoise` with them repeats the
+    measurements.
+    """
 
     game: GameNoise
     plans: Plans
@@ -343,7 +397,9 @@ def start_of(scenario: Scenario, start: Floats) -> dict[str, float]:
     return dict(zip(names, start.tolist(), strict=True))
 
 
-def _in_chunks(plans: Plans, constructions: Constructions | None) -> list[tuple[Plans, Constructions | None]]:
+def _in_chunks(
+    plans: Plans, constructions: Constructions | None
+) -> list[tuple[Plans, Constructions | None]]:
     """Split plans into equal parts of at most `CHUNK`."""
     parts = np.array_split(np.arange(len(plans)), -(-len(plans) // CHUNK))
     return [(plans.take(part), constructions and constructions.take(part)) for part in parts]

@@ -1,4 +1,6 @@
-"""Plans of an adversary (start, errors and target of each engagement): random ones, and changes of the best ones."""
+"""Plans of an adversary (start, errors and target of each engagement): random ones, and changes of
+the best ones.
+"""
 
 from __future__ import annotations
 
@@ -32,14 +34,15 @@ class Plans:
     start : ndarray, shape (n, 4) or (n, 6)
         (z, x, V_z, V_x) at t = 0, m and m/s; (y, z, x, V_y, V_z, V_x) in space.
     errors : ndarray, shape (n, rows, axes, steps)
-        Measurement errors in units of their bounds, one row per sensor, for each lateral axis. A sensor that does not
-        measure by axis uses the first.
+        Measurement errors in units of their bounds, one row per sensor, for each lateral axis. A
+        sensor that does not measure by axis uses the first.
     sides : ndarray, shape (n, axes, steps)
         Sign of the target's acceleration.
     lineage, changes : ndarray of int, shape (n,)
         Index of the first plan from which a plan was derived, and number of changes since then.
     value : ndarray, shape (n,)
-        What the search maximises, m; -inf if the engagement does not count, or before it is simulated.
+        What the search maximises, m; -inf if the engagement does not count, or before it is
+        simulated.
     """
 
     start: Floats
@@ -63,7 +66,9 @@ class Plans:
 
 def joined(parts: Sequence[Plans]) -> Plans:
     """Return the plans of all parts."""
-    return Plans(*(np.concatenate([getattr(part, of.name) for part in parts]) for of in fields(Plans)))
+    return Plans(
+        *(np.concatenate([getattr(part, of.name) for part in parts]) for of in fields(Plans))
+    )
 
 
 @dataclass(frozen=True)
@@ -110,7 +115,9 @@ class _ConstructedNoise(GameNoise):
 
     @property
     def truth_side(self) -> Floats:
-        """Side to which the shift moves the true state, shape (B,) or (C, B): 1 or -1, 0 for no shift."""
+        """Side to which the shift moves the true state, shape (B,) or (C, B): 1 or -1, 0 for no
+        shift.
+        """
         side = self.shift_side
         return side if self.target_side is None else np.where(side == 0.0, 0.0, self.target_side)
 
@@ -120,7 +127,8 @@ class _ConstructedNoise(GameNoise):
 
 
 def by_axis(values: Floats, sensor: Sensor | None = None) -> Floats:
-    """Return values of shape (n, C, ...) as a sensor uses them: (C, n, ...) if it measures by axis, otherwise (n, ...).
+    """Return values of shape (n, C, ...) as a sensor uses them: (C, n, ...) if it measures by axis,
+    otherwise (n, ...).
 
     None is the angle sensor.
     """
@@ -130,31 +138,39 @@ def by_axis(values: Floats, sensor: Sensor | None = None) -> Floats:
 class Planner:
     """Random plans of a scenario whose flights have a number of steps.
 
-    In the guaranteed model the target accelerates at the bound of the model, or at that of the scenario's target if
-    that is greater. In the model `paper` the disturbance is fictitious.
+    In the guaranteed model the target accelerates at the bound of the model, or at that of the
+    scenario's target if that is greater. In the model `paper` the disturbance is fictitious.
 
     Attributes
     ----------
     sensors : tuple of Sensor
         Sensors of the rows of the errors, that of the angles first.
     acceleration_m_s2 : ndarray, shape (axes,)
-        Acceleration of the target along each axis, m/s^2; zero if the target is that of the scenario.
+        Acceleration of the target along each axis, m/s^2; zero if the target is that of the
+        scenario.
     constructions : list of str
         Construction of each first plan so far, by lineage.
     """
 
     def __init__(self, scenario: Scenario, steps: int, seed: int) -> None:
-        model, target = scenario.set_model, scenario.target
-        self._model, self._steps, self._random = model, steps, np.random.default_rng(seed)
+        model = scenario.set_model
+        target = scenario.target
+        self._model = model
+        self._steps = steps
+        self._random = np.random.default_rng(seed)
         others = [sensor for name, sensor in scenario.sensors.items() if name != BearingSensor.name]
         self.sensors: tuple[Sensor, ...] = (scenario.bearing_sensor, *others)
         self._lower, self._upper = corners(model.bounds)
         self._axes = len(model.axes)
         self.acceleration_m_s2: Floats = np.zeros(self._axes)
         if model.is_guaranteed:
-            self.acceleration_m_s2 = np.array([model.axis(axis).disturbance_m_s2 for axis in model.axes])
+            self.acceleration_m_s2 = np.array(
+                [model.axis(axis).disturbance_m_s2 for axis in model.axes]
+            )
             if target is not None and target.manoeuvre is not Manoeuvre.NONE:
-                self.acceleration_m_s2 = np.maximum(self.acceleration_m_s2, amplitudes_m_s2(target, self._axes))
+                self.acceleration_m_s2 = np.maximum(
+                    self.acceleration_m_s2, amplitudes_m_s2(target, self._axes)
+                )
         self.constructions: list[str] = []
         self._changes: list[Callable[[Plans, int], None]] = [
             self._flip,
@@ -169,7 +185,9 @@ class Planner:
             self._changes.append(self._turn_target)
 
     def first(self, count: int) -> tuple[Plans, Constructions]:
-        """Return first plans, in equal numbers for each construction, and how game noise chooses their errors."""
+        """Return first plans, in equal numbers for each construction, and how game noise chooses
+        their errors.
+        """
         makers: list[tuple[str, TieRule | None, Callable[[int], Floats]]] = [
             *((f"game noise, tie {tie.value}", tie, self._coins) for tie in TieRule),
             ("extremes kept in random order", None, self._coins),
@@ -186,13 +204,27 @@ class Planner:
             sides = np.where(in_blocks, self._blocks(share), self._coins(share)[:, :, :1])
             lineage = len(self.constructions) + np.arange(share)
             self.constructions += [name] * share
-            plans.append(Plans(self._starts(share), errors, sides, lineage, 0 * lineage, np.full(share, -np.inf)))
+            plans.append(
+                Plans(
+                    self._starts(share),
+                    errors,
+                    sides,
+                    lineage,
+                    0 * lineage,
+                    np.full(share, -np.inf),
+                )
+            )
             constructions.append(self._construction(tie, errors[:, ANGLE]))
-        together = (np.concatenate([getattr(each, of.name) for each in constructions]) for of in fields(Constructions))
+        together = (
+            np.concatenate([getattr(each, of.name) for each in constructions])
+            for of in fields(Constructions)
+        )
         return joined(plans), Constructions(*together)
 
     def _construction(self, tie: TieRule | None, drawn: Floats) -> Constructions:
-        """Return game noise with a rule for ties, or for None noise that keeps the drawn extremes at every step."""
+        """Return game noise with a rule for ties, or for None noise that keeps the drawn extremes
+        at every step.
+        """
         share = len(drawn)
         side = {TieRule.UPPER: -1.0, TieRule.LOWER: 1.0}.get(tie, 0.0) if tie is not None else 0.0
         choices = drawn.copy()
@@ -214,7 +246,9 @@ class Planner:
         return plans
 
     def _starts(self, count: int) -> Floats:
-        """Return starts in B x D; in a quarter of them, some coordinates are at an end of their interval."""
+        """Return starts in B x D; in a quarter of them, some coordinates are at an end of their
+        interval.
+        """
         share = self._random.random((count, len(self._lower)))
         at_end = (self._random.random(share.shape) < 0.5) & (self._random.random((count, 1)) < 0.5)
         return self._lower + (self._upper - self._lower) * np.where(at_end, np.round(share), share)
@@ -224,12 +258,17 @@ class Planner:
 
     def _blocks(self, count: int) -> Floats:
         one = (count, self._axes, 1)
-        switches = self._random.random((*one[:2], self._steps)) < 10.0 ** self._random.uniform(-2.5, -0.5, one)
-        return np.asarray(self._random.choice([-1.0, 1.0], one) * (-1.0) ** np.cumsum(switches, axis=2))
+        switches = self._random.random((*one[:2], self._steps)) < 10.0 ** self._random.uniform(
+            -2.5, -0.5, one
+        )
+        return np.asarray(
+            self._random.choice([-1.0, 1.0], one) * (-1.0) ** np.cumsum(switches, axis=2)
+        )
 
     def _last_step(self, plans: Plans, i: int) -> int:
         """Return the last step before the closest approach of a start, plus one."""
-        x, vx = float(plans.start[i, self._axes]), float(plans.start[i, -1])
+        x = float(plans.start[i, self._axes])
+        vx = float(plans.start[i, -1])
         return min(self._steps - 1, int(x / (-vx * self._model.step_s)) + 1)
 
     def _step(self, plans: Plans, i: int) -> int:
@@ -246,7 +285,11 @@ class Planner:
 
     def _some_axes(self) -> slice:
         """Return one lateral axis or both."""
-        return slice(0, 1) if self._axes == 1 else slice(*((0, 1), (1, 2), (0, 2))[int(self._random.integers(3))])
+        return (
+            slice(0, 1)
+            if self._axes == 1
+            else slice(*((0, 1), (1, 2), (0, 2))[int(self._random.integers(3))])
+        )
 
     def _flip(self, plans: Plans, i: int) -> None:
         """Change the sign of the errors of the angles in a block."""
@@ -257,7 +300,8 @@ class Planner:
         errors = plans.errors[i, ANGLE, self._some_axes()]
         switches = np.flatnonzero(np.diff(np.sign(errors[0, : self._last_step(plans, i) + 1])))
         if switches.size:
-            at, by = int(self._random.choice(switches)), int(self._random.integers(1, 5))
+            at = int(self._random.choice(switches))
+            by = int(self._random.integers(1, 5))
             if self._random.random() < 0.5:
                 errors[:, at + 1 : at + 1 + by] *= -1.0
             else:
@@ -266,25 +310,33 @@ class Planner:
     def _give_block(self, plans: Plans, i: int) -> None:
         """Set the errors of a block."""
         values = [-1.0, 0.0, 1.0, self._random.uniform(-1.0, 1.0)]
-        plans.errors[i, ..., self._span(plans, i)] = self._random.choice(values, (len(self.sensors), self._axes, 1))
+        plans.errors[i, ..., self._span(plans, i)] = self._random.choice(
+            values, (len(self.sensors), self._axes, 1)
+        )
 
     def _move_error(self, plans: Plans, i: int) -> None:
         """Change the size of the errors of a block."""
         errors = plans.errors[i, ..., self._span(plans, i)]
-        by = self._random.normal(0.0, 10.0 ** self._random.uniform(-2.0, 0.0), (len(self.sensors), self._axes, 1))
+        by = self._random.normal(
+            0.0, 10.0 ** self._random.uniform(-2.0, 0.0), (len(self.sensors), self._axes, 1)
+        )
         errors[:] = np.clip(errors + by, -1.0, 1.0)
 
     def _move_start(self, plans: Plans, i: int) -> None:
         """Move the start in some coordinates or in all, or set some coordinates to an end."""
         width = self._upper - self._lower
         which = self._random.random(len(width)) < self._random.choice([0.25, 1.0])
-        moved = plans.start[i] + width * 10.0 ** self._random.uniform(-5.0, -0.5) * self._random.normal(size=len(width))
+        moved = plans.start[i] + width * 10.0 ** self._random.uniform(
+            -5.0, -0.5
+        ) * self._random.normal(size=len(width))
         if self._random.random() < 0.1:
             moved = np.where(self._random.random(len(width)) < 0.5, self._lower, self._upper)
         plans.start[i] = np.clip(np.where(which, moved, plans.start[i]), self._lower, self._upper)
 
     def _turn_target(self, plans: Plans, i: int) -> None:
-        """Give the target's acceleration another sign in a block, or from a step on, along one axis or both."""
+        """Give the target's acceleration another sign in a block, or from a step on, along one axis
+        or both.
+        """
         span = self._span(plans, i)
         span = slice(span.start, span.stop if self._random.random() < 0.5 else None)
         plans.sides[i, self._some_axes(), span] = self._random.choice([-1.0, 1.0])

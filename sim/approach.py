@@ -1,7 +1,8 @@
 """The approach of a spacecraft to an object from the states of both, in the axes of its B-plane.
 
-A pair of states is an array of shape (4, 3): position and velocity of the spacecraft from the attracting body, and of
-the object from the spacecraft. Without an attracting body its parameter K is zero, and both move on straight lines.
+A pair of states is an array of shape (4, 3): position and velocity of the spacecraft from the
+attracting body, and of the object from the spacecraft. Without an attracting body its parameter K
+is zero, and both move on straight lines.
 """
 
 from __future__ import annotations
@@ -23,20 +24,25 @@ TOLERANCE = 1e-12
 UNIT = np.eye(3)
 """Unit matrix of space."""
 SEARCH = 3.0
-"""The closest approach is searched for up to this multiple of the time that straight lines take to it."""
+"""The closest approach is searched for up to this multiple of the time that straight lines take to
+it.
+"""
 WIDEST = 0.1
 """Maximum miss of an approach in units of its range at the start."""
 SPEEDS = (0.05, 20.0)
-"""Speeds around the attracting body in units of that of a circular orbit; others are mistakes of units."""
+"""Speeds around the attracting body in units of that of a circular orbit; others are mistakes of
+units.
+"""
 
 
 @dataclass(frozen=True)
 class Approach:
-    """An approach without impulses, with (y, z, x) along (T, R, S) of the B-plane across the velocity at its start.
+    """An approach without impulses, with (y, z, x) along (T, R, S) of the B-plane across the
+    velocity at its start.
 
-    It starts `start_s` after the epoch of the states, with the relative state (y, z, x) and (V_y, V_z, V_x), its
-    covariance and the attracting body, and lasts `flight_s` until the closest approach at (B.T, B.R). Until then the
-    closing speed and the direction of approach change.
+    It starts `start_s` after the epoch of the states, with the relative state (y, z, x) and (V_y,
+    V_z, V_x), its covariance and the attracting body, and lasts `flight_s` until the closest
+    approach at (B.T, B.R). Until then the closing speed and the direction of approach change.
     """
 
     start_s: float
@@ -54,39 +60,48 @@ class Approach:
             (_rounded(x - sigmas * s), _rounded(x + sigmas * s))
             for x, s in zip(self.state, self.covariance.sigma, strict=True)
         )
-        return StateBox(**dict(zip(("y_m", "z_m", "x_m", "vy_m_s", "vz_m_s", "vx_m_s"), ends, strict=True)))
+        return StateBox(
+            **dict(zip(("y_m", "z_m", "x_m", "vy_m_s", "vz_m_s", "vx_m_s"), ends, strict=True))
+        )
 
 
 def find_approach(
     states: Floats, parameter_m3_s2: float, covariance: Floats, pole: Floats, flight_s: float | None
 ) -> Approach:
-    """Return the approach of a pair of states at an epoch, with the covariance of the relative state, shape (6, 6).
+    """Return the approach of a pair of states at an epoch, with the covariance of the relative
+    state, shape (6, 6).
 
-    `pole` is the normal of the reference plane of the B-plane. The approach starts `flight_s` before the closest one;
-    None is the epoch. A ValueError is raised if there is none, or it does not fit a scenario.
+    `pole` is the normal of the reference plane of the B-plane. The approach starts `flight_s`
+    before the closest one; None is the epoch. A ValueError is raised if there is none, or it does
+    not fit a scenario.
     """
-    speed, distance_m = np.linalg.norm(states[1]), np.linalg.norm(states[0])
+    speed = np.linalg.norm(states[1])
+    distance_m = np.linalg.norm(states[0])
     if parameter_m3_s2:
         ratio = float(speed * math.sqrt(distance_m / parameter_m3_s2))
         if not SPEEDS[0] <= ratio <= SPEEDS[1]:
             raise ValueError(
-                f"spacecraft: its speed is {ratio:.3g} times that of a circular orbit at its distance of "
-                f"{distance_m / 1e3:.6g} km: check the units of positions, velocities and the gravitational parameter"
+                f"spacecraft: its speed is {ratio:.3g} times that of a circular orbit at its "
+                f"distance of {distance_m / 1e3:.6g} km: check the units of positions, velocities "
+                "and the gravitational parameter"
             )
     arrival_s = closest_approach_s(states, parameter_m3_s2)
     start_s = 0.0 if flight_s is None else arrival_s - flight_s
     if arrival_s <= start_s:
         raise ValueError(
-            f"the closest approach is {-arrival_s / 86400.0:.6g} d before the epoch: give earlier states, or flight_s"
+            f"the closest approach is {-arrival_s / 86400.0:.6g} d before the epoch: give earlier "
+            "states, or flight_s"
         )
     start, transition = propagate(states, parameter_m3_s2, start_s)
     end, _ = propagate(start, parameter_m3_s2, arrival_s - start_s)
     axes = approach_axes(start[3], pole)
-    place, miss_m = axes @ start[2], float(np.linalg.norm(end[2]))
+    place = axes @ start[2]
+    miss_m = float(np.linalg.norm(end[2]))
     if miss_m > WIDEST * place[2]:
         raise ValueError(
-            f"the states do not meet: the closest approach is {miss_m / 1e3:.6g} km, {arrival_s / 86400.0:.6g} d after "
-            f"the epoch, from {place[2] / 1e3:.6g} km at the start; check the units, the epoch and the reference frame"
+            f"the states do not meet: the closest approach is {miss_m / 1e3:.6g} km, "
+            f"{arrival_s / 86400.0:.6g} d after the epoch, from {place[2] / 1e3:.6g} km at the "
+            "start; check the units, the epoch and the reference frame"
         )
     change = np.kron(np.eye(2), axes) @ transition
     speeds = np.linalg.norm([start[3], end[3]], axis=1)
@@ -103,15 +118,17 @@ def find_approach(
 
 
 def approach_axes(velocity: Floats, pole: Floats) -> Floats:
-    """Return the axes (T, R, S) of a B-plane as rows, from the velocity of the object relative to the spacecraft.
+    """Return the axes (T, R, S) of a B-plane as rows, from the velocity of the object relative to
+    the spacecraft.
 
-    S is opposite to this velocity, T = S x N / |S x N| with the normal N of the reference plane, the `pole`, and
-    R = S x T: T is the line in which the two planes meet. A ValueError is raised if the approach is along the pole.
+    S is opposite to this velocity, T = S x N / |S x N| with the normal N of the reference plane,
+    the `pole`, and R = S x T: T is the line in which the two planes meet. A ValueError is raised if
+    the approach is along the pole.
 
     References
     ----------
-    Kizner (1961), A method of describing miss distances for lunar and interplanetary trajectories, Planetary and Space
-    Science 7.
+    Kizner (1961), A method of describing miss distances for lunar and interplanetary trajectories,
+    Planetary and Space Science 7.
     """
     along = -velocity / np.linalg.norm(velocity)
     across = np.cross(along, pole)
@@ -124,7 +141,8 @@ def approach_axes(velocity: Floats, pole: Floats) -> Floats:
 def closest_approach_s(states: Floats, parameter_m3_s2: float) -> float:
     """Return the time of the closest approach of a pair, s; it is negative if the two recede now.
 
-    A ValueError is raised if there is none within `SEARCH` times the time that straight lines take to theirs.
+    A ValueError is raised if there is none within `SEARCH` times the time that straight lines take
+    to theirs.
     """
     relative, velocity = states[2:]
     if not velocity.any():
@@ -135,36 +153,55 @@ def closest_approach_s(states: Floats, parameter_m3_s2: float) -> float:
         return float(state[6:9] @ state[9:12])
 
     radial.terminal, radial.direction = True, np.sign(horizon_s)  # type: ignore[attr-defined]  # from falling to rising
-    times_s = _integrate(states, parameter_m3_s2, horizon_s, radial).t_events[0] if horizon_s else np.zeros(1)
+    times_s = (
+        _integrate(states, parameter_m3_s2, horizon_s, radial).t_events[0]
+        if horizon_s
+        else np.zeros(1)
+    )
     if not len(times_s):
-        raise ValueError(f"the states have no closest approach within {abs(horizon_s) / 86400.0:.4g} d of their epoch")
+        raise ValueError(
+            f"the states have no closest approach within {abs(horizon_s) / 86400.0:.4g} d of their "
+            "epoch"
+        )
     (_, _, relative, velocity), _ = propagate(states, parameter_m3_s2, times_s[0])
-    return float(times_s[0] - relative @ velocity / (velocity @ velocity))  # the event has the error of interpolation
+    return float(
+        times_s[0] - relative @ velocity / (velocity @ velocity)
+    )  # the event has the error of interpolation
 
 
 def propagate(states: Floats, parameter_m3_s2: float, duration_s: float) -> tuple[Floats, Floats]:
-    """Return the pair of states after a time, and the transition matrix of the relative state, shape (6, 6).
+    """Return the pair of states after a time, and the transition matrix of the relative state,
+    shape (6, 6).
 
-    The matrix is that of small changes of the object's orbit. A ValueError is raised if the integration fails.
+    The matrix is that of small changes of the object's orbit. A ValueError is raised if the
+    integration fails.
     """
     end = _integrate(states, parameter_m3_s2, duration_s).y[:, -1]
     return end[:12].reshape(4, 3), end[12:].reshape(6, 6)
 
 
 def pair_rates(state: Floats, parameter_m3_s2: float) -> Floats:
-    """Return the derivative of a pair of states and the transition matrix of the relative state, shape (48,).
+    """Return the derivative of a pair of states and the transition matrix of the relative state,
+    shape (48,).
 
-    The difference of gravity has no cancellation: with q = r . (r + 2 R) / R^2, the ratio of the cubes of both
-    distances is (1 + q)^(3/2) (Battin's form of Encke's method).
+    The difference of gravity has no cancellation: with q = r . (r + 2 R) / R^2, the ratio of the
+    cubes of both distances is (1 + q)^(3/2) (Battin's form of Encke's method).
     """
     own, own_velocity, relative, velocity = state[:12].reshape(4, 3)
     transition = state[12:].reshape(6, 6)
-    own_pull, pull, gradient = np.zeros(3), np.zeros(3), np.zeros((3, 3))
+    own_pull = np.zeros(3)
+    pull = np.zeros(3)
+    gradient = np.zeros((3, 3))
     if parameter_m3_s2:
-        body, squared = own + relative, own @ own
-        scale, ratio = -parameter_m3_s2 / squared**1.5, np.log1p(relative @ (own + body) / squared)
-        own_pull, pull = scale * own, scale * (relative + np.expm1(-1.5 * ratio) * body)
-        gradient = scale * np.exp(-1.5 * ratio) * (UNIT - 3.0 * (body[:, None] * body) / (body @ body))
+        body = own + relative
+        squared = own @ own
+        scale = -parameter_m3_s2 / squared**1.5
+        ratio = np.log1p(relative @ (own + body) / squared)
+        own_pull = scale * own
+        pull = scale * (relative + np.expm1(-1.5 * ratio) * body)
+        gradient = (
+            scale * np.exp(-1.5 * ratio) * (UNIT - 3.0 * (body[:, None] * body) / (body @ body))
+        )
     changes = transition[3:].ravel(), (gradient @ transition[:3]).ravel()
     return np.concatenate([own_velocity, own_pull, velocity, pull, *changes])
 
@@ -173,19 +210,24 @@ def _integrate(states: Floats, parameter_m3_s2: float, duration_s: float, event:
     """Integrate a pair of states with the transition matrix of the relative state."""
     from scipy.integrate import solve_ivp  # takes long to load
 
-    # Each vector has the error of its modulus; the transition matrix that of a change of the relative position.
+    # Each vector has the error of its modulus; the transition matrix that of a change of the
+    # relative position.
     sizes = np.linalg.norm(states, axis=1)
     scale = np.concatenate([np.repeat(np.where(sizes > 0.0, sizes, 1.0), 3), np.ones(36)])
     start = np.concatenate([states.ravel(), np.eye(6).ravel()])
     options = {"method": "DOP853", "rtol": TOLERANCE, "atol": TOLERANCE * scale, "events": event}
-    result = solve_ivp(lambda _, state: pair_rates(state, parameter_m3_s2), (0.0, duration_s), start, **options)
+    result = solve_ivp(
+        lambda _, state: pair_rates(state, parameter_m3_s2), (0.0, duration_s), start, **options
+    )
     if not result.success or not np.isfinite(result.y[:, -1]).all():
         raise ValueError("the motion cannot be integrated: it comes too near the attracting body")
     return result
 
 
 def _sun(place_m: Floats, velocity_m_s: Floats, parameter_m3_s2: float) -> Sun:
-    """Return the attracting body, from the position and velocity (y, z, x) of the spacecraft from it."""
+    """Return the attracting body, from the position and velocity (y, z, x) of the spacecraft from
+    it.
+    """
     y, z, x = -place_m
     return Sun(
         gravitational_parameter_m3_s2=parameter_m3_s2,

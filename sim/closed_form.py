@@ -1,4 +1,6 @@
-"""Misses that images of a camera leave possible: closed forms for a known range and closing speed."""
+"""Misses that images of a camera leave possible: closed forms for a known range and closing
+speed.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,8 @@ def possible_miss_m(
     disturbance_m_s2: float = 0.0,
     constant_bias: bool = False,
 ) -> FloatOrFloats:
-    """Return half the maximum width of the interval of misses along one axis that images leave possible, m.
+    """Return half the maximum width of the interval of misses along one axis that images leave
+    possible, m.
 
     It is also the maximum miss after an impulse that centres this interval exactly.
 
@@ -36,12 +39,13 @@ def possible_miss_m(
     closing_speed_m_s, pixel_error_rad, centroid_error_m : float
         e, p and c: at the distance d the error bound of an image is p + c / d.
     first_image_s, last_image_s : float
-        t_f and t_c, times before the arrival of the first image and of the last one before the last impulse, s.
+        t_f and t_c, times before the arrival of the first image and of the last one before the last
+        impulse, s.
     disturbance_m_s2 : float
         Bound nu of the acceleration of the target along the axis, m/s^2.
     constant_bias : bool
-        Whether the centroid error is one constant of the flight. Then the result is that of a set that knows this,
-        which the information set does not know.
+        Whether the centroid error is one constant of the flight. Then the result is that of a set
+        that knows this, which the information set does not know.
 
     Raises
     ------
@@ -55,11 +59,15 @@ def possible_miss_m(
         2 p e t_c + c + 2 t_c sqrt(nu b0) + nu t_c^2 / 2   if 2 sqrt(b0 / nu) <= t_f - t_c,
         b0 + (2 b0 / u + p e + nu u / 2) t_c + nu t_c^2 / 2   with u = t_f - t_c otherwise.
 
-    A constant centroid error is the same difference c at all images: b0 is then p e t_c, and c is added to the miss.
+    A constant centroid error is the same difference c at all images: b0 is then p e t_c, and c is
+    added to the miss.
     """
     arc_s = first_image_s - last_image_s
     if np.any(arc_s <= 0.0):
-        raise ValueError(f"the first image, {first_image_s:g} s before the arrival, must be before the last image")
+        raise ValueError(
+            f"the first image, {first_image_s:g} s before the arrival, must be before the last "
+            "image"
+        )
     of_pixel_m_s = pixel_error_rad * closing_speed_m_s
     bound_m = of_pixel_m_s * last_image_s + (0.0 if constant_bias else centroid_error_m)
     slope_m_s: Any = 2.0 * of_pixel_m_s + np.where(
@@ -68,27 +76,33 @@ def possible_miss_m(
         4.0 * bound_m / arc_s + disturbance_m_s2 * arc_s,
     )
     constant_m = centroid_error_m if constant_bias else 0.0
-    miss_m: FloatOrFloats = _at_arrival_m(constant_m + bound_m, slope_m_s, last_image_s, disturbance_m_s2)
+    miss_m: FloatOrFloats = _at_arrival_m(
+        constant_m + bound_m, slope_m_s, last_image_s, disturbance_m_s2
+    )
     return miss_m
 
 
 def _at_arrival_m(bound_m: Any, speed_m_s: Any, last_s: Any, disturbance_m_s2: float) -> Any:
-    """Return M of equation (22), m, from b0 and s at the last image, `last_s` before the arrival."""
+    """Return M of equation (22), m, from b0 and s at the last image, `last_s` before the
+    arrival.
+    """
     return bound_m + 0.5 * last_s * (speed_m_s + disturbance_m_s2 * last_s)
 
 
 @dataclass(frozen=True)
 class PossibleMiss:
-    """Half the maximum width of the interval of misses that is left at the last decision, m, by what is known.
+    """Half the maximum width of the interval of misses that is left at the last decision, m, by
+    what is known.
 
-    Both are for errors of images at their bounds, no lost image, and a known range and closing speed; in space they are
-    those of both axes at once.
+    Both are for errors of images at their bounds, no lost image, and a known range and closing
+    speed; in space they are those of both axes at once.
 
     Parameters
     ----------
     images_m : float or None
-        By the images alone, as if they were taken at all times from the first to the last one: the closed form of
-        `possible_miss_of`. None if the sensor of angles is not a camera or loses images.
+        By the images alone, as if they were taken at all times from the first to the last one: the
+        closed form of `possible_miss_of`. None if the sensor of angles is not a camera or loses
+        images.
     images_and_speeds_m : float
         By the images at their own times and the speeds across that the initial set allows.
     """
@@ -98,7 +112,9 @@ class PossibleMiss:
 
 
 def possible_miss(scenario: Scenario) -> PossibleMiss | None:
-    """Return the misses that are possible at the last decision; None with fewer than two images before it."""
+    """Return the misses that are possible at the last decision; None with fewer than two images
+    before it.
+    """
     before_s = np.array(image_times_s(scenario))
     if before_s.size < 2:
         return None
@@ -109,8 +125,11 @@ def possible_miss(scenario: Scenario) -> PossibleMiss | None:
 
 
 def _images_and_speeds_m(scenario: Scenario, before_s: Floats) -> float:
-    """Return the distance of the two motions of `worst_shift_m` at the arrival, m, in space that of both axes."""
-    model, misses_m = scenario.set_model, []
+    """Return the distance of the two motions of `worst_shift_m` at the arrival, m, in space that of
+    both axes.
+    """
+    model = scenario.set_model
+    misses_m = []
     for axis in map(model.axis, model.axes):
         bound_m, speed_m_s = _worst_difference(axis, before_s, scenario.nominal_arrival_s)
         misses_m.append(_at_arrival_m(bound_m, speed_m_s, before_s[-1], axis.disturbance_m_s2))
@@ -118,17 +137,20 @@ def _images_and_speeds_m(scenario: Scenario, before_s: Floats) -> float:
 
 
 def worst_shift_m(scenario: Scenario) -> Floats | None:
-    """Return how far game noise shifts the measured position across x in each step, m, shape (C, steps).
+    """Return how far game noise shifts the measured position across x in each step, m, shape (C,
+    steps).
 
-    None without a cut-off or times of impulses, or with fewer than two images before the last decision.
+    None without a cut-off or times of impulses, or with fewer than two images before the last
+    decision.
 
-    Two motions with the same images differ by at most 2 b along an axis at each image, with the error bound b, m. Let
-    this difference be 2 b0 at the last image before the last decision, and 2 b0 - s u + nu u^2 at the time u before it:
-    the disturbance nu accelerates the motions apart. It is at least -2 b at all images if s is at most
-    (2 b0 + 2 b)/u + nu u, and its speed is possible at t = 0 if s is at most 2 w + 2 nu t, with the half-width w of the
-    speeds of the initial set and the time t of the last image. With the maximum s the misses differ most; before its
-    minimum value, at u = s/(2 nu), the difference is constant. If one of the motions is the true one, images in the
-    middle of both are shifted by half the difference.
+    Two motions with the same images differ by at most 2 b along an axis at each image, with the
+    error bound b, m. Let this difference be 2 b0 at the last image before the last decision, and 2
+    b0 - s u + nu u^2 at the time u before it: the disturbance nu accelerates the motions apart. It
+    is at least -2 b at all images if s is at most (2 b0 + 2 b)/u + nu u, and its speed is possible
+    at t = 0 if s is at most 2 w + 2 nu t, with the half-width w of the speeds of the initial set
+    and the time t of the last image. With the maximum s the misses differ most; before its minimum
+    value, at u = s/(2 nu), the difference is constant. If one of the motions is the true one,
+    images in the middle of both are shifted by half the difference.
     """
     model = scenario.set_model
     if scenario.impulse_steps is None:
@@ -136,15 +158,23 @@ def worst_shift_m(scenario: Scenario) -> Floats | None:
     before_s = np.array(image_times_s(scenario))
     if before_s.size < 2:
         return None
-    shifts_m = [_worst_shift_along_m(model.axis(name), before_s, scenario.nominal_arrival_s) for name in model.axes]
+    shifts_m = [
+        _worst_shift_along_m(model.axis(name), before_s, scenario.nominal_arrival_s)
+        for name in model.axes
+    ]
     return np.stack(shifts_m)
 
 
 def _worst_difference(model: SetModel, before_s: Floats, arrival_s: float) -> tuple[float, float]:
     """Return b0, m, and the maximum s, m/s, of `worst_shift_m` in the planar model of one axis."""
     range_m = before_s * model.closing_speed_m_s
-    bound_m, last_s = model.angle_sensor.error_bound(range_m) * range_m, before_s[-1]
-    earlier_s, disturbance, (minimum, maximum) = before_s[:-1] - last_s, model.disturbance_m_s2, model.bounds.vz_m_s
+    bound_m = model.angle_sensor.error_bound(range_m) * range_m
+    last_s = before_s[-1]
+    earlier_s, disturbance, (minimum, maximum) = (
+        before_s[:-1] - last_s,
+        model.disturbance_m_s2,
+        model.bounds.vz_m_s,
+    )
     speed_m_s = min(
         np.min(2.0 * (bound_m[-1] + bound_m[:-1]) / earlier_s + disturbance * earlier_s),
         maximum - minimum + 2.0 * disturbance * (arrival_s - last_s),
@@ -153,37 +183,57 @@ def _worst_difference(model: SetModel, before_s: Floats, arrival_s: float) -> tu
 
 
 def _worst_shift_along_m(model: SetModel, before_s: Floats, arrival_s: float) -> Floats:
-    """Return `worst_shift_m` in the planar model of one axis, for images at these times before the arrival, s."""
+    """Return `worst_shift_m` in the planar model of one axis, for images at these times before the
+    arrival, s.
+    """
     bound_m, speed_m_s = _worst_difference(model, before_s, arrival_s)
-    disturbance, last_s = model.disturbance_m_s2, before_s[-1]
-    times_s = arrival_s - last_s - model.step_s * np.arange(math.ceil((arrival_s - last_s) / model.step_s) + 1)
+    disturbance = model.disturbance_m_s2
+    last_s = before_s[-1]
+    times_s = (
+        arrival_s
+        - last_s
+        - model.step_s * np.arange(math.ceil((arrival_s - last_s) / model.step_s) + 1)
+    )
     times_s = np.clip(times_s, 0.0, 0.5 * speed_m_s / disturbance if disturbance else None)
-    return np.asarray(bound_m - 0.5 * speed_m_s * times_s + 0.5 * disturbance * times_s**2, dtype=np.float64)
+    return np.asarray(
+        bound_m - 0.5 * speed_m_s * times_s + 0.5 * disturbance * times_s**2, dtype=np.float64
+    )
 
 
 def possible_miss_of(scenario: Scenario, *, constant_bias: bool = False) -> float:
-    """Return `possible_miss_m` of the camera and the last impulse of a scenario, m: in space that of both axes at once.
+    """Return `possible_miss_m` of the camera and the last impulse of a scenario, m: in space that
+    of both axes at once.
 
-    It contains what the images show, and nothing about the start: the set on board knows more if the speeds across are
-    known well from the start (`PossibleMiss.images_and_speeds_m`, which ``infoset scenarios check`` prints too).
+    It contains what the images show, and nothing about the start: the set on board knows more if
+    the speeds across are known well from the start (`PossibleMiss.images_and_speeds_m`, which
+    ``infoset scenarios check`` prints too).
 
-    The disturbance is `set_model.disturbance_m_s2` of each axis, and `constant_bias` that of `possible_miss_m`.
+    The disturbance is `set_model.disturbance_m_s2` of each axis, and `constant_bias` that of
+    `possible_miss_m`.
 
     Raises
     ------
     ValueError
-        If the angle sensor is not a camera, images can be lost, or there are fewer than two images before the last
-        impulse.
+        If the angle sensor is not a camera, images can be lost, or there are fewer than two images
+        before the last impulse.
     """
     model = scenario.set_model
     camera = model.angle_sensor
     if not isinstance(camera, Camera):
-        raise ValueError("the closed form is that of a camera: the scenario must have the table camera")
+        raise ValueError(
+            "the closed form is that of a camera: the scenario must have the table camera"
+        )
     if camera.miss_probability > 0.0:
-        raise ValueError("the closed form is that of a camera that loses no image: set camera.miss_probability = 0")
+        raise ValueError(
+            "the closed form is that of a camera that loses no image: set camera.miss_probability "
+            "= 0"
+        )
     before_s = image_times_s(scenario)
     if len(before_s) < 2:
-        raise ValueError("a bound of the miss needs two images before the last impulse: take more images, or earlier")
+        raise ValueError(
+            "a bound of the miss needs two images before the last impulse: take more images, or "
+            "earlier"
+        )
     along = (
         possible_miss_m(
             model.closing_speed_m_s,

@@ -1,4 +1,6 @@
-"""Columns of results: each is declared once, at its field, and every file format reads the declaration."""
+"""Columns of results: each is declared once, at its field, and every file format reads the
+declaration.
+"""
 
 from __future__ import annotations
 
@@ -41,8 +43,9 @@ class Column:
     optional : bool
         Whether CSV and JSON leave the column out if it is unknown in all runs.
     field, component, derived : str, int or None, bool
-        Set by `columns_of`: name of the field, index from the end along the second axis of a field of shape (B, n),
-        None for a field of shape (B,), and whether the field is computed from others (``init=False``).
+        Set by `columns_of`: name of the field, index from the end along the second axis of a field
+        of shape (B, n), None for a field of shape (B,), and whether the field is computed from
+        others (``init=False``).
     """
 
     name: str
@@ -87,14 +90,18 @@ def columns_with_values(owner: Any) -> tuple[Column, ...]:
 
 
 def values_of(owner: object, column: Column) -> list[Any]:
-    """Return one column as plain Python values, one per run: texts for an enumeration, None if unknown."""
+    """Return one column as plain Python values, one per run: texts for an enumeration, None if
+    unknown.
+    """
     values: Any = getattr(owner, column.field)
     if values is None:
         return [None] * len(cast("Any", owner))
     if isinstance(values, tuple):
         return [None if value is None else value.value for value in values]
     if column.component is not None:
-        if -column.component > values.shape[1]:  # in a plane nothing is along y, and there is no B-plane
+        if (
+            -column.component > values.shape[1]
+        ):  # in a plane nothing is along y, and there is no B-plane
             return [None] * len(values)
         values = values[:, column.component]
     plain: list[Any] = values.tolist()
@@ -104,14 +111,16 @@ def values_of(owner: object, column: Column) -> list[Any]:
 def fields_of(owner: Any, table: Mapping[str, Sequence[Cell]]) -> dict[str, Any]:
     """Return the arguments of a dataclass from its columns by name: the inverse of `values_of`.
 
-    Optional columns may be missing. `ValueError` if another column is missing or unknown, if the columns differ in
-    length, or if a value is not of the column's kind.
+    Optional columns may be missing. `ValueError` if another column is missing or unknown, if the
+    columns differ in length, or if a value is not of the column's kind.
     """
     declared = {column.name: column for column in columns_of(owner)}
     unknown = [name for name in table if name not in declared]
     if unknown:
         raise ValueError(f"column {unknown[0]!r} is not known")
-    missing = [name for name, column in declared.items() if name not in table and not column.optional]
+    missing = [
+        name for name, column in declared.items() if name not in table and not column.optional
+    ]
     if missing:
         raise ValueError(f"column {missing[0]!r} is missing")
     if not all(isinstance(cells, list) for cells in table.values()):
@@ -137,7 +146,9 @@ def fields_of(owner: Any, table: Mapping[str, Sequence[Cell]]) -> dict[str, Any]
 
 
 def _array_of(column: Column, cells: Sequence[Cell]) -> Any:
-    """Return the values of a column: a tuple of members of an enumeration, or an array, masked if it is nullable."""
+    """Return the values of a column: a tuple of members of an enumeration, or an array, masked if
+    it is nullable.
+    """
     is_known = np.array([cell is not None for cell in cells], dtype=bool)
     if not column.nullable and not is_known.all():
         raise ValueError(f"column {column.name!r} has an unknown value")
@@ -148,10 +159,14 @@ def _array_of(column: Column, cells: Sequence[Cell]) -> Any:
     for cell in cells:
         is_flag_as_number = isinstance(cell, bool) and column.kind is not bool
         if cell is not None and (is_flag_as_number or not isinstance(cell, accepted)):
-            raise ValueError(f"column {column.name!r} has a value that is no {column.kind.__name__}")
+            raise ValueError(
+                f"column {column.name!r} has a value that is no {column.kind.__name__}"
+            )
         if isinstance(cell, int | float) and not abs(cell) <= MAXIMUM:
             raise ValueError(f"column {column.name!r} has a number beyond {MAXIMUM:g}")
-    values: NDArray[Any] = np.array([0 if cell is None else cell for cell in cells], dtype=column.kind)
+    values: NDArray[Any] = np.array(
+        [0 if cell is None else cell for cell in cells], dtype=column.kind
+    )
     return np.ma.MaskedArray(values, mask=~is_known) if column.nullable else values
 
 
@@ -169,19 +184,30 @@ def csv_text(names: Sequence[str], rows: Sequence[Sequence[Cell]]) -> str:
 
 
 def documented(owner: type[_Owner]) -> type[_Owner]:
-    """Complete the docstring of a dataclass, which ends with its parameters, by the fields that declare columns."""
+    """Complete the docstring of a dataclass, which ends with its parameters, by the fields that
+    declare columns.
+    """
     parameters: list[str] = []
     attributes = ["", "Attributes", "----------"]
     for field in fields(cast("Any", owner)):
         declared: tuple[Column, ...] = field.metadata.get("columns", ())
         if declared:
             last = declared[-1]
-            array = "tuple" if issubclass(last.kind, Enum) else "masked array" if last.nullable else "ndarray"
+            array = (
+                "tuple"
+                if issubclass(last.kind, Enum)
+                else "masked array"
+                if last.nullable
+                else "ndarray"
+            )
             fewest = sum(not column.optional for column in declared)
             shape = "(B,)" if len(declared) == 1 else f"(B, {fewest} or {len(declared)})"
             meaning = "; ".join(column.meaning for column in declared)
             unit = f" Unit: {last.unit}." if last.unit else ""
             lines = parameters if field.init else attributes
-            lines += [f"{field.name} : {array} of {last.kind.__name__}, shape {shape}", f"    {meaning}.{unit}"]
+            lines += [
+                f"{field.name} : {array} of {last.kind.__name__}, shape {shape}",
+                f"    {meaning}.{unit}",
+            ]
     owner.__doc__ = "\n".join([inspect.getdoc(owner) or "", *parameters, *attributes])
     return owner

@@ -22,7 +22,8 @@ SAMPLE = 2000
 
 @dataclass(frozen=True)
 class Covariance:
-    """Covariance of a relative state, positions before velocities: a matrix, or standard deviations and correlations.
+    """Covariance of a relative state, positions before velocities: a matrix, or standard deviations
+    and correlations.
 
     Parameters
     ----------
@@ -31,7 +32,8 @@ class Covariance:
     correlations : tuple of rows
         Correlations of all components: the whole matrix, or its lower triangle. Without rows: zero.
     matrix_m2 : tuple of rows
-        The covariance in place of the three others, in m^2, m^2/s and m^2/s^2: the whole matrix, or its lower triangle.
+        The covariance in place of the three others, in m^2, m^2/s and m^2/s^2: the whole matrix, or
+        its lower triangle.
 
     Raises
     ------
@@ -48,7 +50,9 @@ class Covariance:
         check_fields(self)
         deviations = len(self.position_sigma_m), len(self.velocity_sigma_m_s)
         if bool(self.matrix_m2) == any(deviations) or (self.matrix_m2 and self.correlations):
-            raise ValueError("Covariance: must have matrix_m2, or position_sigma_m and velocity_sigma_m_s")
+            raise ValueError(
+                "Covariance: must have matrix_m2, or position_sigma_m and velocity_sigma_m_s"
+            )
         if deviations[0] != deviations[1]:
             raise ValueError(
                 "Covariance: position_sigma_m and velocity_sigma_m_s must have as many values: got {} and {}".format(
@@ -56,21 +60,26 @@ class Covariance:
                 )
             )
         if len(self.correlation) != self.size:
-            raise ValueError(f"Covariance: correlations must have {self.size} rows: got {len(self.correlation)}")
+            raise ValueError(
+                f"Covariance: correlations must have {self.size} rows: got {len(self.correlation)}"
+            )
         if not np.allclose(self.correlation.diagonal(), 1.0, atol=ROUNDING, rtol=0.0):
-            raise ValueError("Covariance: the variances must not be negative, and correlations have the diagonal 1")
+            raise ValueError(
+                "Covariance: the variances must not be negative, and correlations have the "
+                "diagonal 1"
+            )
         row, column = np.unravel_index(np.abs(self.correlation).argmax(), self.correlation.shape)
         greatest = self.correlation[row, column]
         if abs(greatest) > 1.0 + ROUNDING:
             raise ValueError(
-                f"Covariance: the correlation of components {min(row, column) + 1} and {max(row, column) + 1} is "
-                f"{greatest:.3g}, and must be from -1 to 1"
+                f"Covariance: the correlation of components {min(row, column) + 1} and "
+                f"{max(row, column) + 1} is {greatest:.3g}, and must be from -1 to 1"
             )
         least = np.linalg.eigvalsh(self.correlation)[0]
         if least < -ROUNDING:
             raise ValueError(
-                f"Covariance: its correlations have a negative eigenvalue, {least:.3g}: check the signs, and that "
-                "positions stand before velocities"
+                f"Covariance: its correlations have a negative eigenvalue, {least:.3g}: check the "
+                "signs, and that positions stand before velocities"
             )
 
     @property
@@ -89,10 +98,16 @@ class Covariance:
     def correlation(self) -> Floats:
         """Correlations, shape (n, n); those of a component that is exactly known are zero."""
         if not self.matrix_m2:
-            return _symmetric("correlations", self.correlations) if self.correlations else np.eye(self.size)
+            return (
+                _symmetric("correlations", self.correlations)
+                if self.correlations
+                else np.eye(self.size)
+            )
         inverse = np.divide(1.0, self.sigma, out=np.zeros(self.size), where=self.sigma > 0.0)
         exact = np.diag(np.where(self.sigma > 0.0, 0.0, 1.0))
-        return np.asarray(_symmetric("matrix_m2", self.matrix_m2) * np.outer(inverse, inverse) + exact)
+        return np.asarray(
+            _symmetric("matrix_m2", self.matrix_m2) * np.outer(inverse, inverse) + exact
+        )
 
     @property
     def matrix(self) -> Floats:
@@ -101,7 +116,8 @@ class Covariance:
 
     @cached_property
     def root(self) -> Floats:
-        """The lower triangular matrix A with A A^T equal to the covariance, shape (n, n): Cholesky's method.
+        """The lower triangular matrix A with A A^T equal to the covariance, shape (n, n):
+        Cholesky's method.
 
         A component that follows from those before it has a column of zeros.
         """
@@ -113,26 +129,40 @@ class Covariance:
         return self.sigma[:, None] * lower
 
     def share_within(self, half: Floats) -> float:
-        """Return the share of normal values between `half` and its opposite, shape (n,), from a fixed sample."""
+        """Return the share of normal values between `half` and its opposite, shape (n,), from a
+        fixed sample.
+        """
         sample = np.random.default_rng(0).standard_normal((SAMPLE, self.size)) @ self.root.T
         return float((np.abs(sample) <= half).all(axis=1).mean())
 
 
 def covariance_of(matrix: Floats) -> Covariance:
-    """Return a covariance matrix as standard deviations and the lower triangle of the correlations, rounded."""
+    """Return a covariance matrix as standard deviations and the lower triangle of the correlations,
+    rounded.
+    """
     given = Covariance(matrix_m2=tuple(map(tuple, (0.5 * (matrix + matrix.T)).tolist())))
     rows = enumerate(np.round(given.correlation, DIGITS).tolist())
     sigma = given.sigma.tolist()
-    return Covariance(tuple(sigma[:3]), tuple(sigma[3:]), tuple(tuple(row[: index + 1]) for index, row in rows))
+    return Covariance(
+        tuple(sigma[:3]), tuple(sigma[3:]), tuple(tuple(row[: index + 1]) for index, row in rows)
+    )
 
 
 def _symmetric(name: str, rows: Rows) -> Floats:
     """Return a symmetric matrix from its rows, or from those of its lower triangle."""
-    size, lengths = len(rows), [len(row) for row in rows]
+    size = len(rows)
+    lengths = [len(row) for row in rows]
     if lengths not in ([size] * size, [*range(1, size + 1)]):
-        raise ValueError(f"Covariance: {name} must be a square matrix or its lower triangle: got rows of {lengths}")
-    matrix = np.array([[*row, *(rows[k][len(row) - 1] for k in range(len(row), size))] for row in rows])
+        raise ValueError(
+            f"Covariance: {name} must be a square matrix or its lower triangle: got rows of "
+            f"{lengths}"
+        )
+    matrix = np.array(
+        [[*row, *(rows[k][len(row) - 1] for k in range(len(row), size))] for row in rows]
+    )
     scale = np.sqrt(np.abs(matrix.diagonal()))
     if (np.abs(matrix - matrix.T) > ROUNDING * np.outer(scale, scale)).any():
-        raise ValueError(f"Covariance: {name} must be symmetric: correct it, or write its lower triangle only")
+        raise ValueError(
+            f"Covariance: {name} must be symmetric: correct it, or write its lower triangle only"
+        )
     return np.asarray(0.5 * (matrix + matrix.T))

@@ -17,7 +17,9 @@ from infoset.sim.scenario import Scenario, corners
 START, TIE, EXECUTION, TARGET, POINTING, BIAS, IMAGES = 0, 3, 5, 6, 7, 8, 9
 """Streams of a run; each kind of sensor has its own as well (`Sensor.stream`)."""
 Y = 16
-"""Difference between the streams of the y axis and those of the z axis, which are also those of a plane."""
+"""Difference between the streams of the y axis and those of the z axis, which are also those of a
+plane.
+"""
 
 
 @dataclass(frozen=True)
@@ -33,13 +35,16 @@ class Draws:
     tie : ndarray, shape (C, B, steps)
         Choices between ties, uniform in [-1, 1]; zeros if the scenario does not choose at random.
     execution, pointing : ndarray, shape (B, steps), or None
-        Errors of the impulses and of their directions in units of their bounds, uniform in [-1, 1]; None is zero.
+        Errors of the impulses and of their directions in units of their bounds, uniform in [-1, 1];
+        None is zero.
     target : ndarray, shape (C, B, steps), or None
         Changes of side of the target, uniform in [-1, 1]; None is zero.
     bias : ndarray, shape (C, B), or None
-        Constant errors of the centroid of a camera in units of their bound; None for a camera with random errors.
+        Constant errors of the centroid of a camera in units of their bound; None for a camera with
+        random errors.
     images : ndarray, shape (B, steps), or None
-        Uniform in [0, 1); an image is lost if its number is less than the probability of that. None loses no image.
+        Uniform in [0, 1); an image is lost if its number is less than the probability of that. None
+        loses no image.
     redraws : ndarray of int, shape (B,), or None
         Normal starts outside the dispersion that were drawn again; None for uniform starts.
     """
@@ -62,19 +67,25 @@ class Draws:
 
 
 def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
-    """Return the random numbers of some runs; run k has the same numbers in every call with the same seed."""
-    steps, axes = max_number_of_steps(scenario), scenario.set_model.axes
+    """Return the random numbers of some runs; run k has the same numbers in every call with the
+    same seed.
+    """
+    steps = max_number_of_steps(scenario)
+    axes = scenario.set_model.axes
     position_m, velocity_m_s, redraws = draw_starts(scenario, runs, seed)
 
     def uniform(stream: int, size: int = steps) -> Floats:
-        return np.stack([generator(seed, run, stream).uniform(-1.0, 1.0, size=size) for run in runs])
+        return np.stack(
+            [generator(seed, run, stream).uniform(-1.0, 1.0, size=size) for run in runs]
+        )
 
     def lateral(stream: int, size: int = steps) -> Floats:
         return np.stack([uniform(stream + Y * (axis == "y"), size) for axis in axes])
 
     nothing = np.broadcast_to(0.0, (len(axes), len(runs), steps))
     errors = {
-        name: (lateral if sensor.is_lateral else uniform)(sensor.stream) for name, sensor in scenario.sensors.items()
+        name: (lateral if sensor.is_lateral else uniform)(sensor.stream)
+        for name, sensor in scenario.sensors.items()
     }
     camera = scenario.set_model.angle_sensor
     bias = lateral(BIAS, 1)[..., 0] if camera.has_constant_bias else None
@@ -82,7 +93,9 @@ def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
         position_m,
         velocity_m_s,
         errors,
-        tie=lateral(TIE) if scenario.noise is NoiseKind.GAME and scenario.tie is TieRule.RANDOM else nothing,
+        tie=lateral(TIE)
+        if scenario.noise is NoiseKind.GAME and scenario.tie is TieRule.RANDOM
+        else nothing,
         execution=uniform(EXECUTION) if scenario.thruster.execution_error_relative > 0.0 else None,
         target=lateral(TARGET) if scenario.target is not None else None,
         pointing=uniform(POINTING) if scenario.thruster.pointing_error_rad > 0.0 else None,
@@ -96,7 +109,9 @@ def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
     )
 
 
-def draw_starts(scenario: Scenario, runs: Sequence[int], seed: int) -> tuple[Floats, Floats, Integers | None]:
+def draw_starts(
+    scenario: Scenario, runs: Sequence[int], seed: int
+) -> tuple[Floats, Floats, Integers | None]:
     """Return `position_m`, `velocity_m_s` and `redraws` of the `Draws` of some runs."""
     lower, upper = corners(scenario.dispersion)
     redraws = None
@@ -107,8 +122,12 @@ def draw_starts(scenario: Scenario, runs: Sequence[int], seed: int) -> tuple[Flo
             starts = np.insert(starts, [0, 2], along_y, axis=1)
         starts = lower + (upper - lower) * starts
     else:
-        of_run = [_normal_start(lower, upper, scenario.covariance, generator(seed, run, START)) for run in runs]
-        starts, redraws = np.stack([start for start, _ in of_run]), np.array([count for _, count in of_run])
+        of_run = [
+            _normal_start(lower, upper, scenario.covariance, generator(seed, run, START))
+            for run in runs
+        ]
+        starts = np.stack([start for start, _ in of_run])
+        redraws = np.array([count for _, count in of_run])
     position_m, velocity_m_s = np.split(starts, 2, axis=1)
     return position_m, velocity_m_s, redraws
 
@@ -116,10 +135,14 @@ def draw_starts(scenario: Scenario, runs: Sequence[int], seed: int) -> tuple[Flo
 def _normal_start(
     lower: Floats, upper: Floats, covariance: Covariance, random: np.random.Generator
 ) -> tuple[Floats, int]:
-    """Return a normal start around the middle of a box that is within it, and how many starts before it were not."""
+    """Return a normal start around the middle of a box that is within it, and how many starts
+    before it were not.
+    """
     redraws = 0
     while True:
-        start = 0.5 * (lower + upper) + (covariance.root * random.standard_normal(covariance.size)).sum(axis=1)
+        start = 0.5 * (lower + upper) + (
+            covariance.root * random.standard_normal(covariance.size)
+        ).sum(axis=1)
         if ((lower <= start) & (start <= upper)).all():
             return start, redraws
         redraws += 1
@@ -127,13 +150,17 @@ def _normal_start(
 
 def generator(seed: int, run: int, stream: int) -> np.random.Generator:
     """Return the random generator of one stream of one run."""
-    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(entropy=seed, spawn_key=(run, stream))))
+    return np.random.Generator(
+        np.random.PCG64(np.random.SeedSequence(entropy=seed, spawn_key=(run, stream)))
+    )
 
 
 def max_number_of_steps(scenario: Scenario) -> int:
-    """Return the number of steps after which every start of the dispersion has passed its closest approach.
+    """Return the number of steps after which every start of the dispersion has passed its closest
+    approach.
 
-    The time at the lowest closing speed is increased by the share of it that gravity can take away, at least by 1 %.
+    The time at the lowest closing speed is increased by the share of it that gravity can take away,
+    at least by 1 %.
     """
     box = scenario.dispersion
     slowest = -box.vx_m_s[1]

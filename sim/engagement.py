@@ -54,8 +54,8 @@ class Step:
     tracking, flying : ndarray of bool, shape (B,)
         Engagements that still measure and decide, and those before their closest approach.
     measured : mapping of str to ndarray
-        Values measured in this step, by sensor, shape (C, B), of ranges (B,); without the sensors that measured in no
-        engagement.
+        Values measured in this step, by sensor, shape (C, B), of ranges (B,); without the sensors
+        that measured in no engagement.
     predicted_miss : PredictedMiss
         After the measurement, before the impulse.
     impulse_m_s : ndarray, shape (C, B)
@@ -78,12 +78,14 @@ class Step:
 class Engagements:
     """A batch of engagements in flight.
 
-    `strategy`, `truth`, `noise` and `target_m_s2`, shape (C, B, steps), replace the strategy, the Kepler motion, the
-    measurement noise and the accelerations of the targets of the scenario. `guarantee` computes the bound Phi in the
-    guaranteed model; a run takes 1.1 to 1.9 times as long, with a rate sensor 1.4 to 9 times.
+    `strategy`, `truth`, `noise` and `target_m_s2`, shape (C, B, steps), replace the strategy, the
+    Kepler motion, the measurement noise and the accelerations of the targets of the scenario.
+    `guarantee` computes the bound Phi in the guaranteed model; a run takes 1.1 to 1.9 times as
+    long, with a rate sensor 1.4 to 9 times.
 
-    One step: measure and cut, decide, shift, drop labels below the threshold, predict; then the true motion advances,
-    and its closest approach is detected. Of the true motion, the strategy gets the measurements only.
+    One step: measure and cut, decide, shift, drop labels below the threshold, predict; then the
+    true motion advances, and its closest approach is detected. Of the true motion, the strategy
+    gets the measurements only.
     """
 
     def __init__(
@@ -113,7 +115,9 @@ class Engagements:
         self._truth_section = TruthSection(model, batch)
         self._arrival_s = self._truth.arrival_s()
         self._sensors = scenario.sensors
-        self._every = {name: model.steps_in(sensor.period_s) for name, sensor in self._sensors.items()}
+        self._every = {
+            name: model.steps_in(sensor.period_s) for name, sensor in self._sensors.items()
+        }
         self._measured: dict[str, Floats] = {}
         self._seen: dict[str, Flags] = {}
         self._flying = np.ones(batch, dtype=bool)
@@ -127,7 +131,9 @@ class Engagements:
         steps = scenario.impulse_steps
         self._impulse_times_s = None if steps is None else np.array(steps) * model.step_s
         self._last_impulse_step = None if steps is None else steps[-1]
-        self._number_of_burn = {step: i for i, step in enumerate(steps or ()) if scenario.thruster.is_scheduled}
+        self._number_of_burn = {
+            step: i for i, step in enumerate(steps or ()) if scenario.thruster.is_scheduled
+        }
         self._burns_m_s = np.zeros((batch, len(self._number_of_burn)))
         # Impulses that are decided and not given yet, one for each of the next steps.
         self._queue = [self._impulse] * scenario.thruster.delay_steps
@@ -138,17 +144,24 @@ class Engagements:
 
     @property
     def flying(self) -> bool:
-        """Whether any true motion is before its closest approach or before x = 0, where its label leaves the set."""
+        """Whether any true motion is before its closest approach or before x = 0, where its label
+        leaves the set.
+        """
         return not self._arrived.all() and self.step < self._draws.steps
 
     @property
     def inconsistency(self) -> tuple[MaskedIntegers, MaskedFloats]:
-        """Step at which each set first became empty, and the label (m) nearest to consistency; masked without one."""
+        """Step at which each set first became empty, and the label (m) nearest to consistency;
+        masked without one.
+        """
         return self._information.inconsistency
 
     def advance(self, observe: Callable[[Step], None] | None = None) -> None:
-        """Simulate one step while `flying`; `observe` is called after the decision, before the impulse."""
-        model, thruster = self.scenario.set_model, self.scenario.thruster
+        """Simulate one step while `flying`; `observe` is called after the decision, before the
+        impulse.
+        """
+        model = self.scenario.set_model
+        thruster = self.scenario.thruster
         sight = self._truth.sight()
         self._tracking = self._flying & self._information.tracking
         pending = self._pending()
@@ -156,7 +169,9 @@ class Engagements:
         miss = self._information.predicted_miss(pending)
         tracking = self._tracking = self._tracking & self._information.tracking
         situation = self._situation(miss, measured, pending)
-        wanted = checked_impulses(self._strategy.decide(situation, self._state), situation, tracking, self._strategy)
+        wanted = checked_impulses(
+            self._strategy.decide(situation, self._state), situation, tracking, self._strategy
+        )
         wanted = np.where(tracking & situation.may_fire, wanted, 0.0)
         if situation.may_fire:
             self._decisions.decide(self.step, tracking, self._budget, miss)
@@ -170,8 +185,21 @@ class Engagements:
         if self.step in self._number_of_burn:
             self._burns_m_s[:, self._number_of_burn[self.step]] = given
         if observe is not None:
-            time_s, flying = self.step * model.step_s, self._flying.copy()
-            observe(Step(self.step, time_s, tracking, flying, sight, measured, miss, self._impulse, self._view))
+            time_s = self.step * model.step_s
+            flying = self._flying.copy()
+            observe(
+                Step(
+                    self.step,
+                    time_s,
+                    tracking,
+                    flying,
+                    sight,
+                    measured,
+                    miss,
+                    self._impulse,
+                    self._view,
+                )
+            )
         executed = self._executed(self._impulse)
         self._truth.fire(executed)
         self._decisions.execute(self.step, executed)
@@ -182,14 +210,17 @@ class Engagements:
         self._information.predict()
         self._truth_section.predict()
         passage = self._truth.advance(model.step_s, self._manoeuvre(sight))
-        # A target that accelerates can return before x = 0, and Phi bounds the minimum distance until then.
+        # A target that accelerates can return before x = 0, and Phi bounds the minimum distance
+        # until then.
         passed = passage.passed & ~self._arrived
         if some(passed):
             self._miss = np.where(passed, passage.min_distance_m, self._miss)
             self._lateral_miss = np.where(passed, passage.lateral_m, self._lateral_miss)
         passing = self._flying & passed
         if some(passing):
-            self._arrival_s = np.where(passing, self.step * model.step_s + passage.arrival_s, self._arrival_s)
+            self._arrival_s = np.where(
+                passing, self.step * model.step_s + passage.arrival_s, self._arrival_s
+            )
             self._flying &= ~passing
         self.step += 1
         if not self._flying.all():
@@ -198,22 +229,26 @@ class Engagements:
             self._information.stop(self._arrived)
 
     def truth_margins_m(self) -> list[MaskedFloats]:
-        """Return the signed margins (m) of the true states in their sections, one array of shape (B,) per step.
+        """Return the signed margins (m) of the true states in their sections, one array of shape
+        (B,) per step.
 
-        They are masked before the first measurement. Before arrival, a section is that of a motion without further
-        impulses.
+        They are masked before the first measurement. Before arrival, a section is that of a motion
+        without further impulses.
         """
         return self._truth_section.margins_m(self._arrivals_s())[: self.step]
 
     def _arrivals_s(self) -> Floats:
-        """Return the times of x = 0, s, without further impulses for flights that have not arrived."""
+        """Return the times of x = 0, s, without further impulses for flights that have not
+        arrived.
+        """
         if not self._flying.any():
             return self._arrival_s
         ahead_s = self.step * self.scenario.set_model.step_s + self._truth.arrival_s()
         return np.where(self._flying, ahead_s, self._arrival_s)
 
     def _measure(self, sight: Sight, pending: Pending) -> Measurements:
-        """Measure with the sensors that are due, cut the sets, and return the values of the sensors that measured.
+        """Measure with the sensors that are due, cut the sets, and return the values of the sensors
+        that measured.
 
         Where the image of a camera is lost, the set is cut by the other measurements.
         """
@@ -226,17 +261,35 @@ class Engagements:
         self._seen = {}
         if not due or not some(self._tracking):
             return {}
-        uniform = {name: self._draws.errors[name][..., self.step] for name in due if name in self._draws.errors}
+        uniform = {
+            name: self._draws.errors[name][..., self.step]
+            for name in due
+            if name in self._draws.errors
+        }
         time_s = self.step * self.scenario.set_model.step_s
-        asked = LineOfSight(self.step, sight.alpha_rad, sight.omega_rad_s, sight.range_m, due, pending, time_s, uniform)
-        measured = kept = checked_measurements(self._noise.measure(asked, self._view), asked, self._noise)
+        asked = LineOfSight(
+            self.step,
+            sight.alpha_rad,
+            sight.omega_rad_s,
+            sight.range_m,
+            due,
+            pending,
+            time_s,
+            uniform,
+        )
+        measured = kept = checked_measurements(
+            self._noise.measure(asked, self._view), asked, self._noise
+        )
         cuts = [(measured, self._tracking)]
-        camera, images = BearingSensor.name, self._draws.images
+        camera = BearingSensor.name
+        images = self._draws.images
         if images is not None and camera in measured:
             seen = images[:, self.step] >= self.scenario.set_model.angle_sensor.miss_probability
             self._seen = {name: seen if name == camera else np.ones_like(seen) for name in measured}
             others = {name: values for name, values in measured.items() if name != camera}
-            kept = others | {camera: np.where(seen, measured[camera], self._measured.get(camera, np.nan))}
+            kept = others | {
+                camera: np.where(seen, measured[camera], self._measured.get(camera, np.nan))
+            }
             cuts = [(measured, self._tracking & seen)]
             if others:
                 cuts.append((others, self._tracking & ~seen))
@@ -253,7 +306,8 @@ class Engagements:
 
     def _executed(self, impulse: Floats) -> Floats:
         """Return the executed impulses."""
-        size, direction = self._draws.execution, self._draws.pointing
+        size = self._draws.execution
+        direction = self._draws.pointing
         return self.scenario.thruster.executed(
             impulse,
             None if size is None else size[:, self.step],
@@ -261,10 +315,13 @@ class Engagements:
         )
 
     def _manoeuvre(self, sight: Sight) -> Floats | None:
-        """Return the acceleration of the targets over this step; None without a target that manoeuvres."""
+        """Return the acceleration of the targets over this step; None without a target that
+        manoeuvres.
+        """
         if self._target_m_s2 is not None:
             return np.asarray(self._target_m_s2[:, :, self.step])
-        target, draws = self.scenario.target, self._draws.target
+        target = self.scenario.target
+        draws = self._draws.target
         if target is None or draws is None:
             return None
         # Signed misses of the true states without further impulses.
@@ -273,29 +330,45 @@ class Engagements:
         if isinstance(self._noise, GameNoise):
             side = self._noise.truth_side
             predicted = np.where(side == 0.0, predicted, side)
-        return acceleration_m_s2(target, draws, self.step, self.scenario.set_model.step_s, predicted)
+        return acceleration_m_s2(
+            target, draws, self.step, self.scenario.set_model.step_s, predicted
+        )
 
     def _pending(self) -> Pending:
-        """Return the impulses that are decided and not given yet, with the times from now to them, s."""
+        """Return the impulses that are decided and not given yet, with the times from now to them,
+        s.
+        """
         step_s = self.scenario.set_model.step_s
-        return tuple((step * step_s, impulse) for step, impulse in enumerate(self._queue) if impulse.any())
+        return tuple(
+            (step * step_s, impulse) for step, impulse in enumerate(self._queue) if impulse.any()
+        )
 
     def _give(self) -> Floats:
-        """Return the impulses that are due, m/s; those of engagements after their closest approach are not given."""
+        """Return the impulses that are due, m/s; those of engagements after their closest approach
+        are not given.
+        """
         due = self._queue.pop(0)
         if self._lead_s == 0.0:
             return due
         self._not_given += np.where(self._flying, 0.0, modulus(due))
         return np.where(self._flying, due, 0.0)
 
-    def _situation(self, miss: PredictedMiss, measured: Measurements, pending: Pending) -> Situation:
-        time_s, lead_s, later_times_s = self.step * self.scenario.set_model.step_s, self._lead_s, self._impulse_times_s
+    def _situation(
+        self, miss: PredictedMiss, measured: Measurements, pending: Pending
+    ) -> Situation:
+        time_s = self.step * self.scenario.set_model.step_s
+        lead_s = self._lead_s
+        later_times_s = self._impulse_times_s
         may_fire = True
         if later_times_s is not None:
-            # Half a step separates the times of different steps, whatever their rounding errors are.
+            # Half a step separates the times of different steps, whatever their rounding errors
+            # are.
             half_s = 0.5 * self.scenario.set_model.step_s
-            first, after = np.searchsorted(later_times_s, (time_s + lead_s - half_s, time_s + lead_s + half_s)).tolist()
-            may_fire, later_times_s = after > first, later_times_s[after:]
+            first, after = np.searchsorted(
+                later_times_s, (time_s + lead_s - half_s, time_s + lead_s + half_s)
+            ).tolist()
+            may_fire = after > first
+            later_times_s = later_times_s[after:]
         return Situation(
             time_s=time_s,
             step=self.step,
@@ -317,19 +390,25 @@ class Engagements:
         )
 
     def _finish_labels(self) -> None:
-        """Drop labels below the threshold, and store the predicted misses of those whose control ends."""
-        information, is_over = self._information, self._control_is_over()
+        """Drop labels below the threshold, and store the predicted misses of those whose control
+        ends.
+        """
+        information = self._information
+        is_over = self._control_is_over()
         if not (self._label_ends.ends_now(is_over) or information.sections_are_leaving()):
             information.drop_below_threshold()
             return
-        living, labels = information.living.copy(), information.labels_m.copy()
+        living = information.living.copy()
+        labels = information.labels_m.copy()
         misses = np.stack(information.predicted_miss_by_section_m())
         self._label_ends.end(information.drop_below_threshold(), living, is_over, labels, misses)
 
     def _control_is_over(self) -> Flags:
-        """Return whether no later step can give an impulse: after the last one of the schedule, or without budget.
+        """Return whether no later step can give an impulse: after the last one of the schedule, or
+        without budget.
 
-        Not in engagements that have arrived: their sets and their impulses do not go on with the rest of the batch.
+        Not in engagements that have arrived: their sets and their impulses do not go on with the
+        rest of the batch.
         """
         if self._last_impulse_step is not None and self.step >= self._last_impulse_step:
             is_over = np.ones_like(self._tracking)
@@ -340,7 +419,9 @@ class Engagements:
         return is_over & ~self._arrived
 
     def any_state_miss_m(self, results: Results) -> Floats:
-        """Return the maximum miss of a state of the set, m, shape (B,): `LabelEnds.any_state_miss_m`."""
+        """Return the maximum miss of a state of the set, m, shape (B,):
+        `LabelEnds.any_state_miss_m`.
+        """
         return self._label_ends.any_state_miss_m(results)
 
     def results(self, runs: NDArray[np.int64]) -> Results:
@@ -348,11 +429,14 @@ class Engagements:
         arrivals_s = self._arrivals_s()
         lost = self._information.inconsistent
         margin = self._truth_section.min_margin_m(arrivals_s)
-        payoff, known = self._label_ends.published_m.copy(), self._label_ends.left
+        payoff = self._label_ends.published_m.copy()
+        known = self._label_ends.left
         if self._model.is_guaranteed:
             payoff, known = self._information.guaranteed_miss()
-        # Without a closest approach within the maximum number of steps, the miss is the present range.
-        passed, present = np.isfinite(self._miss), self._truth.position_m.T[:-1]
+        # Without a closest approach within the maximum number of steps, the miss is the present
+        # range.
+        passed = np.isfinite(self._miss)
+        present = self._truth.position_m.T[:-1]
         miss = np.where(passed, self._miss, self._truth.sight().range_m)
         radius_m = self.scenario.radius_m
         not_given = self._not_given + sum(map(modulus, self._queue))
@@ -361,10 +445,15 @@ class Engagements:
         return Results(
             runs=runs,
             miss_m=miss,
-            impulse_m_s=np.maximum(self.scenario.thruster.budget_m_s - self._budget - not_given, 0.0),
+            impulse_m_s=np.maximum(
+                self.scenario.thruster.budget_m_s - self._budget - not_given, 0.0
+            ),
             guaranteed_miss_m=np.ma.MaskedArray(payoff, mask=~known),
             outcomes=tuple(
-                _outcome(*flags) for flags in zip(miss > self.scenario.nominal_range_m, lost, self._spent, strict=True)
+                _outcome(*flags)
+                for flags in zip(
+                    miss > self.scenario.nominal_range_m, lost, self._spent, strict=True
+                )
             ),
             set_emptied=lost,
             hit=hit,

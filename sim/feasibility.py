@@ -23,14 +23,16 @@ class Feasibility:
     Parameters
     ----------
     steps, images, decisions : int
-        Numbers of steps until the nominal arrival, of images before the last decision, and of steps in which an impulse
-        can be given.
+        Numbers of steps until the nominal arrival, of images before the last decision, and of steps
+        in which an impulse can be given.
     unguided_miss_m : float
         Maximum miss without impulses of `STARTS` starts, without gravity, m.
     engine_corrects_m, budget_corrects_m : float
-        What all impulses of the nominal flight can correct: with any budget, and with that of the engine, m.
+        What all impulses of the nominal flight can correct: with any budget, and with that of the
+        engine, m.
     beyond_engine, beyond_budget : float
-        Shares of the starts that no impulses can bring to a hit: with any budget, and with that of the engine.
+        Shares of the starts that no impulses can bring to a hit: with any budget, and with that of
+        the engine.
     possible_miss : PossibleMiss or None
         The misses that are possible at the last decision; None with fewer than two images.
     """
@@ -51,17 +53,27 @@ def feasibility(scenario: Scenario) -> Feasibility | None:
 
     A start is beyond an engine that corrects less than its miss minus the radius of the body.
     """
-    model, thruster, arrival_s = scenario.set_model, scenario.thruster, scenario.nominal_arrival_s
+    model = scenario.set_model
+    thruster = scenario.thruster
+    arrival_s = scenario.nominal_arrival_s
     if arrival_s > MAX_STEPS * model.step_s:
         return None
     position_m, velocity_m_s, _ = draw_starts(scenario, range(STARTS), 0)
     arrivals_s = position_m[:, -1] / -velocity_m_s[:, -1]
-    unguided_m = np.hypot.reduce(position_m[:, :-1] + velocity_m_s[:, :-1] * arrivals_s[:, None], axis=1)
+    unguided_m = np.hypot.reduce(
+        position_m[:, :-1] + velocity_m_s[:, :-1] * arrivals_s[:, None], axis=1
+    )
     every = range(thruster.delay_steps, int(arrivals_s.max() / model.step_s) + 1)
-    times_s = model.step_s * np.array(every if scenario.impulse_steps is None else scenario.impulse_steps, dtype=float)
-    radius_m, to_go_s = scenario.radius_m or 0.0, np.append(arrivals_s, arrival_s)  # the last one is the nominal flight
+    times_s = model.step_s * np.array(
+        every if scenario.impulse_steps is None else scenario.impulse_steps, dtype=float
+    )
+    radius_m, to_go_s = (
+        scenario.radius_m or 0.0,
+        np.append(arrivals_s, arrival_s),
+    )  # the last one is the nominal flight
     by_engine, by_budget = (
-        max_correctable_m(times_s, thruster, to_go_s, budget=budget) for budget in (None, thruster.budget_m_s)
+        max_correctable_m(times_s, thruster, to_go_s, budget=budget)
+        for budget in (None, thruster.budget_m_s)
     )
     return Feasibility(
         steps=int(arrival_s / model.step_s),

@@ -1,4 +1,6 @@
-"""Bounds of all motions that a set model allows for, with their distance from the attracting body."""
+"""Bounds of all motions that a set model allows for, with their distance from the attracting
+body.
+"""
 
 from __future__ import annotations
 
@@ -29,14 +31,16 @@ TOO_SLOW = "gravity may take away the closing speed"
 
 @dataclass(frozen=True)
 class FlightBounds:
-    """Bounds of all motions that a model allows for, at N equal steps of time until the last of them has x = 0.
+    """Bounds of all motions that a model allows for, at N equal steps of time until the last of
+    them has x = 0.
 
     Parameters
     ----------
     times_s : ndarray, shape (N,)
         Times since t = 0.
     nearest_m : ndarray, shape (N,)
-        Minimum distance of the segment between spacecraft and object from the attracting body, within half a step.
+        Minimum distance of the segment between spacecraft and object from the attracting body,
+        within half a step.
     fastest_m_s : ndarray, shape (N,)
         Maximum speed of a point of the segment relative to the attracting body.
     distance_m, speed_m_s : ndarray, shape (N,)
@@ -60,8 +64,8 @@ class FlightBounds:
 def no_bound(cause: str, range_m: float) -> ValueError:
     """Return the error of a scenario whose gravity has no bound from a range on."""
     return ValueError(
-        f"sun: gravity has no bound: {cause} at a range of {range_m / 1000.0:.4g} km; start nearer to the target, "
-        "narrow the bounds of the start, or omit the attracting body"
+        f"sun: gravity has no bound: {cause} at a range of {range_m / 1000.0:.4g} km; start nearer "
+        "to the target, narrow the bounds of the start, or omit the attracting body"
     )
 
 
@@ -69,8 +73,8 @@ def no_bound(cause: str, range_m: float) -> ValueError:
 class _Motion:
     """Positions and velocities of spacecraft and object, in this order, shape (2, axes, N).
 
-    Those of deviations have the shape (2, 1 + axes, N), with the modulus first: the impulses along two axes have a
-    common bound.
+    Those of deviations have the shape (2, 1 + axes, N), with the modulus first: the impulses along
+    two axes have a common bound.
     """
 
     place_m: Floats
@@ -93,7 +97,8 @@ def flight_bounds(
 ) -> FlightBounds:
     """Return bounds of all motions from a box of starts, as in Lemma 2 of docs/guarantee.md.
 
-    The nominal motion starts in the middle of the box and has no impulses. All deviations from it have a bound.
+    The nominal motion starts in the middle of the box and has no impulses. All deviations from it
+    have a bound.
 
     Parameters
     ----------
@@ -109,16 +114,22 @@ def flight_bounds(
     Raises
     ------
     ValueError
-        If the motions may come too near the attracting body, or may never have x = 0; the message names the range.
+        If the motions may come too near the attracting body, or may never have x = 0; the message
+        names the range.
     """
     boxes = [bounds.axis(name) for name in bounds.axes]
-    start = np.array([[*(box.z_m for box in boxes), bounds.x_m], [*(box.vz_m_s for box in boxes), bounds.vx_m_s]])
-    middle, half = start.mean(axis=2), 0.5 * np.ptp(start, axis=2)
+    start = np.array(
+        [[*(box.z_m for box in boxes), bounds.x_m], [*(box.vz_m_s for box in boxes), bounds.vx_m_s]]
+    )
+    middle = start.mean(axis=2)
+    half = 0.5 * np.ptp(start, axis=2)
     half = np.concatenate([np.linalg.norm(half, axis=1, keepdims=True), half], axis=1)
     # All impulses at once, along each axis: the deviations are largest then.
     impulses = np.array([impulses_m_s, *(impulses_m_s for _ in boxes), 0.0])
     first = np.array([[np.zeros_like(half[0]), half[0]], [impulses, half[1]]])
-    disturbance = np.array([np.zeros_like(half[0]), [np.linalg.norm(disturbances_m_s2), *disturbances_m_s2, 0.0]])
+    disturbance = np.array(
+        [np.zeros_like(half[0]), [np.linalg.norm(disturbances_m_s2), *disturbances_m_s2, 0.0]]
+    )
     for stretch in STRETCHES:
         times_s = np.linspace(0.0, stretch * bounds.x_m[1] / -bounds.vx_m_s[1], INSTANTS)
         nominal = _nominal(middle, sun, times_s)
@@ -130,7 +141,9 @@ def flight_bounds(
 
 
 def _nominal(middle: Floats, sun: Sun, times_s: Floats) -> _Motion:
-    """Return the motion from a relative position and velocity, shape (2, axes), around the attracting body."""
+    """Return the motion from a relative position and velocity, shape (2, axes), around the
+    attracting body.
+    """
     motion = KeplerMotion(middle[None, 0], middle[None, 1], sun)
     states = [motion.bodies()]
     for _ in times_s[1:]:
@@ -140,20 +153,25 @@ def _nominal(middle: Floats, sun: Sun, times_s: Floats) -> _Motion:
     return _Motion(place_m, speed_m_s)
 
 
-def _deviation(first: Floats, disturbance_m_s2: Floats, nominal: _Motion, times_s: Floats, sun: Sun) -> _Motion:
+def _deviation(
+    first: Floats, disturbance_m_s2: Floats, nominal: _Motion, times_s: Floats, sun: Sun
+) -> _Motion:
     """Return bounds of all deviations from the nominal motion.
 
-    A deviation d satisfies |d_i''| <= (K/R^3) (1.5 |d| + 0.5 |d_i|) + disturbance along axis i, with the minimum
-    distance R from the attracting body that the deviation allows for, and its modulus the same with |d| in place of
+    A deviation d satisfies |d_i''| <= (K/R^3) (1.5 |d| + 0.5 |d_i|) + disturbance along axis i,
+    with the minimum distance R from the attracting body that the deviation allows for, and its
+    modulus the same with |d| in place of
     |d_i|. The right side increases with both. A function that is not less than the double integral of the right side
     for it is therefore a bound of all deviations.
     """
-    step_s, far_m = times_s[1], np.linalg.norm(nominal.place_m, axis=1)
+    step_s = times_s[1]
+    far_m = np.linalg.norm(nominal.place_m, axis=1)
     fast_m_s = np.linalg.norm(nominal.speed_m_s, axis=1)
     place = np.repeat(first[0, ..., None], INSTANTS, axis=2)
     speed = np.repeat(first[1, ..., None], INSTANTS, axis=2)
     for _ in range(TRIALS):
-        size_m, size_m_s = place[:, MODULUS], speed[:, MODULUS]
+        size_m = place[:, MODULUS]
+        size_m_s = speed[:, MODULUS]
         nearest_m = far_m - size_m - 0.5 * step_s * (fast_m_s + size_m_s)
         too_near = (nearest_m < NEAREST_SHARE * far_m).any(axis=0)
         if too_near.any():
@@ -165,7 +183,8 @@ def _deviation(first: Floats, disturbance_m_s2: Floats, nominal: _Motion, times_
         grows = ((new_place > place) | (new_speed > speed)).any(axis=(0, 1))
         if not grows.any():
             return _Motion(new_place, new_speed)
-        place, speed = INFLATION * new_place, INFLATION * new_speed
+        place = INFLATION * new_place
+        speed = INFLATION * new_speed
     raise no_bound(TOO_NEAR, nominal.range_m[grows.argmax()])
 
 
@@ -175,20 +194,25 @@ def _sums(values: Floats) -> Floats:
 
 
 def greater_of_neighbours(values: Floats) -> Floats:
-    """Return the greater value of each two neighbours along the last axis: a bound between them, if monotonic."""
+    """Return the greater value of each two neighbours along the last axis: a bound between them, if
+    monotonic.
+    """
     return np.asarray(np.maximum(values[..., 1:], values[..., :-1]))
 
 
 def _bounds(nominal: _Motion, deviation: _Motion, times_s: Floats, instants: int) -> FlightBounds:
     """Return the bounds of a flight until its last arrival."""
     place, speed = nominal.relative
-    place_error, speed_error = deviation.place_m.sum(axis=0), deviation.speed_m_s.sum(axis=0)
+    place_error = deviation.place_m.sum(axis=0)
+    speed_error = deviation.speed_m_s.sum(axis=0)
     offset = np.abs(place) + place_error[1:]
     # Flights end at x = 0.
     offset[X] = np.maximum(place[X] + place_error[X], 0.0)
     across = np.linalg.norm(place[:X], axis=0) + place_error[MODULUS]
     distance = np.minimum(nominal.range_m + place_error[MODULUS], np.hypot(offset[X], across))
-    fastest_m_s = (np.linalg.norm(nominal.speed_m_s, axis=1) + deviation.speed_m_s[:, MODULUS]).max(axis=0)
+    fastest_m_s = (np.linalg.norm(nominal.speed_m_s, axis=1) + deviation.speed_m_s[:, MODULUS]).max(
+        axis=0
+    )
     closest_m, nearest_m = _distances_of_segment(nominal, deviation)
     nearest_m -= 0.5 * times_s[1] * fastest_m_s
     closing_m_s = -speed[X] - speed_error[X]
@@ -211,9 +235,11 @@ def _bounds(nominal: _Motion, deviation: _Motion, times_s: Floats, instants: int
 
 
 def _distances_of_segment(nominal: _Motion, deviation: _Motion) -> tuple[Floats, Floats]:
-    """Return the minimum distance of the segment from the attracting body: nominal, and of all possible motions.
+    """Return the minimum distance of the segment from the attracting body: nominal, and of all
+    possible motions.
 
-    At the length u of the nominal segment it is (height^2 + (u - foot)^2)^(1/2). The deviation is at most linear in u.
+    At the length u of the nominal segment it is (height^2 + (u - foot)^2)^(1/2). The deviation is
+    at most linear in u.
     """
     own, (relative, _) = nominal.place_m[0], nominal.relative
     length = np.maximum(np.linalg.norm(relative, axis=0), np.finfo(float).tiny)
@@ -223,7 +249,9 @@ def _distances_of_segment(nominal: _Motion, deviation: _Motion) -> tuple[Floats,
     def minimum(of_craft: Floats, of_object: Floats) -> Floats:
         slope = np.clip((of_object - of_craft) / length, -1.0 + 1e-12, 1.0 - 1e-12)
         at = np.clip(foot + height * slope / np.sqrt(1.0 - slope**2), 0.0, length)
-        return np.asarray(np.hypot(height, at - foot) - of_craft - (of_object - of_craft) * (at / length))
+        return np.asarray(
+            np.hypot(height, at - foot) - of_craft - (of_object - of_craft) * (at / length)
+        )
 
     sizes = deviation.place_m[:, MODULUS]
     return minimum(*np.zeros_like(sizes)), minimum(*sizes)

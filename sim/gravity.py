@@ -27,7 +27,9 @@ def on_board_model(scenario: Scenario) -> SetModel:
 
 
 def max_impulses_m_s(model: SetModel, thruster: Thruster) -> float:
-    """Return the maximum sum of a flight's impulses, m/s: the budget, or the maximum impulse at every step."""
+    """Return the maximum sum of a flight's impulses, m/s: the budget, or the maximum impulse at
+    every step.
+    """
     steps = model.bounds.x_m[1] / (-model.bounds.vx_m_s[1] * model.step_s) + 1.0
     most = min(thruster.budget_m_s, thruster.max_impulse_m_s * steps)
     return most * (1.0 + thruster.execution_error_relative)
@@ -52,26 +54,41 @@ def with_gravity(model: SetModel, sun: Sun | None, impulses_m_s: float) -> SetMo
 
     Notes
     -----
-    Lemma 2 of docs/guarantee.md, evaluated along the flight (`flight_bounds`). `pull` and `jerk` are bounds of the
-    difference of gravity between spacecraft and object and of its derivative.
+    Lemma 2 of docs/guarantee.md, evaluated along the flight (`flight_bounds`). `pull` and `jerk`
+    are bounds of the difference of gravity between spacecraft and object and of its derivative.
     """
     if sun is None:
-        return replace(model, gravity_m_s2=0.0, gravity_y_m_s2=None, gravity_speed_change=MIN_SPEED_CHANGE)
+        return replace(
+            model, gravity_m_s2=0.0, gravity_y_m_s2=None, gravity_speed_change=MIN_SPEED_CHANGE
+        )
     disturbances = tuple(model.axis(name).disturbance_m_s2 for name in model.axes)
     flight = flight_bounds(model.bounds, disturbances, sun, impulses_m_s)
     gradient = sun.gravitational_parameter_m3_s2 / flight.nearest_m**3
-    distance, pull = flight.distance_m, 2.0 * gradient * flight.distance_m
-    jerk = 2.0 * gradient * (flight.speed_m_s + 3.0 * distance * flight.fastest_m_s / flight.nearest_m)
-    m, later_pull, later_jerk = flight.closing_speed_m_s, _max_later(pull), _max_later(jerk)
-    offset, velocity = flight.offset_m[:-1], flight.velocity_m_s[:-1]
+    distance = flight.distance_m
+    pull = 2.0 * gradient * flight.distance_m
+    jerk = (
+        2.0 * gradient * (flight.speed_m_s + 3.0 * distance * flight.fastest_m_s / flight.nearest_m)
+    )
+    m = flight.closing_speed_m_s
+    later_pull = _max_later(pull)
+    later_jerk = _max_later(jerk)
+    offset = flight.offset_m[:-1]
+    velocity = flight.velocity_m_s[:-1]
     tide = gradient * (1.5 * distance + 0.5 * offset)
-    scale = later_pull / m * velocity + (0.5 * (later_pull / m) ** 2 + later_jerk / (3.0 * m)) * offset
+    scale = (
+        later_pull / m * velocity + (0.5 * (later_pull / m) ** 2 + later_jerk / (3.0 * m)) * offset
+    )
     *along_y, along_z = (_max(each) for each in tide + scale)
     # All that gravity has changed until the end of each step.
-    changes = np.cumsum(greater_of_neighbours(pull)) * flight.times_s[1] / min(m, model.closing_speed_m_s)
+    changes = (
+        np.cumsum(greater_of_neighbours(pull)) * flight.times_s[1] / min(m, model.closing_speed_m_s)
+    )
     allowed = 1.0 - replace(model, gravity_speed_change=0.0).speed_error
     if model.is_guaranteed and changes[-1] >= allowed > 0.0:
-        cause = f"it may change the closing speed by {allowed:.3g} of itself, all that the guaranteed model allows,"
+        cause = (
+            f"it may change the closing speed by {allowed:.3g} of itself, all that the guaranteed "
+            "model allows,"
+        )
         raise no_bound(cause, distance[np.argmax(changes >= allowed)])
     return replace(
         model,

@@ -1,4 +1,6 @@
-"""True motion: heliocentric two-body motion of spacecraft and object, as relative motion of a batch."""
+"""True motion: heliocentric two-body motion of spacecraft and object, as relative motion of a
+batch.
+"""
 
 from __future__ import annotations
 
@@ -12,14 +14,17 @@ from infoset.arrays import Flags, Floats
 from infoset.sim.scenario import Sun
 
 POSITION_ERROR_M = 1e-5
-"""Error of the position at arrival for which the length of a leap is chosen, m. The leap of a step is shorter than the
-step only where gravity is strong."""
+"""Error of the position at arrival for which the length of a leap is chosen, m. The leap of a step
+is shorter than the step only where gravity is strong."""
 SHORTEST_LEAP = 1e-6
-"""Minimum length of a leap in units of the step. Only a fall into the attracting body needs shorter ones."""
+"""Minimum length of a leap in units of the step. Only a fall into the attracting body needs shorter
+ones.
+"""
 NEWTON_STEPS = 8
 CONVERGED = 1e-9
-"""Error of the time of a closest approach that Newton's method may leave, as a share of the leap. It changes the
-distance by at most this share of the way of a leap, which is below a millimetre for ways up to 1000 km."""
+"""Error of the time of a closest approach that Newton's method may leave, as a share of the leap.
+It changes the distance by at most this share of the way of a leap, which is below a millimetre for
+ways up to 1000 km."""
 HALVINGS = 60
 """Number of halvings of a leap that leave less than the rounding error of its length."""
 X = -1
@@ -31,7 +36,8 @@ POSITION, VELOCITY, ACCELERATION, LOST = range(4)
 
 @dataclass(frozen=True)
 class Sight:
-    """True geometry of B engagements; arrays have the shape (C, B), for the plane of x and each lateral axis.
+    """True geometry of B engagements; arrays have the shape (C, B), for the plane of x and each
+    lateral axis.
 
     Parameters
     ----------
@@ -40,7 +46,8 @@ class Sight:
     range_m : ndarray, shape (B,)
         Distance between the centres of mass.
     slope, slope_rate_per_s : ndarray
-        z/x, that is tan(alpha) without the rounding of the angle, and its rate; zero where x is zero.
+        z/x, that is tan(alpha) without the rounding of the angle, and its rate; zero where x is
+        zero.
     """
 
     alpha_rad: Floats
@@ -57,10 +64,11 @@ class Passage:
     Parameters
     ----------
     passed : ndarray of bool
-        Whether the object recedes after the step, or after a part of it. Elsewhere the distance is infinite and the
-        others are zero.
+        Whether the object recedes after the step, or after a part of it. Elsewhere the distance is
+        infinite and the others are zero.
     min_distance_m : ndarray
-        Minimum distance since the start, m. It is that at the start if the object recedes from there on.
+        Minimum distance since the start, m. It is that at the start if the object recedes from
+        there on.
     arrival_s : ndarray
         Time from the beginning of the step to x = 0.
     lateral_m : ndarray, shape (C, B)
@@ -74,14 +82,17 @@ class Passage:
 
 
 class KeplerMotion:
-    """Motion of the object relative to the spacecraft, both in the Sun's gravity, or in free space without a `sun`.
+    """Motion of the object relative to the spacecraft, both in the Sun's gravity, or in free space
+    without a `sun`.
 
-    `position_m` and `velocity_m_s` are the relative position and velocity at t = 0, shape (B, C + 1), along the lateral
-    axes, z in a plane, y and z in space, and x. The spacecraft's orbit gives the position of the Sun: circular at
-    t = 0, in the plane of the Sun and the x axis and toward +x, unless `sun` has its velocity. Impulses change it.
+    `position_m` and `velocity_m_s` are the relative position and velocity at t = 0, shape (B, C +
+    1), along the lateral axes, z in a plane, y and z in space, and x. The spacecraft's orbit gives
+    the position of the Sun: circular at t = 0, in the plane of the Sun and the x axis and toward
+    +x, unless `sun` has its velocity. Impulses change it.
 
-    The motion is integrated in leaps of order four (`leap`) on the exact difference of the two accelerations. The error
-    of the position at arrival is below 1 mm, or 1e-9 of the miss if that is greater.
+    The motion is integrated in leaps of order four (`leap`) on the exact difference of the two
+    accelerations. The error of the position at arrival is below 1 mm, or 1e-9 of the miss if that
+    is greater.
 
     References
     ----------
@@ -105,7 +116,8 @@ class KeplerMotion:
             self._motion[:, POSITION, :, SPACECRAFT] = -sun.distance_m * toward_sun[-axes:]
             self._motion[:, VELOCITY, :, SPACECRAFT] = speed * along_orbit[-axes:]
             parameter = float(sun.gravitational_parameter_m3_s2)
-        # An acceleration with this error over the whole flight changes the position by POSITION_ERROR_M.
+        # An acceleration with this error over the whole flight changes the position by
+        # POSITION_ERROR_M.
         self._gravity = parameter, POSITION_ERROR_M * (velocity_m_s[:, X] / position_m[:, X]) ** 2
         accelerate_all(self._motion, self._manoeuvre, parameter)
 
@@ -120,14 +132,24 @@ class KeplerMotion:
         return self._motion[:, VELOCITY, :, RELATIVE].copy()
 
     def bodies(self) -> Floats:
-        """Return position and velocity of spacecraft and object from the Sun, shape (2, 2, axes, B)."""
-        own, relative = (self._motion[:, :ACCELERATION, :, part].transpose(1, 2, 0) for part in (SPACECRAFT, RELATIVE))
+        """Return position and velocity of spacecraft and object from the Sun, shape (2, 2, axes,
+        B).
+        """
+        own, relative = (
+            self._motion[:, :ACCELERATION, :, part].transpose(1, 2, 0)
+            for part in (SPACECRAFT, RELATIVE)
+        )
         return np.stack([own, own + relative], axis=1)
 
     def sight(self) -> Sight:
         """Return the present geometry."""
-        position, velocity = np.ascontiguousarray(self._motion[:, :ACCELERATION, :, RELATIVE].transpose(1, 2, 0))
-        lateral, x, speed, v_x = position[:X], position[X:], velocity[:X], velocity[X:]
+        position, velocity = np.ascontiguousarray(
+            self._motion[:, :ACCELERATION, :, RELATIVE].transpose(1, 2, 0)
+        )
+        lateral = position[:X]
+        x = position[X:]
+        speed = velocity[:X]
+        v_x = velocity[X:]
         slope = _ratio(lateral, x)
         return Sight(
             alpha_rad=np.arctan2(lateral, x),
@@ -145,8 +167,8 @@ class KeplerMotion:
     def arrival_s(self) -> Floats:
         """Return the times from now to x = 0, shape (B,), s.
 
-        The motion is that without further impulses. Impulses, which are across x, change this time through gravity by
-        some nanoseconds.
+        The motion is that without further impulses. Impulses, which are across x, change this time
+        through gravity by some nanoseconds.
         """
         arrival_s = np.empty(len(self._motion))
         arrive_all(self._motion, self._manoeuvre, *self._gravity, self._scratch, arrival_s)
@@ -155,37 +177,56 @@ class KeplerMotion:
     def advance(self, step_s: float, manoeuvre_m_s2: Floats | None = None) -> Passage:
         """Advance by one step.
 
-        `manoeuvre_m_s2`, shape (C, B), is the lateral acceleration of the object from now on; None leaves it as it is.
+        `manoeuvre_m_s2`, shape (C, B), is the lateral acceleration of the object from now on; None
+        leaves it as it is.
         """
         if manoeuvre_m_s2 is not None:
             self._manoeuvre = np.ascontiguousarray(manoeuvre_m_s2.T)
             accelerate_all(self._motion, self._manoeuvre, self._gravity[0])
         batch = len(self._motion)
-        passage = passed, arrival, closest = np.zeros(batch, dtype=bool), np.zeros(batch), self._closest_m
-        advance_all(self._motion, self._manoeuvre, *self._gravity, float(step_s), self._scratch, passage)
+        passage = passed, arrival, closest = (
+            np.zeros(batch, dtype=bool),
+            np.zeros(batch),
+            self._closest_m,
+        )
+        advance_all(
+            self._motion, self._manoeuvre, *self._gravity, float(step_s), self._scratch, passage
+        )
         nearest = np.where(passed, closest.T, 0.0)
         minimum = np.where(passed, np.hypot.reduce(nearest), np.inf)
         return Passage(passed, minimum, arrival, nearest[:X])
 
 
 def sun_and_orbit(sun: Sun) -> tuple[Floats, Floats]:
-    """Return (y, z, x) of the Sun's direction, and of the spacecraft's velocity in units of that of a circular orbit.
+    """Return (y, z, x) of the Sun's direction, and of the spacecraft's velocity in units of that of
+    a circular orbit.
 
-    Without a velocity in `sun` the second is a direction: the part of +x across the first, or z if the Sun is on x.
+    Without a velocity in `sun` the second is a direction: the part of +x across the first, or z if
+    the Sun is on x.
     """
     level = np.cos(sun.elevation_rad)
-    y, z, x = np.sin(sun.elevation_rad), level * np.sin(sun.direction_rad), level * np.cos(sun.direction_rad)
+    y = np.sin(sun.elevation_rad)
+    z = level * np.sin(sun.direction_rad)
+    x = level * np.cos(sun.direction_rad)
     if sun.spacecraft_velocity_m_s is not None:
         velocity = np.array([0.0, *sun.spacecraft_velocity_m_s])[-3:]
-        return np.array([y, z, x]), velocity / np.sqrt(sun.gravitational_parameter_m3_s2 / sun.distance_m)
+        return np.array([y, z, x]), velocity / np.sqrt(
+            sun.gravitational_parameter_m3_s2 / sun.distance_m
+        )
     across = np.hypot(y, z)
-    along = np.array([-x * (y / across), -x * (z / across), across]) if across > 0.0 else np.array([0.0, x, 0.0])
+    along = (
+        np.array([-x * (y / across), -x * (z / across), across])
+        if across > 0.0
+        else np.array([0.0, x, 0.0])
+    )
     return np.array([y, z, x]), along
 
 
 @inlined
 def attraction_share(squared_m2: float, gravitational_parameter_m3_s2: float) -> float:
-    """Return -K / |r|^3, whose product with r is the acceleration at r from the Sun, from the square of |r|."""
+    """Return -K / |r|^3, whose product with r is the acceleration at r from the Sun, from the
+    square of |r|.
+    """
     return -gravitational_parameter_m3_s2 / (squared_m2 * math.sqrt(squared_m2))
 
 
@@ -193,9 +234,10 @@ def attraction_share(squared_m2: float, gravitational_parameter_m3_s2: float) ->
 def accelerate(state: Floats, manoeuvre_m_s2: Floats, gravitational_parameter_m3_s2: float) -> None:
     """Write the accelerations of a state, relative and of the spacecraft.
 
-    A state, shape (4, A + 1, 2), has position, velocity, acceleration and lost rounding; along the A lateral axes and
-    x; relative, and of the spacecraft. `manoeuvre_m_s2`, shape (A,), is the lateral acceleration of the object. The
-    gravitational parameter K of the Sun is zero in free space.
+    A state, shape (4, A + 1, 2), has position, velocity, acceleration and lost rounding; along the
+    A lateral axes and x; relative, and of the spacecraft. `manoeuvre_m_s2`, shape (A,), is the
+    lateral acceleration of the object. The gravitational parameter K of the Sun is zero in free
+    space.
     """
     own_share = object_share = 0.0
     if gravitational_parameter_m3_s2 > 0.0:
@@ -218,30 +260,38 @@ def accelerate(state: Floats, manoeuvre_m_s2: Floats, gravitational_parameter_m3
 
 @allocation_free
 def leap(
-    state: Floats, manoeuvre_m_s2: Floats, gravitational_parameter_m3_s2: float, duration_s: float, stage: Floats
+    state: Floats,
+    manoeuvre_m_s2: Floats,
+    gravitational_parameter_m3_s2: float,
+    duration_s: float,
+    stage: Floats,
 ) -> None:
     """Advance a state by a time: one step of the method of Runge, Kutta and Nystroem of order four.
 
-    With the acceleration a(p) at the position p, and a1 = a(p), a2 = a(p + h v/2 + h^2 a1/8), a3 = a(p + h v + h^2
-    a2/2), the position gains h v + h^2 (a1 + 2 a2)/6 and the velocity h (a1 + 4 a2 + a3)/6. It is exact for a constant
-    acceleration. `stage` is memory of the shape of the state.
+    With the acceleration a(p) at the position p, and a1 = a(p), a2 = a(p + h v/2 + h^2 a1/8), a3 =
+    a(p + h v + h^2 a2/2), the position gains h v + h^2 (a1 + 2 a2)/6 and the velocity h (a1 + 4 a2
+    + a3)/6. It is exact for a constant acceleration. `stage` is memory of the shape of the state.
 
     References
     ----------
-    Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, section II.14 (the method of Nystroem).
+    Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, section II.14 (the method
+    of Nystroem).
     """
     sixth = duration_s / 6.0
     for axis in range(state.shape[1]):
         for craft in (RELATIVE, SPACECRAFT):
-            speed, first = state[VELOCITY, axis, craft], state[ACCELERATION, axis, craft]
+            speed = state[VELOCITY, axis, craft]
+            first = state[ACCELERATION, axis, craft]
             stage[POSITION, axis, craft] = state[POSITION, axis, craft] + 0.5 * duration_s * (
                 speed + 0.25 * duration_s * first
             )
     accelerate(stage, manoeuvre_m_s2, gravitational_parameter_m3_s2)
     for axis in range(state.shape[1]):
         for craft in (RELATIVE, SPACECRAFT):
-            before, speed = state[POSITION, axis, craft], state[VELOCITY, axis, craft]
-            first, second = state[ACCELERATION, axis, craft], stage[ACCELERATION, axis, craft]
+            before = state[POSITION, axis, craft]
+            speed = state[VELOCITY, axis, craft]
+            first = state[ACCELERATION, axis, craft]
+            second = stage[ACCELERATION, axis, craft]
             stage[POSITION, axis, craft] = before + duration_s * (speed + 0.5 * duration_s * second)
             # Rounding errors must not accumulate: the set allows for those of one step.
             way = duration_s * (speed + sixth * (first + 2.0 * second)) + state[LOST, axis, craft]
@@ -257,11 +307,15 @@ def leap(
 
 
 @inlined
-def longest_leap_s(state: Floats, gravitational_parameter_m3_s2: float, acceleration_error_m_s2: float) -> float:
-    """Return the maximum length of a leap for which its mean acceleration has at most a given error.
+def longest_leap_s(
+    state: Floats, gravitational_parameter_m3_s2: float, acceleration_error_m_s2: float
+) -> float:
+    """Return the maximum length of a leap for which its mean acceleration has at most a given
+    error.
 
-    At the distance R from the Sun, a motion with the speed v changes in the time t = min(R/v, (R^3/K)^(1/2)). A leap of
-    order four and length h has an error of the order of (K/R^2) (h/t)^4. The shorter length of the two bodies' counts.
+    At the distance R from the Sun, a motion with the speed v changes in the time t = min(R/v,
+    (R^3/K)^(1/2)). A leap of order four and length h has an error of the order of (K/R^2) (h/t)^4.
+    The shorter length of the two bodies' counts.
     """
     if gravitational_parameter_m3_s2 == 0.0:
         return math.inf
@@ -269,8 +323,14 @@ def longest_leap_s(state: Floats, gravitational_parameter_m3_s2: float, accelera
     for share_of_relative in (0.0, 1.0):
         squared = speed_squared = 0.0
         for axis in range(state.shape[1]):
-            place = state[POSITION, axis, SPACECRAFT] + share_of_relative * state[POSITION, axis, RELATIVE]
-            speed = state[VELOCITY, axis, SPACECRAFT] + share_of_relative * state[VELOCITY, axis, RELATIVE]
+            place = (
+                state[POSITION, axis, SPACECRAFT]
+                + share_of_relative * state[POSITION, axis, RELATIVE]
+            )
+            speed = (
+                state[VELOCITY, axis, SPACECRAFT]
+                + share_of_relative * state[VELOCITY, axis, RELATIVE]
+            )
             squared += place * place
             speed_squared += speed * speed
         of_orbit = gravitational_parameter_m3_s2 / math.sqrt(squared)
@@ -291,10 +351,13 @@ def copy_state(state: Floats, copy: Floats) -> None:
 
 @inlined
 def products(state: Floats) -> tuple[float, float]:
-    """Return r . v, which is zero at the closest approach, and its rate v . v + r . a, of the relative motion."""
+    """Return r . v, which is zero at the closest approach, and its rate v . v + r . a, of the
+    relative motion.
+    """
     radial = rate = 0.0
     for axis in range(state.shape[1]):
-        place, speed = state[POSITION, axis, RELATIVE], state[VELOCITY, axis, RELATIVE]
+        place = state[POSITION, axis, RELATIVE]
+        speed = state[VELOCITY, axis, RELATIVE]
         radial += place * speed
         rate += speed * speed + place * state[ACCELERATION, axis, RELATIVE]
     return radial, rate
@@ -304,14 +367,16 @@ def products(state: Floats) -> tuple[float, float]:
 def turning_times(state: Floats, duration_s: float) -> tuple[float, float]:
     """Return the times within a leap at which the rate of r . v is zero, in increasing order, s.
 
-    Both are `duration_s` without such a time; r . v is monotone between the ends of the leap and these times. With the
-    acceleration a of the start of the leap its rate is v . v + r . a + 3 v . a t + 1.5 a . a t^2. It has no zero in a
-    leap in which the acceleration changes the velocity only little.
+    Both are `duration_s` without such a time; r . v is monotone between the ends of the leap and
+    these times. With the acceleration a of the start of the leap its rate is v . v + r . a + 3 v .
+    a t + 1.5 a . a t^2. It has no zero in a leap in which the acceleration changes the velocity
+    only little.
     """
     _, constant = products(state)
     linear = quadratic = 0.0
     for axis in range(state.shape[1]):
-        speed, acceleration = state[VELOCITY, axis, RELATIVE], state[ACCELERATION, axis, RELATIVE]
+        speed = state[VELOCITY, axis, RELATIVE]
+        acceleration = state[ACCELERATION, axis, RELATIVE]
         linear += 3.0 * speed * acceleration
         quadratic += 1.5 * acceleration * acceleration
     discriminant = linear * linear - 4.0 * quadratic * constant
@@ -321,8 +386,10 @@ def turning_times(state: Floats, duration_s: float) -> tuple[float, float]:
     root = math.sqrt(discriminant)
     # The sum of two terms of one sign, and the other zero from the product of both.
     sum_of_both = -0.5 * (linear + math.copysign(root, linear))
-    one, other = sum_of_both / quadratic, constant / sum_of_both
-    first, second = min(one, other), max(one, other)
+    one = sum_of_both / quadratic
+    other = constant / sum_of_both
+    first = min(one, other)
+    second = max(one, other)
     if first <= 0.0:
         first = second
     if not 0.0 < first < duration_s:
@@ -339,10 +406,11 @@ def approach(
     stage: Floats,
     start: Floats,
 ) -> None:
-    """Advance a state to the closest approach, at most `longest_s` later: Newton's method on r . v = 0, or bisection.
+    """Advance a state to the closest approach, at most `longest_s` later: Newton's method on r . v
+    = 0, or bisection.
 
-    r . v is negative now and not negative after `longest_s`, and monotone between. `start` is memory of the shape of
-    the state.
+    r . v is negative now and not negative after `longest_s`, and monotone between. `start` is
+    memory of the shape of the state.
     """
     copy_state(state, start)
     moment = 0.0
@@ -357,7 +425,8 @@ def approach(
     if abs(radial) <= CONVERGED * longest_s * rate:
         return
 
-    lower, upper = 0.0, longest_s
+    lower = 0.0
+    upper = longest_s
     for _ in range(HALVINGS):
         middle = 0.5 * (lower + upper)
         copy_state(start, state)
@@ -371,7 +440,9 @@ def approach(
 
 @inlined
 def keep_closest(state: Floats, closest_m: Floats) -> None:
-    """Write the relative position of a state if it is nearer than the position of `closest_m`, shape (A + 1,)."""
+    """Write the relative position of a state if it is nearer than the position of `closest_m`,
+    shape (A + 1,).
+    """
     squared = kept = 0.0
     for axis in range(state.shape[1]):
         squared += state[POSITION, axis, RELATIVE] * state[POSITION, axis, RELATIVE]
@@ -392,10 +463,12 @@ def approach_within(
 ) -> None:
     """Keep the closest approaches within a leap that starts at a state: `keep_closest`.
 
-    They are the start, if the object recedes there, and the times at which r . v becomes positive. `scratch` is memory
-    of three states.
+    They are the start, if the object recedes there, and the times at which r . v becomes positive.
+    `scratch` is memory of three states.
     """
-    trial, stage, start = scratch[0], scratch[1], scratch[2]
+    trial = scratch[0]
+    stage = scratch[1]
+    start = scratch[2]
     radial, _ = products(before)
     if radial >= 0.0:
         keep_closest(before, closest_m)
@@ -411,9 +484,12 @@ def approach_within(
             copy_state(before, trial)
             if begin > 0.0:
                 leap(trial, manoeuvre_m_s2, gravitational_parameter_m3_s2, begin, stage)
-            approach(trial, manoeuvre_m_s2, gravitational_parameter_m3_s2, end - begin, stage, start)
+            approach(
+                trial, manoeuvre_m_s2, gravitational_parameter_m3_s2, end - begin, stage, start
+            )
             keep_closest(trial, closest_m)
-        begin, radial = end, next_radial
+        begin = end
+        radial = next_radial
 
 
 @allocation_free
@@ -424,11 +500,14 @@ def arrive(
     acceleration_error_m_s2: float,
     stage: Floats,
 ) -> float:
-    """Advance a state to x = 0 without impulses, and return the time, s: Newton's method in leaps of limited length."""
+    """Advance a state to x = 0 without impulses, and return the time, s: Newton's method in leaps
+    of limited length.
+    """
     total = 0.0
     last = 0
     while last < NEWTON_STEPS:
-        x, speed = state[POSITION, X, RELATIVE], state[VELOCITY, X, RELATIVE]
+        x = state[POSITION, X, RELATIVE]
+        speed = state[VELOCITY, X, RELATIVE]
         rest = -x / speed
         if speed >= 0.0 or abs(rest) <= 1e-16 * total:
             return float(total + rest)
@@ -443,8 +522,12 @@ def arrive(
 
 
 @entry
-def accelerate_all(motion: Floats, manoeuvre_m_s2: Floats, gravitational_parameter_m3_s2: float) -> None:
-    """Write the accelerations of all states, shape (B, 4, A + 1, 2); manoeuvres have the shape (B, A)."""
+def accelerate_all(
+    motion: Floats, manoeuvre_m_s2: Floats, gravitational_parameter_m3_s2: float
+) -> None:
+    """Write the accelerations of all states, shape (B, 4, A + 1, 2); manoeuvres have the shape (B,
+    A).
+    """
     for b in range(len(motion)):
         accelerate(motion[b], manoeuvre_m_s2[b], gravitational_parameter_m3_s2)
 
@@ -459,7 +542,8 @@ def arrive_all(
     arrival_s: Floats,
 ) -> None:
     """Write the times to x = 0 of all states."""
-    state, stage = scratch[0], scratch[1]
+    state = scratch[0]
+    stage = scratch[1]
     for b in range(len(motion)):
         copy_state(motion[b], state)
         error = acceleration_error_m_s2[b]
@@ -478,14 +562,17 @@ def advance_all(
 ) -> None:
     """Advance all states by a step, and write the closest approaches within it: see `Passage`.
 
-    The length of a leap depends on the state of the engagement alone, so a run does not depend on the others of its
-    batch. `passage` is whether the object has passed, the time of arrival, s, and the nearest relative positions so
-    far, m, shape (B, A + 1).
+    The length of a leap depends on the state of the engagement alone, so a run does not depend on
+    the others of its batch. `passage` is whether the object has passed, the time of arrival, s, and
+    the nearest relative positions so far, m, shape (B, A + 1).
     """
-    before, stage = scratch[0], scratch[2]
+    before = scratch[0]
+    stage = scratch[2]
     passed, arrival_s, closest_m = passage
     for b in range(len(motion)):
-        state, manoeuvre, error = motion[b], manoeuvre_m_s2[b], acceleration_error_m_s2[b]
+        state = motion[b]
+        manoeuvre = manoeuvre_m_s2[b]
+        error = acceleration_error_m_s2[b]
         left = step_s
         while left > 0.0:
             longest = longest_leap_s(state, gravitational_parameter_m3_s2, error)
@@ -495,7 +582,14 @@ def advance_all(
             leap(state, manoeuvre, gravitational_parameter_m3_s2, duration, stage)
             is_receding = products(state)[0] >= 0.0
             if is_receding or turning_times(before, duration)[0] < duration:
-                approach_within(before, manoeuvre, gravitational_parameter_m3_s2, duration, scratch[1:], closest_m[b])
+                approach_within(
+                    before,
+                    manoeuvre,
+                    gravitational_parameter_m3_s2,
+                    duration,
+                    scratch[1:],
+                    closest_m[b],
+                )
             if is_receding and not passed[b]:
                 passed[b] = True
                 to_zero = arrive(before, manoeuvre, gravitational_parameter_m3_s2, error, stage)

@@ -1,8 +1,9 @@
 """Misses that the set contains when control ends for a label.
 
-Control ends for a label when it leaves the set below the range threshold, and for all labels after the last scheduled
-impulse, after a cut-off, or with the budget spent. All states of a section then agree with everything that was
-measured until control ended, so that each of them may be the true one.
+Control ends for a label when it leaves the set below the range threshold, and for all labels after
+the last scheduled impulse, after a cut-off, or with the budget spent. All states of a section then
+agree with everything that was measured until control ended, so that each of them may be the true
+one.
 """
 
 from __future__ import annotations
@@ -27,18 +28,20 @@ class LabelEnds:
 
     Notes
     -----
-    Misses along y and z are combined as in Phi: a section in space is the product of both planes. Labels between the
-    stored ones are not considered.
+    Misses along y and z are combined as in Phi: a section in space is the product of both planes.
+    Labels between the stored ones are not considered.
     """
 
     def __init__(self, model: SetModel, batch: int) -> None:
-        self._model, self._laws = model, section_laws(model)
+        self._model = model
+        self._laws = section_laws(model)
         self.published_m: Floats = np.zeros(batch)
         self.left: Flags = np.zeros(batch, dtype=bool)
         self._exists = np.zeros(batch, dtype=bool)
         # Without control, no later section counts.
         self._is_over = np.zeros(batch, dtype=bool)
-        # Sections whose control has ended: engagement, label and misses. Impulses move them until their range is zero.
+        # Sections whose control has ended: engagement, label and misses. Impulses move them until
+        # their range is zero.
         self._of = np.empty(0, dtype=np.int64)
         self._labels_m = np.empty(0)
         self._misses_m = np.empty((2, len(self._laws), 0))
@@ -59,7 +62,9 @@ class LabelEnds:
         self._misses_m[0] -= (impulse + doubt)[:, self._of] * to_go_s
         self._misses_m[1] -= (impulse - doubt)[:, self._of] * to_go_s
 
-    def end(self, left: Flags, living: Flags, control_is_over: Flags, labels_m: Floats, misses_m: Floats) -> None:
+    def end(
+        self, left: Flags, living: Flags, control_is_over: Flags, labels_m: Floats, misses_m: Floats
+    ) -> None:
         """Add the sections whose control ends in this step.
 
         Parameters
@@ -74,7 +79,8 @@ class LabelEnds:
             Minimum and maximum predicted miss of each section along each lateral axis, m.
         """
         of, slots = np.nonzero(np.where(control_is_over[:, None], living, left))
-        leaves, counts = left[of, slots], ~self._is_over[of]
+        leaves = left[of, slots]
+        counts = ~self._is_over[of]
         misses = misses_m[:, :, of, slots]
         self.left[of[leaves]] = True
         np.maximum.at(self.published_m, of[leaves], _max(misses)[leaves])
@@ -85,10 +91,11 @@ class LabelEnds:
         self._misses_m = np.concatenate((self._misses_m, misses[:, :, counts]), axis=2)
 
     def any_state_miss_m(self, results: Results) -> Floats:
-        """Return the maximum miss of a state that the set contained when control ended for its label, m, shape (B,).
+        """Return the maximum miss of a state that the set contained when control ended for its
+        label, m, shape (B,).
 
-        The true state is such a state if it was always inside its section. Where the set became empty, or no section
-        has ended, it is the only one.
+        The true state is such a state if it was always inside its section. Where the set became
+        empty, or no section has ended, it is the only one.
         """
         ended = self._exists & ~results.set_emptied
         of_truth = np.where(ended & ~results.truth_kept, 0.0, results.miss_m)
@@ -97,7 +104,8 @@ class LabelEnds:
         return np.maximum(np.where(ended, of_sections, 0.0), of_truth)
 
     def _scale(self, labels: Floats) -> Floats:
-        """Return the maximum 1 + eta of a label: a length of the guaranteed model times 1 + eta is the true one.
+        """Return the maximum 1 + eta of a label: a length of the guaranteed model times 1 + eta is
+        the true one.
 
         The label is the true range at t = 0 divided by 1 + eta.
         """
@@ -109,5 +117,7 @@ class LabelEnds:
 
 
 def _max(misses: Floats) -> Floats:
-    """Return the maximum modulus of minimum and maximum misses of shape (2, C, ...), shape (...)."""
+    """Return the maximum modulus of minimum and maximum misses of shape (2, C, ...), shape
+    (...).
+    """
     return np.asarray(np.hypot.reduce(np.maximum(misses[1], -misses[0]), axis=0))

@@ -11,7 +11,14 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    wait,
+)
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from multiprocessing.synchronize import Lock
@@ -32,7 +39,9 @@ _PARENT_CHECK_S = 0.5
 
 
 class CampaignNoise(Enum):
-    """Measurement noise of a campaign: a `NoiseKind`, MIXED (random in even runs, game in odd ones), or OWN."""
+    """Measurement noise of a campaign: a `NoiseKind`, MIXED (random in even runs, game in odd
+    ones), or OWN.
+    """
 
     RANDOM = "random"
     GAUSSIAN = "gaussian"
@@ -44,7 +53,9 @@ class CampaignNoise(Enum):
     @property
     def kinds(self) -> tuple[CampaignNoise, ...]:
         """Noises of run 0, 1, 2, ..., repeated."""
-        return (CampaignNoise.RANDOM, CampaignNoise.GAME) if self is CampaignNoise.MIXED else (self,)
+        return (
+            (CampaignNoise.RANDOM, CampaignNoise.GAME) if self is CampaignNoise.MIXED else (self,)
+        )
 
     def of_run(self, run: int) -> CampaignNoise:
         """Return the noise of a run."""
@@ -89,21 +100,23 @@ class Task:
 def simulate_tasks(
     tasks: Iterable[Task], executor: Executor | None = None, workers: int | None = None
 ) -> Generator[tuple[Task, Results], None, None]:
-    """Simulate tasks on an executor and yield each with its results as soon as it is finished, in any order.
+    """Simulate tasks on an executor and yield each with its results as soon as it is finished, in
+    any order.
 
-    The results of a run depend neither on the executor nor on the other runs of its task. When the generator is closed
-    or ends with an error, tasks that have not started are cancelled, and threads stop after their current step.
+    The results of a run depend neither on the executor nor on the other runs of its task. When the
+    generator is closed or ends with an error, tasks that have not started are cancelled, and
+    threads stop after their current step.
 
     Parameters
     ----------
     tasks : iterable of Task
         Tasks, of which a limited number is taken at a time.
     executor : Executor or None
-        An executor of `concurrent.futures`, or one with the same interface. None uses threads of this process: the
-        kernels release the interpreter's lock.
+        An executor of `concurrent.futures`, or one with the same interface. None uses threads of
+        this process: the kernels release the interpreter's lock.
     workers : int or None
-        Number of threads, by default one per core; with an executor the number of tasks that are submitted at a time,
-        by default two per core.
+        Number of threads, by default one per core; with an executor the number of tasks that are
+        submitted at a time, by default two per core.
 
     Raises
     ------
@@ -116,9 +129,12 @@ def simulate_tasks(
     stopped = threading.Event()
     if executor is None:
         pool: Executor = ThreadPoolExecutor(workers or cores)
-        at_once, check = (workers or cores) + 1, stopped.is_set
+        at_once = (workers or cores) + 1
+        check = stopped.is_set
     else:
-        pool, at_once, check = executor, workers or 2 * cores, None
+        pool = executor
+        at_once = workers or 2 * cores
+        check = None
     waiting = iter(tasks)
     running: dict[Future[Results], Task] = {}
     can_wait = True
@@ -131,7 +147,9 @@ def simulate_tasks(
             for future in wait(running, return_when=FIRST_COMPLETED).done:
                 yield running.pop(future), future.result()
     except MemoryError:
-        can_wait = False  # Numba may still hold its lock, and a running task would wait for it for ever
+        can_wait = (
+            False  # Numba may still hold its lock, and a running task would wait for it for ever
+        )
         raise
     finally:
         stopped.set()
@@ -142,10 +160,11 @@ def simulate_tasks(
 
 
 def simulate_task(task: Task, stopped: Callable[[], bool] | None = None) -> Results:
-    """Simulate the runs of a task and return the results in the order of the runs; see `simulate_tasks`.
+    """Simulate the runs of a task and return the results in the order of the runs; see
+    `simulate_tasks`.
 
-    The simulation ends with an InterruptedError after a step at which `stopped` returns true. A FloatingPointError is
-    raised if results are not finite.
+    The simulation ends with an InterruptedError after a step at which `stopped` returns true. A
+    FloatingPointError is raised if results are not finite.
     """
     need_versions(task.versions)
 
@@ -157,7 +176,9 @@ def simulate_task(task: Task, stopped: Callable[[], bool] | None = None) -> Resu
 
     noise = task.noise or CampaignNoise(task.scenario.noise.value)
     kind = noise if isinstance(noise, CampaignNoise) else CampaignNoise.OWN
-    runs_by_noise = {each: [run for run in task.runs if kind.of_run(run) is each] for each in kind.kinds}
+    runs_by_noise = {
+        each: [run for run in task.runs if kind.of_run(run) is each] for each in kind.kinds
+    }
     results = join(
         [
             simulate_runs(
@@ -175,7 +196,9 @@ def simulate_task(task: Task, stopped: Callable[[], bool] | None = None) -> Resu
         ]
     )
     if not is_finite(results):
-        raise FloatingPointError(f"results of runs {task.runs[0]} to {task.runs[-1]} are not finite")
+        raise FloatingPointError(
+            f"results of runs {task.runs[0]} to {task.runs[-1]} are not finite"
+        )
     return results.take(np.argsort(results.runs))
 
 
@@ -187,17 +210,20 @@ def is_finite(results: Results) -> bool:
 
 @contextlib.contextmanager
 def worker_processes(count: int) -> Iterator[Executor]:
-    """Start processes that simulate tasks, and end them on exit from the context, after an error at once.
+    """Start processes that simulate tasks, and end them on exit from the context, after an error at
+    once.
 
-    Half of the work of an engagement needs the interpreter, which threads share and processes do not. A process takes
-    one or two seconds to start. Processes are spawned: forked ones would keep the lock of a campaign's folder after
-    this process has ended.
+    Half of the work of an engagement needs the interpreter, which threads share and processes do
+    not. A process takes one or two seconds to start. Processes are spawned: forked ones would keep
+    the lock of a campaign's folder after this process has ended.
     """
     before = set(multiprocessing.active_children())
     spawning = multiprocessing.get_context("spawn")
     level = logging.ERROR if NOTICE.is_given else LOGGER.getEffectiveLevel()
     notice = _WorkerNotice(level, NOTICE.purpose, spawning.Lock())
-    pool = ProcessPoolExecutor(count, spawning, initializer=_start_worker, initargs=(os.getpid(), notice))
+    pool = ProcessPoolExecutor(
+        count, spawning, initializer=_start_worker, initargs=(os.getpid(), notice)
+    )
     try:
         yield pool
     except BaseException:
@@ -209,7 +235,8 @@ def worker_processes(count: int) -> Iterator[Executor]:
 
 
 class _WorkerNotice(NamedTuple):
-    """The notice about compiling in worker processes: the level of its logger, its purpose, and who may give it.
+    """The notice about compiling in worker processes: the level of its logger, its purpose, and who
+    may give it.
 
     Only the process that acquires the lock, which nobody releases, gives the notice.
     """
@@ -228,7 +255,9 @@ def _start_worker(parent: int, notice: _WorkerNotice) -> None:
 
 
 def _end_with(parent: int) -> None:
-    """Ignore SIGINT (the parent handles it); exit when the parent dies, which the pool does not do."""
+    """Ignore SIGINT (the parent handles it); exit when the parent dies, which the pool does not
+    do.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def watch() -> None:

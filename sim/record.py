@@ -38,7 +38,8 @@ class RecordedInconsistency:
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """One engagement, step by step: arrays have the shape (N, ...) for N steps, (N, C, ...) along C lateral axes.
+    """One engagement, step by step: arrays have the shape (N, ...) for N steps, (N, C, ...) along C
+    lateral axes.
 
     NaN is an unknown value.
 
@@ -53,14 +54,15 @@ class Record:
     true_angle_rad, true_rate_rad_s : ndarray, shape (N, C)
         True line of sight in the plane of x and each axis.
     measured : mapping of str to ndarray
-        Measured values by sensor: "angle" (rad) and "rate" (rad/s), shape (N, C), "range" (m), shape (N,). NaN where
-        the sensor did not measure.
+        Measured values by sensor: "angle" (rad) and "rate" (rad/s), shape (N, C), "range" (m),
+        shape (N,). NaN where the sensor did not measure.
     predicted_miss_m : ndarray, shape (N, C, 2)
         (pi_*, pi^*) after the measurement and before the impulse; NaN without a set.
     impulse_m_s : ndarray, shape (N, C)
         Impulses of the thruster, before errors of execution.
     truth_margin_m : ndarray, shape (N,)
-        Signed margin of the true state in its section at the last measurement; NaN before the first.
+        Signed margin of the true state in its section at the last measurement; NaN before the
+        first.
     sections : tuple of tuple of Section
         Sections after the measurement of each step, in ascending order of range.
     noise : str or None
@@ -107,7 +109,8 @@ class Record:
     @property
     def ending(self) -> str:
         """The outcome, and if the body has a size `hit`, or `missed` and why."""
-        result, cause = self.result, self.result.causes[0]
+        result = self.result
+        cause = self.result.causes[0]
         return ending(result.outcomes[0].value, result.hit.tolist()[0], cause and cause.value)
 
     def __repr__(self) -> str:
@@ -115,9 +118,9 @@ class Record:
         inside = "inside" if result.truth_kept[0] else "not inside"
         exceeds = "" if result.phi_held.filled(True)[0] else ", miss above the bound Phi"
         return (
-            f"<engagement of {self.scenario.name}, seed {self.seed}, run {self.run}: {self.strategy}, "
-            f"{self.noise_name} noise, {self.steps} steps\n {self.ending}, "
-            f"miss {result.miss_m[0]:.4g} m for {result.impulse_m_s[0]:.4g} m/s, "
+            f"<engagement of {self.scenario.name}, seed {self.seed}, run {self.run}: "
+            f"{self.strategy}, {self.noise_name} noise, {self.steps} steps\n"
+            f" {self.ending}, miss {result.miss_m[0]:.4g} m for {result.impulse_m_s[0]:.4g} m/s, "
             f"true state {inside} its section at every step{exceeds}>"
         )
 
@@ -152,8 +155,8 @@ def fly_one(
     Raises
     ------
     TypeError, ValueError
-        If `run` or `seed` is not a whole number, the strategy is not registered, or a strategy or noise of your own
-        returns a value that is not allowed.
+        If `run` or `seed` is not a whole number, the strategy is not registered, or a strategy or
+        noise of your own returns a value that is not allowed.
     """
     WHOLE.need("run", run)
     WHOLE.need("seed", seed)
@@ -200,5 +203,7 @@ def fly_one(
         truth_margin_m=np.array([margin.filled(np.nan)[0] for margin in flight.truth_margins_m()]),
         sections=tuple(sections),
         noise=None if own_noise is None else noise_name(own_noise),
-        inconsistency=RecordedInconsistency(int(at_step[0]), float(label[0])) if at_step.count() else None,
+        inconsistency=RecordedInconsistency(int(at_step[0]), float(label[0]))
+        if at_step.count()
+        else None,
     )

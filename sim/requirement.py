@@ -76,7 +76,9 @@ class Requirement(Checked):
         return self.quantile.quantity
 
     def numbers(self, column: Any) -> Floats:
-        """Return the values of the quantity in a table of runs; a run without one does not satisfy the bound."""
+        """Return the values of the quantity in a table of runs; a run without one does not satisfy
+        the bound.
+        """
         return np.asarray(column.to_numpy(np.float64, na_value=np.inf))
 
     def holds(self, values: Floats) -> Flags:
@@ -86,12 +88,14 @@ class Requirement(Checked):
 
 @dataclass(frozen=True)
 class HitRequirement(Checked):
-    """A lower bound of the probability of a hit, `hit>=0.95`, or of no miss of one cause, `no-engine>=0.99`.
+    """A lower bound of the probability of a hit, `hit>=0.95`, or of no miss of one cause,
+    `no-engine>=0.99`.
 
     Parameters
     ----------
     share : float
-        Minimum share of the runs that hit, or that hit or miss because of something else, between 0 and 1.
+        Minimum share of the runs that hit, or that hit or miss because of something else, between 0
+        and 1.
     cause : MissCause or None
         None is any miss.
     """
@@ -118,7 +122,9 @@ class HitRequirement(Checked):
         return self.share
 
     def numbers(self, column: Any) -> Floats:
-        """Return 1 for the runs of a table that hit, or do not have the cause, and 0 for the others."""
+        """Return 1 for the runs of a table that hit, or do not have the cause, and 0 for the
+        others.
+        """
         if self.cause is not None:
             return np.asarray(column != self.cause.value, dtype=np.float64)
         return np.asarray(column.to_numpy(np.float64, na_value=0.0))
@@ -132,7 +138,9 @@ AnyRequirement = Requirement | HitRequirement
 
 
 def parse_requirement(text: str) -> AnyRequirement:
-    """Read a requirement, in which `miss_m<10` is the 99 % quantile; raise ValueError for any other text."""
+    """Read a requirement, in which `miss_m<10` is the 99 % quantile; raise ValueError for any other
+    text.
+    """
     match = _FORM.fullmatch(text[:100])
     if match is None:
         raise ValueError(
@@ -141,7 +149,9 @@ def parse_requirement(text: str) -> AnyRequirement:
             f"{', '.join(QUANTITIES)}; found {text[:100]!r}"
         )
     if match["share"] is not None:
-        return HitRequirement(float(match["share"]), MissCause(match["cause"]) if match["cause"] else None)
+        return HitRequirement(
+            float(match["share"]), MissCause(match["cause"]) if match["cause"] else None
+        )
     quantile = QuantileName.of_percent(match["quantity"], match["level"] or _DEFAULT_LEVEL)
     return Requirement(quantile, float(match["bound"]))
 
@@ -155,13 +165,14 @@ class Verdict:
     decision : Decision
         Met if the interval is on the right side of the bound, not met if it is on the wrong side.
     value : float or None
-        The required quantile of the sample, in its unit, or the share of hits; None if the sample does not show it
-        (`infoset.sim.statistics.shows`), or if too many runs have no value.
+        The required quantile of the sample, in its unit, or the share of hits; None if the sample
+        does not show it (`infoset.sim.statistics.shows`), or if too many runs have no value.
     lower, upper : float or None
         Ends of its 95 % confidence interval; None if the sample is too small to bound that side.
     runs_needed : int or None
-        Approximate number of runs that decide with `watched=True`, if the share of runs that satisfy the bound stays
-        the same; None if it is over `MAX_RUNS_NEEDED`, because the estimate is at the bound.
+        Approximate number of runs that decide with `watched=True`, if the share of runs that
+        satisfy the bound stays the same; None if it is over `MAX_RUNS_NEEDED`, because the estimate
+        is at the bound.
     known : int
         Runs with a value of the quantity; the others do not satisfy the bound.
     """
@@ -183,8 +194,8 @@ def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Verd
     values : ndarray, shape (n,)
         The required quantity, in the order of the runs: `requirement.numbers`.
     watched : bool
-        Whether the number of runs may depend on the values, because runs were added after a look at them. False: the
-        number of runs was fixed before.
+        Whether the number of runs may depend on the values, because runs were added after a look at
+        them. False: the number of runs was fixed before.
 
     Raises
     ------
@@ -193,22 +204,26 @@ def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Verd
 
     Notes
     -----
-    Let K of n runs satisfy the bound, and q be the required share. The requirement is met if the hypothesis that the
-    true share is at most q is rejected, and not met if the hypothesis that it is at least q is rejected, each at the
-    level 2.5 %. With a fixed n the tests are the exact binomial ones. They are equivalent to a comparison of the bound
-    with the interval of order statistics of `estimate_quantiles`, or with the Clopper-Pearson interval.
+    Let K of n runs satisfy the bound, and q be the required share. The requirement is met if the
+    hypothesis that the true share is at most q is rejected, and not met if the hypothesis that it
+    is at least q is rejected, each at the level 2.5 %. With a fixed n the tests are the exact
+    binomial ones. They are equivalent to a comparison of the bound with the interval of order
+    statistics of `estimate_quantiles`, or with the Clopper-Pearson interval.
 
-    Repeated looks at such an interval until it decides would make errors more frequent than 5 %. If `watched`, the
-    tests are those of a confidence sequence, which holds for all n at once: the likelihood ratio of a uniform mixture
-    of all shares above (below) q to the share q exceeds 40 at any n with a probability of at most 2.5 % if the true
-    share is at most (at least) q. The first n that decides is final: more runs never change a decision.
+    Repeated looks at such an interval until it decides would make errors more frequent than 5 %. If
+    `watched`, the tests are those of a confidence sequence, which holds for all n at once: the
+    likelihood ratio of a uniform mixture of all shares above (below) q to the share q exceeds 40 at
+    any n with a probability of at most 2.5 % if the true share is at most (at least) q. The first n
+    that decides is final: more runs never change a decision.
 
     References
     ----------
-    Robbins (1970), Statistical methods related to the law of the iterated logarithm. Howard, Ramdas, McAuliffe, Sekhon
-    (2021), Time-uniform, nonparametric, nonasymptotic confidence sequences, Annals of Statistics 49(2).
+    Robbins (1970), Statistical methods related to the law of the iterated logarithm. Howard,
+    Ramdas, McAuliffe, Sekhon (2021), Time-uniform, nonparametric, nonasymptotic confidence
+    sequences, Annals of Statistics 49(2).
     """
-    size, share = values.size, requirement.share
+    size = values.size
+    share = requirement.share
     if not size or np.isnan(values).any():
         raise ValueError("a requirement needs at least one value, and none may be NaN")
     holding = np.cumsum(requirement.holds(values))
@@ -224,20 +239,26 @@ def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Verd
         upper = _finite(ordered[last - 1]) if last <= size else None
     else:
         estimate = estimate_hits(int(holding[-1]), size, CONFIDENCE)
-        value, lower, upper = estimate.probability, estimate.lower, estimate.upper
+        value = estimate.probability
+        lower = estimate.lower
+        upper = estimate.upper
         if watched:
             lower, upper = share_interval(int(holding[-1]), size)
     known = int(np.isfinite(values).sum())
     if watched:
-        met, missed = (p_value <= _TAIL for p_value in p_values(np.arange(1, size + 1), holding, share))
+        met, missed = (
+            p_value <= _TAIL for p_value in p_values(np.arange(1, size + 1), holding, share)
+        )
     else:
-        met, missed = holding[-1:] >= last, holding[-1:] < first
+        met = holding[-1:] >= last
+        missed = holding[-1:] < first
     decided = np.flatnonzero(met | missed)
     if not decided.size:
         needed = runs_needed(int(holding[-1]), size, share)
         return Verdict(Decision.UNDECIDED, size, value, lower, upper, needed, known)
     decision = Decision.MET if met[decided[0]] else Decision.NOT_MET
-    # A decision at an earlier run stays valid, although the last interval may contain the bound again.
+    # A decision at an earlier run stays valid, although the last interval may contain the bound
+    # again.
     if (decision is Decision.MET) == isinstance(requirement, Requirement):
         upper = requirement.bound if upper is None else min(upper, requirement.bound)
     else:
@@ -253,8 +274,8 @@ def _finite(value: float) -> float | None:
 def _ranks(size: int, share: float, watched: bool) -> tuple[int, int]:
     """Return the ranks of the order statistics that enclose a quantile, as `order_statistics`.
 
-    The requirement is met if at least as many runs as the second rank satisfy the bound, and not met if fewer than the
-    first do.
+    The requirement is met if at least as many runs as the second rank satisfy the bound, and not
+    met if fewer than the first do.
     """
     if not watched:
         return order_statistics(size, share, CONFIDENCE)
@@ -263,7 +284,9 @@ def _ranks(size: int, share: float, watched: bool) -> tuple[int, int]:
 
 
 def share_interval(count: int, runs: int) -> tuple[float, float]:
-    """Return the 95 % confidence interval of a share after `runs` runs of a confidence sequence (`judge`)."""
+    """Return the 95 % confidence interval of a share after `runs` runs of a confidence sequence
+    (`judge`).
+    """
 
     def end(index: int, outside: float) -> float:
         inside = count / runs
@@ -279,20 +302,24 @@ def share_interval(count: int, runs: int) -> tuple[float, float]:
 
 
 def decides(runs: ArrayLike, count: ArrayLike, share: float) -> Flags:
-    """Return whether a confidence sequence decides a requirement: `count` of `runs` satisfy its bound (`judge`)."""
+    """Return whether a confidence sequence decides a requirement: `count` of `runs` satisfy its
+    bound (`judge`).
+    """
     return np.asarray(np.minimum(*p_values(runs, count, share)) <= _TAIL)
 
 
 def p_values(runs: ArrayLike, count: ArrayLike, share: ArrayLike) -> tuple[Floats, Floats]:
-    """Return the p-values of the hypotheses that the true share is at most, and at least, a given share.
+    """Return the p-values of the hypotheses that the true share is at most, and at least, a given
+    share.
 
-    `count` is the number of those of n `runs` that satisfy the bound; it may be fractional. The values are inverse
-    likelihood ratios, and hold for all numbers of runs at once: see `judge`.
+    `count` is the number of those of n `runs` that satisfy the bound; it may be fractional. The
+    values are inverse likelihood ratios, and hold for all numbers of runs at once: see `judge`.
     """
     from scipy.special import betainc, betaln  # slow to load, and few commands need it
 
     n, k, q = (np.asarray(values, dtype=np.float64) for values in (runs, count, share))
-    # The integral of the likelihood over the shares above q is an incomplete beta function; likewise below q.
+    # The integral of the likelihood over the shares above q is an incomplete beta function;
+    # likewise below q.
     likelihood = k * np.log(q) + (n - k) * np.log1p(-q) - betaln(k + 1.0, n - k + 1.0)
     with np.errstate(divide="ignore", over="ignore"):
         above = np.log1p(-q) + likelihood - np.log(betainc(n - k + 1.0, k + 1.0, 1.0 - q))
@@ -301,9 +328,11 @@ def p_values(runs: ArrayLike, count: ArrayLike, share: ArrayLike) -> tuple[Float
 
 
 def runs_needed(count: int, runs: int, share: float) -> int | None:
-    """Return the approximate number of runs that decide a requirement with `watched=True`; see `Verdict`.
+    """Return the approximate number of runs that decide a requirement with `watched=True`; see
+    `Verdict`.
 
-    None is more than `MAX_RUNS_NEEDED`. If all runs satisfy the bound so far, it is the minimum number that can decide.
+    None is more than `MAX_RUNS_NEEDED`. If all runs satisfy the bound so far, it is the minimum
+    number that can decide.
     """
 
     def deciding(sizes: Integers) -> Integers:

@@ -13,7 +13,16 @@ from numpy.typing import NDArray
 
 from infoset.arrays import Flags, Floats, Integers
 from infoset.set_queries import MaskedFloats
-from infoset.sim.columns import Cell, Column, columns, columns_with_values, csv_text, documented, fields_of, values_of
+from infoset.sim.columns import (
+    Cell,
+    Column,
+    columns,
+    columns_with_values,
+    csv_text,
+    documented,
+    fields_of,
+    values_of,
+)
 from infoset.sim.miss_cause import MissCause, count_causes
 from infoset.sim.statistics import HitEstimate, estimate_hits
 
@@ -21,7 +30,9 @@ MaskedFlags = np.ma.MaskedArray[tuple[int], np.dtype[np.bool_]]
 
 
 class GuaranteeWarning(UserWarning):
-    """A guarantee failed: a set lost the true state or became empty, or a miss exceeds the bound Phi."""
+    """A guarantee failed: a set lost the true state or became empty, or a miss exceeds the bound
+    Phi.
+    """
 
 
 class Outcome(Enum):
@@ -30,9 +41,11 @@ class Outcome(Enum):
     ARRIVED = "arrived"
     """The spacecraft flew to the closest approach, near or far, and no other outcome applies."""
     SET_EMPTY = "set-empty"
-    """A measurement left the set empty although no label was below the threshold: measurements and model disagree.
+    """A measurement left the set empty although no label was below the threshold: measurements and
+    model disagree.
 
-    With recovery the last consistent set is enlarged and guidance continues; without it no more impulses are given.
+    With recovery the last consistent set is enlarged and guidance continues; without it no more
+    impulses are given.
     """
     BUDGET_SPENT = "budget-spent"
     """The budget fell below the minimum impulse while the strategy still commanded one."""
@@ -41,12 +54,12 @@ class Outcome(Enum):
 
 
 _PHI = (
-    "Bound Phi of the miss (in the paper's model the published Phi, which is not a bound); unknown where no label "
-    "left, or the data exceeded their error bounds"
+    "Bound Phi of the miss (in the paper's model the published Phi, which is not a bound); "
+    "unknown where no label left, or the data exceeded their error bounds"
 )
 _MARGIN = (
-    "Smallest distance from the true state to the boundary of its section, negative outside; unknown where nothing was "
-    "measured"
+    "Smallest distance from the true state to the boundary of its section, negative outside; "
+    "unknown where nothing was measured"
 )
 _HELD = "Miss at most the guaranteed miss; unknown without a guarantee"
 _EMPTY = "A measurement left the set empty, whatever the outcome is"
@@ -68,23 +81,33 @@ _B_DOT_T = "B.T of the closest approach; unknown without a reference plane"
 class Results:
     """Results of a batch of B engagements.
 
-    A column of results is declared at its field here; CSV, JSON, Parquet and record files follow the declaration.
+    A column of results is declared at its field here; CSV, JSON, Parquet and record files follow
+    the declaration.
 
     Parameters
     ----------
     guarantees : bool
         Whether `guaranteed_miss_m` is a bound: the set's model is the guaranteed one.
     burns_m_s : ndarray, shape (B, n), or None
-        Moduli of the impulses at the times of the schedule, m/s; None without a schedule, and for results from files.
+        Moduli of the impulses at the times of the schedule, m/s; None without a schedule, and for
+        results from files.
     b_plane_t_rad : float or None
         Direction of the axis T of the B-plane from y toward z, rad; None without a reference plane.
     """
 
     runs: Integers = field(metadata=columns(Column("run", "", "Run number", int)))
-    miss_m: Floats = field(metadata=columns(Column("miss_m", "m", "Minimum distance between the centres of mass")))
-    impulse_m_s: Floats = field(metadata=columns(Column("impulse_m_s", "m/s", "Sum of the impulses' moduli")))
-    guaranteed_miss_m: MaskedFloats = field(metadata=columns(Column("guaranteed_miss_m", "m", _PHI, nullable=True)))
-    outcomes: tuple[Outcome, ...] = field(metadata=columns(Column("outcome", "", "How the engagement ended", Outcome)))
+    miss_m: Floats = field(
+        metadata=columns(Column("miss_m", "m", "Minimum distance between the centres of mass"))
+    )
+    impulse_m_s: Floats = field(
+        metadata=columns(Column("impulse_m_s", "m/s", "Sum of the impulses' moduli"))
+    )
+    guaranteed_miss_m: MaskedFloats = field(
+        metadata=columns(Column("guaranteed_miss_m", "m", _PHI, nullable=True))
+    )
+    outcomes: tuple[Outcome, ...] = field(
+        metadata=columns(Column("outcome", "", "How the engagement ended", Outcome))
+    )
     set_emptied: Flags = field(metadata=columns(Column("set_emptied", "", _EMPTY, bool)))
     hit: MaskedFlags = field(metadata=columns(Column("hit", "", _HIT, bool, nullable=True)))
     causes: tuple[MissCause | None, ...] = field(
@@ -93,12 +116,21 @@ class Results:
     unguided_miss_m: Floats = field(metadata=columns(Column("unguided_miss_m", "m", _UNGUIDED)))
     engine_corrects_m: Floats = field(metadata=columns(Column("engine_corrects_m", "m", _ENGINE)))
     budget_corrects_m: Floats = field(metadata=columns(Column("budget_corrects_m", "m", _BUDGET)))
-    last_possible_m: MaskedFloats = field(metadata=columns(Column("last_possible_m", "m", _LAST, nullable=True)))
-    truth_kept: Flags = field(
-        init=False, metadata=columns(Column("truth_kept", "", "True state inside its section at every step", bool))
+    last_possible_m: MaskedFloats = field(
+        metadata=columns(Column("last_possible_m", "m", _LAST, nullable=True))
     )
-    truth_margin_m: MaskedFloats = field(metadata=columns(Column("truth_margin_m", "m", _MARGIN, nullable=True)))
-    phi_held: MaskedFlags = field(init=False, metadata=columns(Column("phi_held", "", _HELD, bool, nullable=True)))
+    truth_kept: Flags = field(
+        init=False,
+        metadata=columns(
+            Column("truth_kept", "", "True state inside its section at every step", bool)
+        ),
+    )
+    truth_margin_m: MaskedFloats = field(
+        metadata=columns(Column("truth_margin_m", "m", _MARGIN, nullable=True))
+    )
+    phi_held: MaskedFlags = field(
+        init=False, metadata=columns(Column("phi_held", "", _HELD, bool, nullable=True))
+    )
     position_m: Floats = field(
         metadata=columns(
             _along_y("start_y_m", "m", "True y at the start, only in space"),
@@ -124,7 +156,8 @@ class Results:
         metadata=columns(_along_y("b_dot_t_m", "m", _B_DOT_T), _along_y("b_dot_r_m", "m", "B.R")),
     )
     redraws: Integers | None = field(
-        default=None, metadata=columns(Column("redraws", "", _REDRAWS, int, nullable=True, optional=True))
+        default=None,
+        metadata=columns(Column("redraws", "", _REDRAWS, int, nullable=True, optional=True)),
     )
     guarantees: bool = False
     burns_m_s: Floats | None = None
@@ -148,33 +181,52 @@ class Results:
 
     @property
     def missed(self) -> dict[str, Any]:
-        """Number of misses of each cause, and what explains them (`infoset.sim.miss_cause.count_causes`)."""
+        """Number of misses of each cause, and what explains them
+        (`infoset.sim.miss_cause.count_causes`).
+        """
         causes = np.array([cause and cause.value for cause in self.causes], dtype=object)
-        return count_causes(causes, self.unguided_miss_m, self.engine_corrects_m, self.last_possible_m.filled(0.0))
+        return count_causes(
+            causes, self.unguided_miss_m, self.engine_corrects_m, self.last_possible_m.filled(0.0)
+        )
 
     @property
     def failures(self) -> str:
-        """In how many runs a guarantee failed, as text: the set, or the bound Phi; empty if none did."""
+        """In how many runs a guarantee failed, as text: the set, or the bound Phi; empty if none
+        did.
+        """
         failed_sets = int((~self.truth_kept | self.set_emptied).sum())
         exceeded = int((~self.phi_held.filled(True)).sum())
         found = []
         if failed_sets:
-            found.append(f"in {failed_sets} of {len(self)} runs the set lost the true state or became empty")
+            found.append(
+                f"in {failed_sets} of {len(self)} runs the set lost the true state or became empty"
+            )
         if exceeded:
-            found.append(f"in {exceeded} of {int(self.phi_held.count())} runs the miss exceeds the bound Phi")
+            found.append(
+                f"in {exceeded} of {int(self.phi_held.count())} runs the miss exceeds the bound Phi"
+            )
         return ", ".join(found)
 
     @property
     def redrawn_share(self) -> float | None:
-        """Share of the normal starts that were outside the dispersion and drawn again; None for uniform starts."""
-        return None if self.redraws is None else float(1.0 - len(self) / (len(self) + self.redraws.sum()))
+        """Share of the normal starts that were outside the dispersion and drawn again; None for
+        uniform starts.
+        """
+        return (
+            None
+            if self.redraws is None
+            else float(1.0 - len(self) / (len(self) + self.redraws.sum()))
+        )
 
     def to_dict(self) -> dict[str, list[Any]]:
-        """Return the columns by name as plain values, one per run: texts for outcomes, None if unknown."""
+        """Return the columns by name as plain values, one per run: texts for outcomes, None if
+        unknown.
+        """
         return {column.name: values_of(self, column) for column in columns_with_values(self)}
 
     def to_csv(self) -> str:
-        """Return the columns as comma-separated values, one row per run; `infoset.save` writes them to a file.
+        """Return the columns as comma-separated values, one row per run; `infoset.save` writes them
+        to a file.
 
         An unknown value is an empty cell; numbers have all their digits.
         """
@@ -182,7 +234,9 @@ class Results:
         return csv_text(list(table), list(zip(*table.values(), strict=True)))
 
     def to_pandas(self) -> Any:
-        """Return the columns as a pandas `DataFrame`, one row per run, with the units in ``frame.attrs["units"]``."""
+        """Return the columns as a pandas `DataFrame`, one row per run, with the units in
+        ``frame.attrs["units"]``.
+        """
         import pandas as pd  # of the extra `campaign`
 
         frame = pd.DataFrame(self.to_dict())
@@ -195,15 +249,23 @@ class Results:
         def taken(values: Any) -> Any:
             if not isinstance(values, tuple | np.ndarray):
                 return values
-            return tuple(values[index] for index in indices) if isinstance(values, tuple) else values[indices]
+            return (
+                tuple(values[index] for index in indices)
+                if isinstance(values, tuple)
+                else values[indices]
+            )
 
         return Results(**{name: taken(getattr(self, name)) for name in _INPUTS})
 
     def __repr__(self) -> str:
-        miss, fuel = np.median(self.miss_m), np.median(self.impulse_m_s)
+        miss = np.median(self.miss_m)
+        fuel = np.median(self.impulse_m_s)
         hits = "" if self.hits is None else f", {self.hits.hits} hit"
         failures = f"; {self.failures}" if self.failures else ""
-        return f"<{len(self)} engagements{hits}: median miss {miss:.3g} m for {fuel:.4g} m/s{failures}>"
+        return (
+            f"<{len(self)} engagements{hits}: median miss {miss:.3g} m for {fuel:.4g} "
+            f"m/s{failures}>"
+        )
 
 
 def from_columns(
@@ -221,7 +283,9 @@ def from_columns(
         raise ValueError("columns must be a table, and guarantees true or false")
     arguments = fields_of(Results, table)
     burns = None if burns_m_s is None else np.array(burns_m_s, dtype=float)
-    if burns is not None and (burns.ndim != 2 or len(burns) != len(arguments["runs"]) or not np.isfinite(burns).all()):
+    if burns is not None and (
+        burns.ndim != 2 or len(burns) != len(arguments["runs"]) or not np.isfinite(burns).all()
+    ):
         raise ValueError("burns_m_s must have one row of numbers for each run")
     if b_plane_t_rad is not None and not np.isfinite(float(b_plane_t_rad)):
         raise ValueError("b_plane_t_rad must be a number")
@@ -229,18 +293,23 @@ def from_columns(
 
 
 def ending(outcome: str, hit: bool | None, cause: str | None) -> str:
-    """Return how an engagement ended as text: the outcome, and if the body has a size `hit`, or `missed` and why."""
+    """Return how an engagement ended as text: the outcome, and if the body has a size `hit`, or
+    `missed` and why.
+    """
     return outcome if hit is None else f"{outcome}, {'hit' if hit else f'missed ({cause})'}"
 
 
 def b_plane(lateral_m: Floats, t_rad: float | None) -> Floats:
-    """Return (B.T, B.R) of positions (y, z) of the object across the approach, shape (B, 2); (B, 0) without axes.
+    """Return (B.T, B.R) of positions (y, z) of the object across the approach, shape (B, 2); (B, 0)
+    without axes.
 
-    B points from the object to the spacecraft, opposite to (y, z). `t_rad` is the direction of T from y toward z.
+    B points from the object to the spacecraft, opposite to (y, z). `t_rad` is the direction of T
+    from y toward z.
     """
     if t_rad is None:
         return np.empty((len(lateral_m), 0))
-    cosine, sine = np.cos(t_rad), np.sin(t_rad)
+    cosine = np.cos(t_rad)
+    sine = np.sin(t_rad)
     return np.asarray(-lateral_m @ np.array([[cosine, -sine], [sine, cosine]]))
 
 

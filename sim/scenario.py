@@ -15,7 +15,17 @@ from infoset.arrays import Floats
 from infoset.guidance.noise import NoiseKind, NoiseSource, TieRule
 from infoset.guidance.strategy import Strategy
 from infoset.guidance.thruster import Thruster
-from infoset.limits import NUMBER, Checked, Description, Limits, Name, NotNegative, Positive, check_fields, shown
+from infoset.limits import (
+    NUMBER,
+    Checked,
+    Description,
+    Limits,
+    Name,
+    NotNegative,
+    Positive,
+    check_fields,
+    shown,
+)
 from infoset.model import SetModel, SetSettings, StateBox
 from infoset.sensors import AngleSensor, BearingSensor, Camera, RangeSensor, RateSensor, Sensor
 from infoset.sim.covariance import Covariance
@@ -25,13 +35,19 @@ LIGHT_M_S = 299_792_458.0
 
 @dataclass(frozen=True)
 class _Speed(Limits):
-    """A positive speed of a Newtonian motion: at most 1 % of the speed of light, where mistakes of units begin."""
+    """A positive speed of a Newtonian motion: at most 1 % of the speed of light, where mistakes of
+    units begin.
+    """
 
     def problem(self, value: object) -> str | None:
         """Return why a speed is not allowed, or None."""
         number: Any = value
         is_fast = super().problem(value) is None and number > 0.01 * LIGHT_M_S
-        return "is more than a hundredth of the speed of light; check its unit" if is_fast else super().problem(value)
+        return (
+            "is more than a hundredth of the speed of light; check its unit"
+            if is_fast
+            else super().problem(value)
+        )
 
 
 _SPEED = _Speed(above=0.0)
@@ -41,7 +57,9 @@ _SIGMA = Limits(minimum=0.01, maximum=10.0)
 MAX_STEPS = 100_000
 """Maximum number of steps of a flight; all random numbers are drawn before it starts."""
 MIN_SHARE_WITHIN = 0.01
-"""Minimum share of the starts of a covariance within the dispersion; a start is drawn again at most some 1000 times."""
+"""Minimum share of the starts of a covariance within the dispersion; a start is drawn again at most
+some 1000 times.
+"""
 
 
 @dataclass(frozen=True)
@@ -59,8 +77,8 @@ class Sun(Checked):
     elevation_rad : float
         Angle of that direction out of the plane (x, z), toward y, rad. For space only.
     spacecraft_velocity_m_s : tuple of float, or None
-        Velocity of the spacecraft from the Sun at t = 0 along y, z and x, in a plane along z and x, m/s. None is a
-        circular orbit, in the plane of the Sun and the x axis and toward +x.
+        Velocity of the spacecraft from the Sun at t = 0 along y, z and x, in a plane along z and x,
+        m/s. None is a circular orbit, in the plane of the Sun and the x axis and toward +x.
     """
 
     gravitational_parameter_m3_s2: Positive
@@ -73,8 +91,8 @@ class Sun(Checked):
 class Manoeuvre(Enum):
     """How the target accelerates along z, within its bound.
 
-    CONSTANT keeps its sign, BANG_BANG changes it at equal intervals, RANDOM_TELEGRAPH at random times; WORST_CASE has
-    the sign of the predicted miss of the true state, and increases it.
+    CONSTANT keeps its sign, BANG_BANG changes it at equal intervals, RANDOM_TELEGRAPH at random
+    times; WORST_CASE has the sign of the predicted miss of the true state, and increases it.
     """
 
     NONE = "none"
@@ -119,22 +137,26 @@ class Body(Checked):
 
 @dataclass(frozen=True, kw_only=True)
 class Scenario:
-    """An interception: true motion, sensors, engine, guidance and noise. Its fields are the keys of a scenario file.
+    """An interception: true motion, sensors, engine, guidance and noise. Its fields are the keys of
+    a scenario file.
 
     Parameters
     ----------
     name, description : str
         Name of the results, and a line about the scenario.
     nominal_range_m, closing_speed_m_s : float
-        Range at the start, m, and closing speed e, m/s, of the nominal motion, which the on-board model believes in.
+        Range at the start, m, and closing speed e, m/s, of the nominal motion, which the on-board
+        model believes in.
     step_s : float
         The step Delta of observation and control, s.
     strategy : str
         Name of the guidance strategy.
     noise, tie : NoiseKind, TieRule
-        How errors of measurements are chosen, and what game noise keeps of two equally bad extremes.
+        How errors of measurements are chosen, and what game noise keeps of two equally bad
+        extremes.
     noise_sigma : float
-        Standard deviation of Gaussian and correlated errors as a share of the bound, at which they are truncated.
+        Standard deviation of Gaussian and correlated errors as a share of the bound, at which they
+        are truncated.
     noise_correlation_s : float or None
         Time constant of correlated errors, s; None is a tenth of the time to the nominal arrival.
     uncertainty : StateBox
@@ -142,11 +164,11 @@ class Scenario:
     dispersion : StateBox
         True starts (B0 x D0), uniform, unknown on board. A fixed value has equal ends.
     covariance : Covariance or None
-        True starts are normal around the middle of the dispersion, and are drawn again until they are within it. The
-        components are along (y, z, x), in a plane along (z, x).
+        True starts are normal around the middle of the dispersion, and are drawn again until they
+        are within it. The components are along (y, z, x), in a plane along (z, x).
     b_plane_t_rad : float or None
-        Direction of the axis T of the B-plane, the line in which it meets the reference plane, from y toward z, rad.
-        None: the reference plane is not known. For space only.
+        Direction of the axis T of the B-plane, the line in which it meets the reference plane, from
+        y toward z, rad. None: the reference plane is not known. For space only.
     angle_sensor : AngleSensor or None
         The sensor of the line-of-sight angles, if it is not a camera.
     camera : Camera or None
@@ -198,12 +220,15 @@ class Scenario:
         _ = self.impulse_steps  # raises ValueError if the thruster can give no impulse
         self.set_model.check_start("dispersion", self.dispersion)
         if self.information_set.is_guaranteed:
-            _ = self.set_model.label_limits_m  # raises ValueError if the closing speed is too uncertain
-        farthest_m, slowest_m_s = self.dispersion.x_m[1], -self.dispersion.vx_m_s[1]
+            _ = (
+                self.set_model.label_limits_m
+            )  # raises ValueError if the closing speed is too uncertain
+        farthest_m = self.dispersion.x_m[1]
+        slowest_m_s = -self.dispersion.vx_m_s[1]
         if farthest_m > MAX_STEPS * (1.0 + 1e-9) * slowest_m_s * self.step_s:
             raise ValueError(
-                f"step_s must be long enough for at most {MAX_STEPS} steps from {farthest_m:g} m at "
-                f"{slowest_m_s:g} m/s: got {self.step_s!r}"
+                f"step_s must be long enough for at most {MAX_STEPS} steps from {farthest_m:g} m "
+                f"at {slowest_m_s:g} m/s: got {self.step_s!r}"
             )
         maximum = max(self.dispersion.x_m[1], self.uncertainty.x_m[1])
         if self.sun is not None and self.sun.distance_m <= maximum:
@@ -214,12 +239,15 @@ class Scenario:
         minimum = min(self.dispersion.x_m[0], self.uncertainty.x_m[0])
         if self.body is not None and self.body.radius_m >= minimum:
             raise ValueError(
-                f"body.radius_m must be less than the minimum possible range, {minimum:g} m: got {self.body.radius_m!r}"
+                f"body.radius_m must be less than the minimum possible range, {minimum:g} m: got "
+                f"{self.body.radius_m!r}"
             )
 
     @cached_property
     def set_model(self) -> SetModel:
-        """Knowledge and assumptions on board, without gravity and the errors of the engine (`infoset.sim.gravity`)."""
+        """Knowledge and assumptions on board, without gravity and the errors of the engine
+        (`infoset.sim.gravity`).
+        """
         return SetModel(
             closing_speed_m_s=self.closing_speed_m_s,
             step_s=self.step_s,
@@ -229,37 +257,48 @@ class Scenario:
         )
 
     def _check_axes(self) -> None:
-        """Check that all values are in a plane, or all in space, and that the dispersion contains normal starts."""
+        """Check that all values are in a plane, or all in space, and that the dispersion contains
+        normal starts.
+        """
         if self.dispersion.axes != self.set_model.axes:
             raise ValueError(
-                "Scenario: uncertainty and dispersion must both have y_m and vy_m_s (an engagement in space), or "
-                "neither"
+                "Scenario: uncertainty and dispersion must both have y_m and vy_m_s (an "
+                "engagement in space), or neither"
             )
         components = len(self.set_model.axes) + 1
         velocity = None if self.sun is None else self.sun.spacecraft_velocity_m_s
         if velocity is not None and len(velocity) != components:
-            raise ValueError(f"sun.spacecraft_velocity_m_s must have {components} components: got {len(velocity)}")
+            raise ValueError(
+                f"sun.spacecraft_velocity_m_s must have {components} components: got "
+                f"{len(velocity)}"
+            )
         if self.covariance is not None:
             if self.covariance.size != 2 * components:
-                raise ValueError(f"covariance must have {2 * components} components: got {self.covariance.size}")
+                raise ValueError(
+                    f"covariance must have {2 * components} components: got {self.covariance.size}"
+                )
             share = self.covariance.share_within(0.5 * np.ptp(corners(self.dispersion), axis=0))
             if share < MIN_SHARE_WITHIN:
                 raise ValueError(
-                    f"covariance: {100.0 * share:.2g} % of its starts are within dispersion, at least "
-                    f"{100.0 * MIN_SHARE_WITHIN:g} % must be: widen dispersion, or reduce the deviations"
+                    f"covariance: {100.0 * share:.2g} % of its starts are within dispersion, at "
+                    f"least {100.0 * MIN_SHARE_WITHIN:g} % must be: widen dispersion, or reduce "
+                    "the deviations"
                 )
         if self.is_spatial:
             return
         for name, is_set in (
             ("sun.elevation_rad", self.sun is not None and self.sun.elevation_rad != 0.0),
-            ("target.acceleration_y_m_s2", self.target is not None and self.target.acceleration_y_m_s2 is not None),
+            (
+                "target.acceleration_y_m_s2",
+                self.target is not None and self.target.acceleration_y_m_s2 is not None,
+            ),
             ("thruster.pointing_error_rad", self.thruster.pointing_error_rad > 0.0),
             ("b_plane_t_rad", self.b_plane_t_rad is not None),
         ):
             if is_set:
                 raise ValueError(
-                    f"{name} is a value of an engagement in space, and dispersion has no y_m and vy_m_s: set them, or "
-                    "leave the value out"
+                    f"{name} is a value of an engagement in space, and dispersion has no y_m and "
+                    "vy_m_s: set them, or leave the value out"
                 )
 
     @property
@@ -274,8 +313,9 @@ class Scenario:
         fitted = [sensor for sensor in (self.angle_sensor, self.camera) if sensor is not None]
         if len(fitted) != 1:
             raise ValueError(
-                "Scenario: must have one sensor of angles, the table angle_sensor, whose error bound is linear in the "
-                f"range, or the table camera: got {'both' if fitted else 'neither'}"
+                "Scenario: must have one sensor of angles, the table angle_sensor, whose error "
+                "bound is linear in the range, or the table camera: got "
+                f"{'both' if fitted else 'neither'}"
             )
         return fitted[0]
 
@@ -287,11 +327,17 @@ class Scenario:
     @property
     def correlation_time_s(self) -> float:
         """Time constant of correlated errors, s."""
-        return 0.1 * self.nominal_arrival_s if self.noise_correlation_s is None else self.noise_correlation_s
+        return (
+            0.1 * self.nominal_arrival_s
+            if self.noise_correlation_s is None
+            else self.noise_correlation_s
+        )
 
     @property
     def impulse_steps(self) -> Sequence[int] | None:
-        """Steps in which impulses can be given (`Thruster.impulse_steps`); None is every step from the delay on."""
+        """Steps in which impulses can be given (`Thruster.impulse_steps`); None is every step from
+        the delay on.
+        """
         return self.thruster.impulse_steps(self.nominal_arrival_s, self.step_s)
 
     @property
@@ -312,10 +358,13 @@ class Scenario:
 
 
 def corners(box: StateBox) -> tuple[Floats, Floats]:
-    """Return minimum and maximum (z, x, V_z, V_x) of a box, or (y, z, x, V_y, V_z, V_x) of one in space."""
+    """Return minimum and maximum (z, x, V_z, V_x) of a box, or (y, z, x, V_y, V_z, V_x) of one in
+    space.
+    """
     lateral = [box.axis(name) for name in box.axes]
     intervals = np.array(
-        [*(axis.z_m for axis in lateral), box.x_m, *(axis.vz_m_s for axis in lateral), box.vx_m_s], dtype=np.float64
+        [*(axis.z_m for axis in lateral), box.x_m, *(axis.vz_m_s for axis in lateral), box.vx_m_s],
+        dtype=np.float64,
     )
     return intervals[:, 0], intervals[:, 1]
 
@@ -323,7 +372,8 @@ def corners(box: StateBox) -> tuple[Floats, Floats]:
 def of_model(model: SetModel) -> dict[str, Any]:
     """Return the fields of a scenario with a set model: ``replace(scenario, **of_model(model))``.
 
-    The bounds of gravity and of the engine's errors are not among them; they follow from the scenario.
+    The bounds of gravity and of the engine's errors are not among them; they follow from the
+    scenario.
     """
     sensor = model.angle_sensor
     return {
@@ -332,12 +382,16 @@ def of_model(model: SetModel) -> dict[str, Any]:
         "uncertainty": model.bounds,
         "angle_sensor": sensor if isinstance(sensor, AngleSensor) else None,
         "camera": sensor if isinstance(sensor, Camera) else None,
-        "information_set": SetSettings(**{field.name: getattr(model, field.name) for field in fields(SetSettings)}),
+        "information_set": SetSettings(
+            **{field.name: getattr(model, field.name) for field in fields(SetSettings)}
+        ),
     }
 
 
 def strategy_name(scenario: Scenario, own: Strategy | None) -> str:
-    """Return the name of a strategy in files: the registered name, or module and class of the user's own."""
+    """Return the name of a strategy in files: the registered name, or module and class of the
+    user's own.
+    """
     if own is None:
         return scenario.strategy
     return f"{type(own).__module__}.{type(own).__qualname__}"
@@ -347,12 +401,16 @@ def need_scenario(scenario: object) -> None:
     """Raise TypeError, with the function that reads a scenario, if an argument is no scenario."""
     if not isinstance(scenario, Scenario):
         raise TypeError(
-            f"scenario must be a Scenario: got {shown(scenario)}; infoset.load_scenario returns it for a name or a file"
+            f"scenario must be a Scenario: got {shown(scenario)}; infoset.load_scenario returns it "
+            "for a name or a file"
         )
 
 
-def with_strategy(scenario: Scenario, strategy: Strategy | str | None) -> tuple[Scenario, Strategy | None]:
-    """Return the scenario with a strategy if it is a registered name, and the strategy if it is an object.
+def with_strategy(
+    scenario: Scenario, strategy: Strategy | str | None
+) -> tuple[Scenario, Strategy | None]:
+    """Return the scenario with a strategy if it is a registered name, and the strategy if it is an
+    object.
 
     TypeError if the scenario is none.
     """
@@ -363,18 +421,26 @@ def with_strategy(scenario: Scenario, strategy: Strategy | str | None) -> tuple[
 
 
 def noise_name(own: NoiseSource) -> str:
-    """Return the name of a noise of the user's own in records: its attribute `name`, or that of its class."""
+    """Return the name of a noise of the user's own in records: its attribute `name`, or that of its
+    class.
+    """
     kind = own if isinstance(own, type) else type(own)
     return str(getattr(own, "name", kind.__name__))
 
 
-def with_noise(scenario: Scenario, noise: NoiseSource | str | None) -> tuple[Scenario, NoiseSource | None]:
-    """Return the scenario with a noise if it is the name of a kind, and the noise if it is a class or an object.
+def with_noise(
+    scenario: Scenario, noise: NoiseSource | str | None
+) -> tuple[Scenario, NoiseSource | None]:
+    """Return the scenario with a noise if it is the name of a kind, and the noise if it is a class
+    or an object.
 
     A ValueError is raised if no kind has this name.
     """
     if not isinstance(noise, str):
         return scenario, noise
     if noise not in [kind.value for kind in NoiseKind]:
-        raise ValueError(f"no noise is called '{noise}'; there are: {', '.join(kind.value for kind in NoiseKind)}")
+        raise ValueError(
+            f"no noise is called '{noise}'; there are: "
+            f"{', '.join(kind.value for kind in NoiseKind)}"
+        )
     return replace(scenario, noise=NoiseKind(noise)), None

@@ -1,4 +1,6 @@
-"""The images and impulses that a scenario schedules, and where they differ from the times that it asks for."""
+"""The images and impulses that a scenario schedules, and where they differ from the times that it
+asks for.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,9 @@ SAID_FROM = 0.1
 
 @dataclass(frozen=True)
 class Difference:
-    """A time of a scenario and the time of the image or step that it means, s before the nominal arrival."""
+    """A time of a scenario and the time of the image or step that it means, s before the nominal
+    arrival.
+    """
 
     key: str
     asked_s: float
@@ -28,7 +32,8 @@ class Schedule:
     Parameters
     ----------
     images_s, impulses_s : tuple of float
-        Times of all images and of all steps in which an impulse can be given, s before the nominal arrival, decreasing.
+        Times of all images and of all steps in which an impulse can be given, s before the nominal
+        arrival, decreasing.
     images_before_last_decision : int
         Number of images until the last decision of an impulse.
     differences : tuple of Difference
@@ -42,8 +47,11 @@ class Schedule:
 
 
 def schedule(scenario: Scenario) -> Schedule | None:
-    """Return the schedule of a scenario; None if the nominal arrival is more than `MAX_STEPS` away."""
-    arrival_s, step_s = scenario.nominal_arrival_s, scenario.step_s
+    """Return the schedule of a scenario; None if the nominal arrival is more than `MAX_STEPS`
+    away.
+    """
+    arrival_s = scenario.nominal_arrival_s
+    step_s = scenario.step_s
     if arrival_s > MAX_STEPS * step_s:
         return None
     last_step = steps_between(arrival_s, 0.0, step_s)
@@ -53,13 +61,18 @@ def schedule(scenario: Scenario) -> Schedule | None:
     images_s = _before_s(scenario, [*images_until(scenario, last_step)][::-1])
     impulses_s = _before_s(scenario, [step for step in steps if step <= last_step])
     asked = [*_asked_images(scenario, images_s), *_asked_impulses(scenario, impulses_s)]
-    differences = [each for each in asked if abs(each.scheduled_s - each.asked_s) > SAID_FROM * step_s]
+    differences = [
+        each for each in asked if abs(each.scheduled_s - each.asked_s) > SAID_FROM * step_s
+    ]
     return Schedule(images_s, impulses_s, len(image_times_s(scenario)), tuple(differences))
 
 
 def image_times_s(scenario: Scenario) -> list[float]:
-    """Return the times before the nominal arrival of the images until the last decision of an impulse, s."""
-    model, steps = scenario.set_model, scenario.impulse_steps
+    """Return the times before the nominal arrival of the images until the last decision of an
+    impulse, s.
+    """
+    model = scenario.set_model
+    steps = scenario.impulse_steps
     end_s = scenario.nominal_arrival_s - model.min_range_m / model.closing_speed_m_s
     last_step = int(end_s / model.step_s) if steps is None else int(max(steps))
     images = [*images_until(scenario, last_step - scenario.thruster.delay_steps)][::-1]
@@ -80,7 +93,9 @@ def _before_s(scenario: Scenario, steps: Sequence[int]) -> tuple[float, ...]:
 
 
 def _asked_images(scenario: Scenario, images_s: Sequence[float]) -> Iterator[Difference]:
-    """Yield the times of the first and the last image that the scenario has, and those of the schedule."""
+    """Yield the times of the first and the last image that the scenario has, and those of the
+    schedule.
+    """
     sensor = scenario.bearing_sensor
     if images_s and sensor.first_image_s is not None:
         yield Difference(f"{sensor.table}.first_image_s", sensor.first_image_s, images_s[0])
@@ -90,7 +105,9 @@ def _asked_images(scenario: Scenario, images_s: Sequence[float]) -> Iterator[Dif
 
 def _asked_impulses(scenario: Scenario, impulses_s: Sequence[float]) -> Iterator[Difference]:
     """Yield the times of impulses that the scenario has, and those of the schedule."""
-    thruster, arrival_s, step_s = scenario.thruster, scenario.nominal_arrival_s, scenario.step_s
+    thruster = scenario.thruster
+    arrival_s = scenario.nominal_arrival_s
+    step_s = scenario.step_s
 
     def meant(key: str, time_s: float) -> Difference:
         step = steps_between(arrival_s, time_s, step_s)
@@ -105,4 +122,6 @@ def _asked_impulses(scenario: Scenario, impulses_s: Sequence[float]) -> Iterator
     yield meant("last_impulse_s", thruster.last_impulse_s)
     if thruster.impulse_period_s is not None:
         for place in range(1, len(impulses_s)):
-            yield meant("impulse_period_s", thruster.last_impulse_s + place * thruster.impulse_period_s)
+            yield meant(
+                "impulse_period_s", thruster.last_impulse_s + place * thruster.impulse_period_s
+            )

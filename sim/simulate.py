@@ -22,7 +22,9 @@ SECTIONS_AT_ONCE = 6000
 STEPS_AT_ONCE = 500_000
 """Maximum number of engagements of a batch times their steps; each takes about 600 bytes."""
 FLIGHT_SHARE = 0.75
-"""Share of the steps in the time of a batch; afterwards margins and bounds are computed from the whole history."""
+"""Share of the steps in the time of a batch; afterwards margins and bounds are computed from the
+whole history.
+"""
 
 
 def simulate(
@@ -49,16 +51,18 @@ def simulate(
     strategy : Strategy, str or None
         A strategy of your own, the name of a registered one, or None for the scenario's.
     noise : MeasurementNoise, callable, str or None
-        A noise of your own, the name of a kind, or None for the scenario's. A class, or a function without arguments,
-        is called for the noise of each batch; an object is that of all batches, at the same time if there are threads.
+        A noise of your own, the name of a kind, or None for the scenario's. A class, or a function
+        without arguments, is called for the noise of each batch; an object is that of all batches,
+        at the same time if there are threads.
     guarantee : bool
-        Compute the bound Phi in the guaranteed model; a run takes 1.1 to 1.9 times as long, with a rate sensor 1.4 to 9
-        times.
+        Compute the bound Phi in the guaranteed model; a run takes 1.1 to 1.9 times as long, with a
+        rate sensor 1.4 to 9 times.
     progress : callable or None
         Called with the fraction done, from 0 to 1.
     observe : callable or None
-        Called at each step of each batch, with the index in `runs` of the batch's first run, and the step: `time_s`,
-        `tracking`, `measured`, `predicted_miss`, `impulse_m_s` and `information` (the view of the set), among others.
+        Called at each step of each batch, with the index in `runs` of the batch's first run, and
+        the step: `time_s`, `tracking`, `measured`, `predicted_miss`, `impulse_m_s` and
+        `information` (the view of the set), among others.
 
     Returns
     -------
@@ -68,8 +72,8 @@ def simulate(
     Raises
     ------
     TypeError, ValueError
-        If there are no runs, a run number or the seed is not a whole number, the strategy or the noise is not
-        registered, or one of your own returns values that are not allowed.
+        If there are no runs, a run number or the seed is not a whole number, the strategy or the
+        noise is not registered, or one of your own returns values that are not allowed.
     """
     results = simulate_runs(
         scenario,
@@ -92,12 +96,18 @@ def warn_of_failures(scenario: Scenario, results: Results) -> None:
         return
     if scenario.set_model.is_guaranteed:
         reason = (
-            "an assumption of the model does not hold: the noise exceeds the bounds of the sensors, or the scenario "
-            "exceeds those of the model; infoset scenarios check FILE examines it"
+            "an assumption of the model does not hold: the noise exceeds the bounds of the "
+            "sensors, or the scenario exceeds those of the model; infoset scenarios check FILE "
+            "examines it"
         )
     else:
-        reason = "the model paper does not promise to keep the true state; information_set.model = guaranteed does"
-    warnings.warn(f"{scenario.name}: {failures}: {reason}", GuaranteeWarning, stacklevel=_level_of_user())
+        reason = (
+            "the model paper does not promise to keep the true state; information_set.model = "
+            "guaranteed does"
+        )
+    warnings.warn(
+        f"{scenario.name}: {failures}: {reason}", GuaranteeWarning, stacklevel=_level_of_user()
+    )
 
 
 def _level_of_user() -> int:
@@ -121,7 +131,8 @@ def simulate_runs(
     progress: Callable[[float], None] | None = None,
     observe: Callable[[int, Step], None] | None = None,
 ) -> Results:
-    """Return the results of `simulate` without its warning, for commands: they report such runs themselves.
+    """Return the results of `simulate` without its warning, for commands: they report such runs
+    themselves.
 
     Raises
     ------
@@ -132,27 +143,38 @@ def simulate_runs(
     scenario, own = with_strategy(scenario, strategy)
     scenario, own_noise = with_noise(scenario, noise)
     numbers = np.asarray(runs)
-    if isinstance(runs, bool) or numbers.ndim > 1 or (numbers.dtype.kind not in "iu" and numbers.size):
+    if (
+        isinstance(runs, bool)
+        or numbers.ndim > 1
+        or (numbers.dtype.kind not in "iu" and numbers.size)
+    ):
         raise TypeError(
-            f"runs must be the number of runs or a sequence of run numbers, all integers: got {shown(runs)}"
+            "runs must be the number of runs or a sequence of run numbers, all integers: got "
+            f"{shown(runs)}"
         )
     numbers = np.arange(int(numbers)) if numbers.ndim == 0 else numbers.astype(np.int64)
     if numbers.size == 0 or numbers.min() < 0:
         raise ValueError(f"need at least one run, and no negative run numbers: got runs={runs}")
     parts = []
-    # Small batches fit into the processor's cache; with very many sections or steps, larger ones would not fit into
-    # memory.
+    # Small batches fit into the processor's cache; with very many sections or steps, larger ones
+    # would not fit into memory.
     by_steps = STEPS_AT_ONCE // max_number_of_steps(scenario)
-    at_once = max(1, min(ENGAGEMENTS_AT_ONCE, SECTIONS_AT_ONCE // scenario.set_model.sections, by_steps))
+    at_once = max(
+        1, min(ENGAGEMENTS_AT_ONCE, SECTIONS_AT_ONCE // scenario.set_model.sections, by_steps)
+    )
     for first in range(0, numbers.size, at_once):
         chunk = numbers[first : first + at_once]
         draws = draw(scenario, chunk.tolist(), seed)
         flight = Engagements(scenario, draws, own, noise=own_noise, guarantee=guarantee)
-        steps, observe_batch = draws.steps, None if observe is None else partial(observe, first)
+        steps = draws.steps
+        observe_batch = None if observe is None else partial(observe, first)
         while flight.flying:
             flight.advance(observe_batch)
             if progress is not None:
-                progress((first + FLIGHT_SHARE * chunk.size * min(1.0, flight.step / steps)) / numbers.size)
+                progress(
+                    (first + FLIGHT_SHARE * chunk.size * min(1.0, flight.step / steps))
+                    / numbers.size
+                )
         parts.append(flight.results(chunk))
         if progress is not None:
             progress((first + chunk.size) / numbers.size)

@@ -1,4 +1,6 @@
-"""Statistics of samples: empirical distribution, quantiles, and distribution-free confidence intervals."""
+"""Statistics of samples: empirical distribution, quantiles, and distribution-free confidence
+intervals.
+"""
 
 from __future__ import annotations
 
@@ -28,8 +30,8 @@ class Distribution:
     probability : ndarray, shape (n,)
         Share of the sample at or below each value.
     lower, upper : ndarray, shape (n,)
-        Band of the distribution function at each value. The true function lies within it everywhere with at least the
-        probability of the confidence.
+        Band of the distribution function at each value. The true function lies within it everywhere
+        with at least the probability of the confidence.
     """
 
     values: Floats
@@ -66,7 +68,9 @@ def empirical_distribution(sample: ArrayLike, confidence: float = 0.95) -> Distr
 
 
 def _ordered(sample: ArrayLike) -> Floats:
-    """Return the values of a sample in ascending order; raise ValueError unless all are finite, and there is one."""
+    """Return the values of a sample in ascending order; raise ValueError unless all are finite, and
+    there is one.
+    """
     values = np.sort(real_values("sample", sample).ravel())
     if values.size == 0 or not np.isfinite(values).all():
         raise ValueError("a sample needs at least one value, all finite")
@@ -76,17 +80,23 @@ def _ordered(sample: ArrayLike) -> Floats:
 def shows(size: int, level: float) -> bool:
     """Return whether a sample of `size` values shows the quantile of a level in [0, 1].
 
-    At least one value must be expected beyond the quantile: size min(p, 1 - p) >= 1, so 100 values for 99 %. With fewer
-    values the interpolated quantile is only the extreme of the sample. Levels 0 and 1 are the extremes.
+    At least one value must be expected beyond the quantile: size min(p, 1 - p) >= 1, so 100 values
+    for 99 %. With fewer values the interpolated quantile is only the extreme of the sample. Levels
+    0 and 1 are the extremes.
     """
     tail = min(level, 1.0 - level)
     return tail == 0.0 or size * tail > 1.0 - 1e-9
 
 
 def shown_quantiles(sample: Floats, levels: Sequence[float]) -> list[float | None]:
-    """Return quantiles of a sample with at least one value; None where it does not show the quantile (`shows`)."""
+    """Return quantiles of a sample with at least one value; None where it does not show the
+    quantile (`shows`).
+    """
     values = np.quantile(sample, levels).tolist()
-    return [value if shows(len(sample), level) else None for level, value in zip(levels, values, strict=True)]
+    return [
+        value if shows(len(sample), level) else None
+        for level, value in zip(levels, values, strict=True)
+    ]
 
 
 @dataclass(frozen=True)
@@ -114,8 +124,11 @@ class QuantileEstimate:
         return None if self.lower is None or self.upper is None else self.upper - self.lower
 
 
-def estimate_quantiles(sample: ArrayLike, levels: Sequence[float], confidence: float = 0.95) -> list[QuantileEstimate]:
-    """Return quantiles of a sample, in the order of the levels, with distribution-free confidence intervals.
+def estimate_quantiles(
+    sample: ArrayLike, levels: Sequence[float], confidence: float = 0.95
+) -> list[QuantileEstimate]:
+    """Return quantiles of a sample, in the order of the levels, with distribution-free confidence
+    intervals.
 
     Parameters
     ----------
@@ -133,15 +146,19 @@ def estimate_quantiles(sample: ArrayLike, levels: Sequence[float], confidence: f
 
     Notes
     -----
-    The ends of the interval are order statistics: the number of values below the true quantile is binomial with n
-    trials and the level as probability (David, Nagaraja 2003, Order Statistics, section 7.1). O(n log n).
+    The ends of the interval are order statistics: the number of values below the true quantile is
+    binomial with n trials and the level as probability (David, Nagaraja 2003, Order Statistics,
+    section 7.1). O(n log n).
     """
     FRACTION.need("confidence", confidence)
     if not all(0.0 <= level <= 1.0 for level in levels):
         raise ValueError(f"levels must lie in [0, 1]: got {levels}")
     values = _ordered(sample)
     ends = [
-        (float(values[lower - 1]) if lower >= 1 else None, float(values[upper - 1]) if upper <= values.size else None)
+        (
+            float(values[lower - 1]) if lower >= 1 else None,
+            float(values[upper - 1]) if upper <= values.size else None,
+        )
         for lower, upper in (order_statistics(values.size, level, confidence) for level in levels)
     ]
     # overwrite_input saves a second copy of a million values, and changes their order.
@@ -188,18 +205,21 @@ class HitEstimate:
 def estimate_hits(hits: int, runs: int, confidence: float = 0.95) -> HitEstimate:
     """Return the share of hits with its Clopper-Pearson interval.
 
-    If the true probability is less than `lower`, the probability of at least this number of hits is less than
-    (1 - confidence) / 2. If it is greater than `upper`, the same holds for at most this number of hits. For each fixed
-    number of runs, the interval therefore contains the true probability with at least this confidence.
+    If the true probability is less than `lower`, the probability of at least this number of hits is
+    less than (1 - confidence) / 2. If it is greater than `upper`, the same holds for at most this
+    number of hits. For each fixed number of runs, the interval therefore contains the true
+    probability with at least this confidence.
 
     Raises
     ------
     ValueError
-        If `runs` is not at least 1, `hits` is not in [0, runs], or the confidence is not between 0 and 1.
+        If `runs` is not at least 1, `hits` is not in [0, runs], or the confidence is not between 0
+        and 1.
 
     References
     ----------
-    Clopper, Pearson (1934), The use of confidence or fiducial limits illustrated in the case of the binomial.
+    Clopper, Pearson (1934), The use of confidence or fiducial limits illustrated in the case of the
+    binomial.
     """
     from scipy.stats import beta  # slow to load, and few commands need it
 
@@ -213,18 +233,21 @@ def estimate_hits(hits: int, runs: int, confidence: float = 0.95) -> HitEstimate
 
 
 def _lower_end(hits: int, runs: int, tail: float) -> float:
-    """Return the probability at which at least so many hits have the probability `tail`; 0 without a hit."""
+    """Return the probability at which at least so many hits have the probability `tail`; 0 without
+    a hit.
+    """
     from scipy.stats import beta  # slow to load, and few commands need it
 
     return float(beta.ppf(tail, hits, runs - hits + 1)) if hits else 0.0
 
 
 def runs_for_hits(share: float, misses: int = 0, confidence: float = 0.95) -> int:
-    """Return the minimum number of runs that show a probability of a hit, of which `misses` runs miss.
+    """Return the minimum number of runs that show a probability of a hit, of which `misses` runs
+    miss.
 
-    With so many runs, the hypothesis that the probability is less than `share` is rejected at the level
-    1 - `confidence`: the test is the exact binomial one, and one-sided. Without misses it is the least n with
-    share^n <= 1 - confidence, 299 runs for 99 % at 95 %.
+    With so many runs, the hypothesis that the probability is less than `share` is rejected at the
+    level 1 - `confidence`: the test is the exact binomial one, and one-sided. Without misses it is
+    the least n with share^n <= 1 - confidence, 299 runs for 99 % at 95 %.
 
     Raises
     ------
@@ -245,9 +268,11 @@ def runs_for_hits(share: float, misses: int = 0, confidence: float = 0.95) -> in
 
 
 def average_ranks(values: Floats) -> Floats:
-    """Return the ranks of finite values, from 1, for Spearman's coefficient; equal values have the mean of their ranks.
+    """Return the ranks of finite values, from 1, for Spearman's coefficient; equal values have the
+    mean of their ranks.
 
-    The ranks are exact. This takes half the time of `pandas.Series.rank`, which uses no vector instructions.
+    The ranks are exact. This takes half the time of `pandas.Series.rank`, which uses no vector
+    instructions.
     """
     order = np.argsort(values)
     ordered = values[order]
@@ -264,10 +289,11 @@ def average_ranks(values: Floats) -> Floats:
 def correlation_interval(
     correlation: float, size: int, confidence: float = 0.95, *, ranks: bool = False
 ) -> tuple[float, float]:
-    """Return the confidence interval of a correlation coefficient by Fisher's z; NaN with fewer than 4 values.
+    """Return the confidence interval of a correlation coefficient by Fisher's z; NaN with fewer
+    than 4 values.
 
-    The interval is approximate, and assumes two normal variables. `ranks` is for Spearman's coefficient, whose z has
-    a standard deviation larger by a factor of sqrt(1.06).
+    The interval is approximate, and assumes two normal variables. `ranks` is for Spearman's
+    coefficient, whose z has a standard deviation larger by a factor of sqrt(1.06).
 
     References
     ----------
@@ -275,7 +301,9 @@ def correlation_interval(
     """
     if size < 4:
         return math.nan, math.nan
-    half = NormalDist().inv_cdf(0.5 + 0.5 * confidence) * math.sqrt((1.06 if ranks else 1.0) / (size - 3))
+    half = NormalDist().inv_cdf(0.5 + 0.5 * confidence) * math.sqrt(
+        (1.06 if ranks else 1.0) / (size - 3)
+    )
     with np.errstate(divide="ignore"):  # the interval of 1 is the point 1
         z = np.arctanh(np.clip(correlation, -1.0, 1.0))
     return float(np.tanh(z - half)), float(np.tanh(z + half))

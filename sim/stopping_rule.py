@@ -1,4 +1,6 @@
-"""Quantiles as text, and the rule that stops a campaign: the confidence interval of a quantile is narrow enough."""
+"""Quantiles as text, and the rule that stops a campaign: the confidence interval of a quantile is
+narrow enough.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,9 @@ from infoset.sim.statistics import estimate_quantiles, level_name, number_text
 QUANTITIES = ("miss_m", "impulse_m_s", "guaranteed_miss_m")
 
 DIGITS = r"[0-9]{1,20}(?:\.[0-9]{1,25})?(?:[eE][+-]?[0-9]{1,3})?"
-_RULE = re.compile(rf"\s*(?P<quantity>\w+)\s+p(?P<percent>{DIGITS})\s+ci\s*<\s*(?P<width>{DIGITS})\s*")
+_RULE = re.compile(
+    rf"\s*(?P<quantity>\w+)\s+p(?P<percent>{DIGITS})\s+ci\s*<\s*(?P<width>{DIGITS})\s*"
+)
 
 
 @dataclass(frozen=True)
@@ -42,7 +46,9 @@ class QuantileName:
     def __post_init__(self) -> None:
         check_fields(self)
         if self.quantity not in QUANTITIES:
-            raise ValueError(f"there is no quantity {self.quantity[:40]}; choose one of: {', '.join(QUANTITIES)}")
+            raise ValueError(
+                f"there is no quantity {self.quantity[:40]}; choose one of: {', '.join(QUANTITIES)}"
+            )
 
     def __str__(self) -> str:
         return f"{self.quantity} {level_name(self.level)}"
@@ -55,7 +61,8 @@ class QuantileName:
 
 @dataclass(frozen=True)
 class StoppingRule(Checked):
-    """Stop when the confidence interval of a quantile is narrower than a width, written `miss_m p99 ci<0.5`.
+    """Stop when the confidence interval of a quantile is narrower than a width, written `miss_m p99
+    ci<0.5`.
 
     Parameters
     ----------
@@ -85,8 +92,12 @@ class StoppingRule(Checked):
         """
         match = _RULE.fullmatch(text[:100])
         if match is None:
-            raise ValueError('must be a quantity, a quantile and a width, for example "miss_m p99 ci<0.5"')
-        return cls(QuantileName.of_percent(match["quantity"], match["percent"]), float(match["width"]))
+            raise ValueError(
+                'must be a quantity, a quantile and a width, for example "miss_m p99 ci<0.5"'
+            )
+        return cls(
+            QuantileName.of_percent(match["quantity"], match["percent"]), float(match["width"])
+        )
 
     @property
     def quantity(self) -> str:

@@ -12,11 +12,13 @@ from infoset.sim.scenario import Manoeuvre, Target
 ROUNDING = 1e-12
 
 
-def acceleration_m_s2(target: Target, draws: Floats, step: int, step_s: float, predicted_miss_m: Floats) -> Floats:
+def acceleration_m_s2(
+    target: Target, draws: Floats, step: int, step_s: float, predicted_miss_m: Floats
+) -> Floats:
     """Return the lateral acceleration of the targets of a batch over one step, m/s^2, shape (C, B).
 
-    `draws`, shape (C, B, steps), are uniform in [-1, 1]. `predicted_miss_m`, shape (C, B), is the signed predicted miss
-    z + V_z (time to go) of the true state.
+    `draws`, shape (C, B, steps), are uniform in [-1, 1]. `predicted_miss_m`, shape (C, B), is the
+    signed predicted miss z + V_z (time to go) of the true state.
     """
     first = _first_side(draws)
     if target.manoeuvre is Manoeuvre.NONE:
@@ -25,7 +27,9 @@ def acceleration_m_s2(target: Target, draws: Floats, step: int, step_s: float, p
         side = first
     elif target.manoeuvre is Manoeuvre.BANG_BANG:
         # A whole number of periods must not be rounded down.
-        side = first * (-1.0) ** math.floor(step * step_s / target.switching_period_s * (1.0 + ROUNDING))
+        side = first * (-1.0) ** math.floor(
+            step * step_s / target.switching_period_s * (1.0 + ROUNDING)
+        )
     elif target.manoeuvre is Manoeuvre.RANDOM_TELEGRAPH:
         # Probability of an odd number of switches within a step of a Poisson process.
         odd = 0.5 * (1.0 - math.exp(-2.0 * step_s / target.switching_period_s))
@@ -38,12 +42,15 @@ def acceleration_m_s2(target: Target, draws: Floats, step: int, step_s: float, p
 
 def amplitudes_m_s2(target: Target, axes: int) -> Floats:
     """Return the acceleration of a target along each of its lateral axes, z or y and z, m/s^2."""
-    along_z, along_y = target.acceleration_m_s2, target.acceleration_y_m_s2
+    along_z = target.acceleration_m_s2
+    along_y = target.acceleration_y_m_s2
     return np.array([along_z if along_y is None else along_y, along_z][-axes:])
 
 
 def constant_side(target: Target | None, draws: Floats | None) -> Floats | None:
-    """Return the sign of the acceleration of targets that keep it, shape (C, B); None for others."""
+    """Return the sign of the acceleration of targets that keep it, shape (C, B); None for
+    others.
+    """
     if target is None or draws is None or target.manoeuvre is not Manoeuvre.CONSTANT:
         return None
     return _first_side(draws)

@@ -1,7 +1,8 @@
 """The section at the label of the true state, and the distance of the true state from its boundary.
 
-The label is known only on arrival, because impulses change the arrival time by some nanoseconds through gravity.
-Therefore measurements and impulses are stored during the flight and evaluated afterwards.
+The label is known only on arrival, because impulses change the arrival time by some nanoseconds
+through gravity. Therefore measurements and impulses are stored during the flight and evaluated
+afterwards.
 """
 
 from __future__ import annotations
@@ -21,12 +22,16 @@ from infoset.set_queries import MaskedFloats
 from infoset.sim.kepler import Sight
 
 ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
-"""Rounding error of a margin, relative to the terms of z: a quarter of that for which each cut widens the set."""
+"""Rounding error of a margin, relative to the terms of z: a quarter of that for which each cut
+widens the set.
+"""
 
 
 @dataclass(frozen=True)
 class _Look:
-    """True states of the flights that measure in a step, after some events; slopes have the shape (C, B)."""
+    """True states of the flights that measure in a step, after some events; slopes have the shape
+    (C, B).
+    """
 
     step: int
     events: int
@@ -36,25 +41,31 @@ class _Look:
 
 
 class TruthSection:
-    """Measurements and impulses of a batch of flights, for the margins of the true states in their sections.
+    """Measurements and impulses of a batch of flights, for the margins of the true states in their
+    sections.
 
-    Angles do not depend on scale: a true motion with closing speed e (1 + eta) has the angles of a model motion at
-    range x / (1 + eta), so its label is e T, with T the time at which x = 0.
+    Angles do not depend on scale: a true motion with closing speed e (1 + eta) has the angles of a
+    model motion at range x / (1 + eta), so its label is e T, with T the time at which x = 0.
     """
 
     def __init__(self, model: SetModel, batch: int) -> None:
         laws = section_laws(model)
-        self._law, self._laws = laws[0], law_table(laws)
+        self._law = laws[0]
+        self._laws = law_table(laws)
         self._exact_angles = model.is_guaranteed
         self._min_range_m = model.min_range_m
         self._history = History(len(laws), batch)
         self._looks: list[_Look] = []
 
     def look(self, where: Flags, sight: Sight) -> None:
-        """Store which flights measured in this step, after the measurements, and the true states."""
-        slope, rate = sight.alpha_rad, sight.omega_rad_s
+        """Store which flights measured in this step, after the measurements, and the true
+        states.
+        """
+        slope = sight.alpha_rad
+        rate = sight.omega_rad_s
         if self._exact_angles:
-            slope, rate = sight.slope, sight.slope_rate_per_s
+            slope = sight.slope
+            rate = sight.slope_rate_per_s
         self._looks.append(_Look(self._history.elapsed, self._history.events, where, slope, rate))
 
     def measure_angle(self, alpha_rad: Floats, where: Flags) -> None:
@@ -80,12 +91,14 @@ class TruthSection:
         self._history.record(PREDICTION)
 
     def margins_m(self, arrival_s: Floats) -> list[MaskedFloats]:
-        """Return the signed margins (m) of the true states in their sections, one array of shape (B,) per step.
+        """Return the signed margins (m) of the true states in their sections, one array of shape
+        (B,) per step.
 
-        A margin is that of the last measurement; it is masked before the first one. It includes an allowance for
-        rounding. `arrival_s` are the times from the start to x = 0.
+        A margin is that of the last measurement; it is masked before the first one. It includes an
+        allowance for rounding. `arrival_s` are the times from the start to x = 0.
         """
-        latest, margins = np.full(len(arrival_s), np.inf), []
+        latest = np.full(len(arrival_s), np.inf)
+        margins = []
         measured: dict[int, Floats] = {}
         for look, margin in zip(self._looks, self._margins(arrival_s), strict=True):
             measured[look.step] = np.minimum(margin, measured.get(look.step, np.inf))
@@ -96,32 +109,42 @@ class TruthSection:
         return margins
 
     def min_margin_m(self, arrival_s: Floats) -> MaskedFloats:
-        """Return the minimum signed margin of each true state, m; masked where nothing was measured."""
+        """Return the minimum signed margin of each true state, m; masked where nothing was
+        measured.
+        """
         return _if_measured(self._margins(arrival_s).min(axis=0, initial=np.inf))
 
     def _margins(self, arrival_s: Floats) -> Floats:
-        """Return the margin of each flight at each look, m, shape (L, B); infinite where it does not measure."""
-        law, history, looks = self._law, copy.copy(self._history), self._looks
+        """Return the margin of each flight at each look, m, shape (L, B); infinite where it does
+        not measure.
+        """
+        law = self._law
+        history = copy.copy(self._history)
+        looks = self._looks
         if not looks:
             return np.empty((0, len(arrival_s)))
         labels = law.closing_speed * arrival_s
         ranges = labels - law.closing_speed * (law.step * np.arange(history.elapsed + 1))[:, None]
         kinds = history.kinds[: history.events]
-        measured, steps = np.isin(kinds, (ANGLE, RATE)), np.cumsum(kinds == PREDICTION)
+        measured = np.isin(kinds, (ANGLE, RATE))
+        steps = np.cumsum(kinds == PREDICTION)
         history.applies = history.applies[: history.events].copy()
         history.applies[measured] &= (ranges >= self._min_range_m)[steps[measured]]
         at = [look.step for look in looks]
         ranges = ranges[at]
-        where = np.reshape([look.where for look in looks], ranges.shape) & (ranges >= self._min_range_m)
+        where = np.reshape([look.where for look in looks], ranges.shape) & (
+            ranges >= self._min_range_m
+        )
         # Shape (L, C, B), then (C, L, B).
         each = (len(looks), len(self._laws), len(labels))
         slope = np.reshape([look.slope for look in looks], each).swapaxes(0, 1)
         rate = np.reshape([look.slope_rate_per_s for look in looks], each).swapaxes(0, 1)
         ends = np.array([look.events for look in looks], dtype=np.int64)
-        v, z = np.ascontiguousarray(rate * ranges - law.closing_speed * slope), np.ascontiguousarray(slope * ranges)
+        v = np.ascontiguousarray(rate * ranges - law.closing_speed * slope)
+        z = np.ascontiguousarray(slope * ranges)
         margins, reaches = margins_along(labels, ends, v, z, history, self._laws)
-        # The label and z = label |slope| of the true state are rounded, and so is z = m - V (label/e) of a vertex: the
-        # sections of an exactly known z are thinner than that.
+        # The label and z = label |slope| of the true state are rounded, and so is z = m - V
+        # (label/e) of a vertex: the sections of an exactly known z are thinner than that.
         margins += ROUNDING * labels * (np.abs(slope) + reaches / law.closing_speed)
         return np.where(where, margins.min(axis=0), np.inf)
 

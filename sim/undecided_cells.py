@@ -17,29 +17,34 @@ from infoset.sim.stopping_rule import StoppingRule
 from infoset.sim.storage import CampaignFolder
 
 GROWTH = 1.05
-"""A sample grows by at least this factor between two checks of a quantile: one after each chunk would cost O(N^2)."""
+"""A sample grows by at least this factor between two checks of a quantile: one after each chunk
+would cost O(N^2).
+"""
 
 
 class Sample:
     """Runs of one noise of a cell, by which a rule is decided.
 
-    A quantile is checked after certain numbers of chunks, which depend neither on the workers nor on their speed: a
-    campaign stops at the same run on one worker and on a hundred, in one session and in ten. O(N log N) over a
-    campaign. A requirement is checked after each run.
+    A quantile is checked after certain numbers of chunks, which depend neither on the workers nor
+    on their speed: a campaign stops at the same run on one worker and on a hundred, in one session
+    and in ten. O(N log N) over a campaign. A requirement is checked after each run.
     """
 
     def __init__(self, rule: StoppingRule | AnyRequirement, chunks: int) -> None:
         self.decided = False
-        self._rule, self._last = rule, chunks
+        self._rule = rule
+        self._last = chunks
         self._count, self._next_check = 0, 1
         self._values: Floats = np.empty(0)
 
     def add(self, values: Floats) -> None:
         """Add the values of a chunk; NaN is unknown."""
         self._count += 1
-        before, self._values = len(self._values), np.append(self._values, values[~np.isnan(values)])
+        before = len(self._values)
+        self._values = np.append(self._values, values[~np.isnan(values)])
         if not isinstance(self._rule, StoppingRule):
-            runs, counts = np.arange(1, len(self._values) + 1), np.cumsum(self._rule.holds(self._values))
+            runs = np.arange(1, len(self._values) + 1)
+            counts = np.cumsum(self._rule.holds(self._values))
             self.decided |= bool(decides(runs[before:], counts[before:], self._rule.share).any())
         elif self._count == min(self._next_check, self._last):
             self._next_check = max(self._count + 1, math.ceil(GROWTH * self._count))
@@ -48,7 +53,9 @@ class Sample:
 
 @dataclass
 class _Cell:
-    """Progress of a cell: its chunks, the number of judged ones, and the judged runs of each noise."""
+    """Progress of a cell: its chunks, the number of judged ones, and the judged runs of each
+    noise.
+    """
 
     chunks: list[range]
     samples: dict[str, Sample]
@@ -57,15 +64,18 @@ class _Cell:
 
 
 class UndecidedCells:
-    """The chunks that must still be simulated, and those that were simulated before an earlier chunk.
+    """The chunks that must still be simulated, and those that were simulated before an earlier
+    chunk.
 
-    The number of runs in the manifest of the folder is the limit of each cell, `min_runs` its minimum number for a
-    requirement. The rule is decided for each noise. A chunk is stored only if the chunks before it in its cell are
-    stored and have not decided. The stored runs are therefore the same for any number of workers and after any
-    interruption.
+    The number of runs in the manifest of the folder is the limit of each cell, `min_runs` its
+    minimum number for a requirement. The rule is decided for each noise. A chunk is stored only if
+    the chunks before it in its cell are stored and have not decided. The stored runs are therefore
+    the same for any number of workers and after any interruption.
     """
 
-    def __init__(self, folder: CampaignFolder, rule: StoppingRule | AnyRequirement, min_runs: int) -> None:
+    def __init__(
+        self, folder: CampaignFolder, rule: StoppingRule | AnyRequirement, min_runs: int
+    ) -> None:
         self._folder = folder
         self._rule = rule
         self._min_runs = 0 if isinstance(rule, StoppingRule) else min_runs
@@ -73,13 +83,17 @@ class UndecidedCells:
         for cell, runs in folder.manifest.chunks():
             chunks[cell].append(runs)
         noises = [kind.value for kind in folder.manifest.noise.kinds]
-        self._cells = [_Cell(each, {noise: Sample(rule, len(each)) for noise in noises}) for each in chunks]
+        self._cells = [
+            _Cell(each, {noise: Sample(rule, len(each)) for noise in noises}) for each in chunks
+        ]
         for cell in range(len(self._cells)):
             self._advance(cell)
 
     @property
     def runs(self) -> tuple[int, ...]:
-        """Engagements stored without a gap from run 0 on, for each cell; empty if the rule has stopped none."""
+        """Engagements stored without a gap from run 0 on, for each cell; empty if the rule has
+        stopped none.
+        """
         if not any(map(self._is_decided, self._cells)):
             return ()
         counts = []
@@ -89,13 +103,17 @@ class UndecidedCells:
         return tuple(counts)
 
     def missing(self) -> Iterator[tuple[int, range]]:
-        """Yield the chunks to simulate: the next one of each cell that is undecided at that time, in rounds."""
+        """Yield the chunks to simulate: the next one of each cell that is undecided at that time,
+        in rounds.
+        """
         for cell, runs in self._folder.manifest.chunks():
             if not self._is_done(self._cells[cell]) and not self._folder.has(cell, runs):
                 yield cell, runs
 
     def store(self, cell: int, runs: Sequence[int], results: Results) -> None:
-        """Write a simulated chunk once all chunks before it are written; discard it if its cell is then decided."""
+        """Write a simulated chunk once all chunks before it are written; discard it if its cell is
+        then decided.
+        """
         self._cells[cell].waiting[runs] = results
         self._advance(cell)
 
@@ -107,7 +125,9 @@ class UndecidedCells:
         return cell.judged == len(cell.chunks) or self._is_decided(cell)
 
     def _advance(self, number: int) -> None:
-        """Judge the chunks of a cell in their order, up to the first unknown chunk or the decision of the cell."""
+        """Judge the chunks of a cell in their order, up to the first unknown chunk or the decision
+        of the cell.
+        """
         cell = self._cells[number]
         while not self._is_done(cell):
             runs = cell.chunks[cell.judged]

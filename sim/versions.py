@@ -16,7 +16,9 @@ class VersionError(Exception):
 
 
 def versions() -> dict[str, str]:
-    """Return the versions that results, records and campaigns carry: those of the packages, and that of Python."""
+    """Return the versions that results, records and campaigns carry: those of the packages, and
+    that of Python.
+    """
     return {**{name: _version(name) for name in PACKAGES}, "python": platform.python_version()}
 
 

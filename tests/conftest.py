@@ -1,4 +1,6 @@
-"""Profiles of Hypothesis (fixed examples; other and more ones: `thorough`), and fixtures that many tests use."""
+"""Profiles of Hypothesis (fixed examples; other and more ones: `thorough`), and fixtures that many
+tests use.
+"""
 
 from __future__ import annotations
 
@@ -19,12 +21,14 @@ if TYPE_CHECKING:
     from infoset.sim import Scenario
 
 OF_THE_CHECKOUT = ["docs", "test_architecture.py", "test_readme.py"]
-"""Tests of files that the wheel does not contain. They are skipped outside a checkout, where the wheel is tested."""
+"""Tests of files that the wheel does not contain. They are skipped outside a checkout, where the
+wheel is tested.
+"""
 IN_A_CHECKOUT = (Path(__file__).parents[1] / "README.md").exists()
 collect_ignore = [] if IN_A_CHECKOUT else OF_THE_CHECKOUT
 
-# One thread for linear algebra, set before NumPy is imported: the matrices are small, and the threads of several
-# processes on the same cores would wait for each other by spinning.
+# One thread for linear algebra, set before NumPy is imported: the matrices are small, and the
+# threads of several processes on the same cores would wait for each other by spinning.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 PROFILE = os.environ.get("INFOSET_HYPOTHESIS_PROFILE", "default")
@@ -34,16 +38,25 @@ EXAMPLES = 40
 
 # No property depends on the speed of the machine.
 settings.register_profile(
-    "default", derandomize=True, deadline=None, max_examples=EXAMPLES, suppress_health_check=[HealthCheck.too_slow]
+    "default",
+    derandomize=True,
+    deadline=None,
+    max_examples=EXAMPLES,
+    suppress_health_check=[HealthCheck.too_slow],
 )
 settings.register_profile(
-    "thorough", settings.get_profile("default"), derandomize=False, max_examples=TIMES * settings().max_examples
+    "thorough",
+    settings.get_profile("default"),
+    derandomize=False,
+    max_examples=TIMES * settings().max_examples,
 )
 settings.load_profile(PROFILE)
 
 
 def pytest_configure() -> None:
-    """Restore the default handler of SIGINT, which shells disable for background jobs; some tests send SIGINT."""
+    """Restore the default handler of SIGINT, which shells disable for background jobs; some tests
+    send SIGINT.
+    """
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -54,7 +67,9 @@ def pytest_report_header() -> str | None:
 
 
 def pytest_collection_modifyitems(items: Sequence[pytest.Item]) -> None:
-    """Multiply also the examples of tests that set their number; a profile does not change those."""
+    """Multiply also the examples of tests that set their number; a profile does not change
+    those.
+    """
     if PROFILE != "thorough":
         return
     tests = {id(item.obj): item.obj for item in items if isinstance(item, pytest.Function)}
@@ -63,11 +78,15 @@ def pytest_collection_modifyitems(items: Sequence[pytest.Item]) -> None:
             continue
         own: settings = test._hypothesis_internal_use_settings
         if own.max_examples != settings().max_examples:
-            test._hypothesis_internal_use_settings = settings(own, max_examples=TIMES * own.max_examples)
+            test._hypothesis_internal_use_settings = settings(
+                own, max_examples=TIMES * own.max_examples
+            )
 
 
 def pytest_collection_finish() -> None:
-    """Collect garbage less often, and not in the imported modules: it would take an eighth of the time of the tests."""
+    """Collect garbage less often, and not in the imported modules: it would take an eighth of the
+    time of the tests.
+    """
     gc.collect()
     gc.freeze()
     gc.set_threshold(100_000)
@@ -86,20 +105,25 @@ def environment_is_put_back() -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def figures_are_small() -> Iterator[None]:
-    """Write PNG files of 50 dpi, and PDF files with Type 3 fonts, which take a tenth of the time of the style's fonts.
+    """Write PNG files of 50 dpi, and PDF files with Type 3 fonts, which take a tenth of the time of
+    the style's fonts.
 
     `experiments/common/test_figure_style.py` tests those of the style.
     """
     from infoset.experiments.common import figure_style
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(figure_style, "STYLE", [*figure_style.STYLE, {"pdf.fonttype": 3, "savefig.dpi": 50}])
+        patch.setattr(
+            figure_style, "STYLE", [*figure_style.STYLE, {"pdf.fonttype": 3, "savefig.dpi": 50}]
+        )
         yield
 
 
 @pytest.fixture(scope="session", autouse=True)
 def files_are_not_flushed() -> Iterator[None]:
-    """Do not wait for the disk. Flushes are for a machine that stops, and cost milliseconds for each file."""
+    """Do not wait for the disk. Flushes are for a machine that stops, and cost milliseconds for
+    each file.
+    """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(os, "fsync", lambda _descriptor: None)
         yield
@@ -107,7 +131,9 @@ def files_are_not_flushed() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def brief() -> Scenario:
-    """A short scenario with few sections: the last ten seconds of an approach with a known range."""
+    """A short scenario with few sections: the last ten seconds of an approach with a known
+    range.
+    """
     from infoset import StateBox
     from infoset.experiments.interception.scenario_file import load_scenario
     from tests.sensors import linear
@@ -115,8 +141,12 @@ def brief() -> Scenario:
     published = load_scenario("asteroid-1997")
     box = StateBox((-100.0, 100.0), (590e3, 600e3), (-10.0, 10.0), (-58e3, -57.5e3))
     sensor = replace(linear(published.angle_sensor), nominal_range_m=595e3)
-    model = replace(published.set_model, bounds=box, sections=5, fewest_sections=3, angle_sensor=sensor)
-    return replace(published, name="brief", **of_model(model), dispersion=box, nominal_range_m=595e3)
+    model = replace(
+        published.set_model, bounds=box, sections=5, fewest_sections=3, angle_sensor=sensor
+    )
+    return replace(
+        published, name="brief", **of_model(model), dispersion=box, nominal_range_m=595e3
+    )
 
 
 @pytest.fixture(scope="session")

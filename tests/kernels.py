@@ -11,7 +11,10 @@ from infoset.kernels import JIT
 def callable_kernels(module: ModuleType) -> Any:
     """Return the contents of a module, with its kernels callable from Python."""
     return SimpleNamespace(
-        **{name: _callable(value) if hasattr(value, "py_func") else value for name, value in vars(module).items()}
+        **{
+            name: _callable(value) if hasattr(value, "py_func") else value
+            for name, value in vars(module).items()
+        }
     )
 
 

@@ -1,4 +1,6 @@
-"""Exact rational numbers for independent checks: those of GMP, which are many times faster than Python's."""
+"""Exact rational numbers for independent checks: those of GMP, which are many times faster than
+Python's.
+"""
 
 from __future__ import annotations
 

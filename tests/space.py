@@ -11,7 +11,9 @@ from infoset.sim.scenario import of_model
 
 
 def in_space(scenario: Scenario, **sensor: Any) -> Scenario:
-    """Return a scenario whose y axis has the bounds of its z axis, with fields of the angle sensor replaced."""
+    """Return a scenario whose y axis has the bounds of its z axis, with fields of the angle sensor
+    replaced.
+    """
     model = scenario.set_model
     angle_sensor = replace(model.angle_sensor, **sensor)
     spatial = replace(model, bounds=_both(model.bounds), angle_sensor=angle_sensor)

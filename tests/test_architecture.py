@@ -35,7 +35,9 @@ def modules() -> Iterator[ModuleType]:
 
 
 def public() -> Iterator[tuple[str, object]]:
-    """Yield public functions, classes and methods with the names of the modules that define them."""
+    """Yield public functions, classes and methods with the names of the modules that define
+    them.
+    """
     for module in modules():
         for name, thing in vars(module).items():
             python = getattr(thing, "py_func", thing)
@@ -44,7 +46,9 @@ def public() -> Iterator[tuple[str, object]]:
             if inspect.isclass(python):
                 yield f"{module.__name__}.{name}", python
                 for method_name, method in vars(python).items():
-                    function = inspect.unwrap(getattr(method, "__func__", getattr(method, "fget", method)))
+                    function = inspect.unwrap(
+                        getattr(method, "__func__", getattr(method, "fget", method))
+                    )
                     if not method_name.startswith("_") and inspect.isfunction(function):
                         yield f"{module.__name__}.{name}.{method_name}", function
             elif inspect.isfunction(python):
@@ -55,16 +59,24 @@ PUBLIC = dict(public())
 
 
 def without_text(docstring: str) -> list[str]:
-    """Return the heads of the entries in the section Parameters of a docstring that have no text below them."""
-    section = re.search(r"^Parameters\n-+\n(.*?)(?=^\w[\w ]*\n-+$|\Z)", docstring, flags=re.DOTALL | re.MULTILINE)
+    """Return the heads of the entries in the section Parameters of a docstring that have no text
+    below them.
+    """
+    section = re.search(
+        r"^Parameters\n-+\n(.*?)(?=^\w[\w ]*\n-+$|\Z)", docstring, flags=re.DOTALL | re.MULTILINE
+    )
     lines = section[1].splitlines() if section else []
     return [
-        line for line, below in pairwise([*lines, ""]) if line and not line[0].isspace() and not below.startswith(" ")
+        line
+        for line, below in pairwise([*lines, ""])
+        if line and not line[0].isspace() and not below.startswith(" ")
     ]
 
 
 def documented(tree: ast.Module) -> Iterator[tuple[str, str]]:
-    """Yield the classes and functions of a module, private ones too, by name, with their docstrings."""
+    """Yield the classes and functions of a module, private ones too, by name, with their
+    docstrings.
+    """
     for node in ast.walk(tree):
         if isinstance(node, ast.ClassDef | ast.FunctionDef):
             yield node.name, ast.get_docstring(node) or ""
@@ -72,7 +84,9 @@ def documented(tree: ast.Module) -> Iterator[tuple[str, str]]:
 
 @pytest.fixture(scope="module")
 def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The modules as they are installed: grimp reads folders, and runs where Python finds these first."""
+    """The modules as they are installed: grimp reads folders, and runs where Python finds these
+    first.
+    """
     return write_tree(tmp_path_factory.mktemp("tree"))
 
 
@@ -94,7 +108,9 @@ def test_public_things_have_a_docstring(name: str) -> None:
     # The docstring of a dataclass or a named tuple without one is its signature.
     text = getattr(PUBLIC[name], "__doc__", None) or ""
     assert text.strip(), f"{name} has no docstring"
-    assert not text.startswith(f"{name.rsplit('.', 1)[-1]}("), f"{name} has its signature as docstring"
+    assert not text.startswith(f"{name.rsplit('.', 1)[-1]}("), (
+        f"{name} has its signature as docstring"
+    )
 
 
 @pytest.mark.parametrize("package", ["infoset", *PACKAGES])
@@ -114,7 +130,9 @@ def test_no_modules_import_each_other_in_a_circle(tree: Path) -> None:
         "import grimp, json; graph = grimp.build_graph('infoset', cache_dir=None); "
         "print(json.dumps({each: sorted(graph.find_modules_directly_imported_by(each)) for each in graph.modules}))"
     )
-    done = subprocess.run([sys.executable, "-c", code], cwd=tree, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tree, capture_output=True, text=True, check=True
+    )
     imports = json.loads(done.stdout)
     assert len(imports) > 250
     TopologicalSorter(imports).prepare()  # raises CycleError, which names the circle
@@ -126,8 +144,12 @@ def test_a_measured_angle_reaches_the_cut_of_a_section_in_five_functions() -> No
     found = re.findall(r"^\d\. `([\w.]+)` \(`([\w/]+)\.py`\)", text, flags=re.MULTILINE)
     assert len(found) == 5
     for (name, file), (called, _) in pairwise(found):
-        owner: Any = importlib.import_module(".".join(["infoset", *file.removeprefix("infoset/").split("/")]))
+        owner: Any = importlib.import_module(
+            ".".join(["infoset", *file.removeprefix("infoset/").split("/")])
+        )
         for part in name.split("."):
             owner = getattr(owner, part)
         source = inspect.getsource(getattr(owner, "py_func", owner))
-        assert re.search(rf"\b{called.rpartition('.')[2]}\(", source), f"{name} does not call {called}"
+        assert re.search(rf"\b{called.rpartition('.')[2]}\(", source), (
+            f"{name} does not call {called}"
+        )

@@ -22,7 +22,9 @@ ANY_SCENARIO = "asteroid-1997-single"
 
 def run_python(code: str, folder: Path) -> str:
     """Return what code prints in a new process that starts in a folder."""
-    done = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -54,7 +56,10 @@ def test_importing_infoset_loads_no_library(tmp_path: Path) -> None:
 
     loaded = set(run_python(code, tmp_path).split())
 
-    assert loaded - set(sys.stdlib_module_names) - {"sitecustomize", "__main__"} <= {"infoset", *startup(tmp_path)}
+    assert loaded - set(sys.stdlib_module_names) - {"sitecustomize", "__main__"} <= {
+        "infoset",
+        *startup(tmp_path),
+    }
 
 
 def startup(folder: Path) -> set[str]:
@@ -105,7 +110,11 @@ def test_installation_has_one_top_level_name() -> None:
 
 def test_python_m_infoset_is_the_command(tmp_path: Path) -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "infoset", "--version"], cwd=tmp_path, capture_output=True, text=True, check=True
+        [sys.executable, "-m", "infoset", "--version"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
     )
     assert re.fullmatch(r"infoset \d+\.\d+\.\d+\S*", done.stdout.splitlines()[0])
 
@@ -113,7 +122,9 @@ def test_python_m_infoset_is_the_command(tmp_path: Path) -> None:
 def test_scenario_by_name_is_refused_with_the_function_that_loads_it() -> None:
     name: Any = ANY_SCENARIO
     for function in (infoset.simulate, infoset.fly_one, infoset.find_worst, infoset.lower_bound):
-        with pytest.raises(TypeError, match=r"got 'asteroid-1997-single'; infoset\.load_scenario returns it"):
+        with pytest.raises(
+            TypeError, match=r"got 'asteroid-1997-single'; infoset\.load_scenario returns it"
+        ):
             function(name)
 
 

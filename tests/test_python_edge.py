@@ -1,4 +1,6 @@
-"""Python's edge is as strict as the files': what is no sound value is refused with its name, in one sentence."""
+"""Python's edge is as strict as the files': what is no sound value is refused with its name, in one
+sentence.
+"""
 
 from __future__ import annotations
 
@@ -120,7 +122,9 @@ ANY_SIGN = ("direction_rad", "elevation_rad")
 
 
 def refused(call: Callable[[], object], name: str) -> None:
-    """Check that a call is refused in a sentence that names the parameter, with no warning before it."""
+    """Check that a call is refused in a sentence that names the parameter, with no warning before
+    it.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         with pytest.raises(REFUSALS) as found:
@@ -134,7 +138,8 @@ def refused(call: Callable[[], object], name: str) -> None:
 @pytest.mark.parametrize("sound", SOUND, ids=lambda sound: type(sound).__name__)
 def test_what_is_no_value_of_a_field(sound: Any) -> None:
     for field in fields(sound):
-        value, bad = getattr(sound, field.name), list[Any]()
+        value = getattr(sound, field.name)
+        bad = list[Any]()
         if value == ():
             bad = [1.0, "ab"]
         elif isinstance(value, tuple):
@@ -218,10 +223,17 @@ NO_ARRAYS: tuple[Any, ...] = (
         (lambda given, value: given.measure_range(value, 0.05), "range_m"),
         (lambda given, value: given.measure_rate(value, 1e-6), "omega_rad_s"),
         (lambda given, value: given.shift(value), "impulse_m_s"),
-        (lambda given, value: given.measure_range(5.5e6, 0.05, alpha_rad=[] if value is None else value), "alpha_rad"),
+        (
+            lambda given, value: given.measure_range(
+                5.5e6, 0.05, alpha_rad=[] if value is None else value
+            ),
+            "alpha_rad",
+        ),
     ],
 )
-def test_what_is_no_measurement_or_impulse(operation: Callable[[Any, Any], object], name: str) -> None:
+def test_what_is_no_measurement_or_impulse(
+    operation: Callable[[Any, Any], object], name: str
+) -> None:
     for value in NO_ARRAYS:
         refused(partial(operation, information(), value), name)
 
@@ -297,7 +309,9 @@ class Returns:
 
     def measure(self, sight: Any, predicted: Any) -> Any:
         honest = {"angle": sight.alpha_rad}
-        return honest if sight.step == 0 else self.value(sight) if callable(self.value) else self.value
+        return (
+            honest if sight.step == 0 else self.value(sight) if callable(self.value) else self.value
+        )
 
 
 @pytest.mark.parametrize(
@@ -317,7 +331,10 @@ class Returns:
     ],
 )
 def test_what_a_strategy_must_not_want(wanted: Any, brief: Scenario) -> None:
-    refused(lambda: simulate(brief, 1, strategy=Returns(wanted)), "strategy Returns must return finite impulses")
+    refused(
+        lambda: simulate(brief, 1, strategy=Returns(wanted)),
+        "strategy Returns must return finite impulses",
+    )
 
 
 @pytest.mark.parametrize(
@@ -331,8 +348,14 @@ def test_what_a_strategy_must_not_want(wanted: Any, brief: Scenario) -> None:
         ({"angle": np.array([[0.0, 0.0]])}, "angle"),
         ({"angle": np.array([[1j]])}, "angle"),
         ({"angle": np.ma.masked_array([[0.0]], [[True]])}, "angle"),
-        (lambda sight: {"angle": sight.alpha_rad, "range": sight.range_m}, "sensor 'range' does not measure"),
-        (lambda sight: {"angle": sight.alpha_rad, "rate": sight.omega_rad_s}, "sensor 'rate' does not measure"),
+        (
+            lambda sight: {"angle": sight.alpha_rad, "range": sight.range_m},
+            "sensor 'range' does not measure",
+        ),
+        (
+            lambda sight: {"angle": sight.alpha_rad, "rate": sight.omega_rad_s},
+            "sensor 'rate' does not measure",
+        ),
     ],
 )
 def test_what_a_noise_must_not_measure(measured: Any, name: str, brief: Scenario) -> None:
@@ -341,11 +364,16 @@ def test_what_a_noise_must_not_measure(measured: Any, name: str, brief: Scenario
 
 def test_sensors_that_measure_now_and_then_are_asked_now_and_then(brief: Scenario) -> None:
     step_s = brief.set_model.step_s
-    scenario = replace(brief, range_sensor=RangeSensor(2 * step_s, 0.05), rate_sensor=RateSensor(3 * step_s, 1e-4))
+    scenario = replace(
+        brief, range_sensor=RangeSensor(2 * step_s, 0.05), rate_sensor=RateSensor(3 * step_s, 1e-4)
+    )
 
     class Honest:
         def measure(self, sight: Any, predicted: Any) -> Any:
-            assert ("range" in sight.sensors, "rate" in sight.sensors) == (sight.step % 2 == 0, sight.step % 3 == 0)
+            assert ("range" in sight.sensors, "rate" in sight.sensors) == (
+                sight.step % 2 == 0,
+                sight.step % 3 == 0,
+            )
             return {name: sensor.true_value(sight) for name, sensor in sight.sensors.items()}
 
     record = fly_one(scenario, noise=Honest(), strategy=SymmetricMiss())
@@ -354,4 +382,7 @@ def test_sensors_that_measure_now_and_then_are_asked_now_and_then(brief: Scenari
         assert record.measures("rate")[number] == (number % 3 == 0)
     always = replace(scenario, rate_sensor=None)
     both = Returns(lambda sight: {"angle": sight.alpha_rad, "range": sight.range_m})
-    refused(lambda: fly_one(always, noise=both), "sensor 'range' does not measure at this step, only ['angle']")
+    refused(
+        lambda: fly_one(always, noise=both),
+        "sensor 'range' does not measure at this step, only ['angle']",
+    )

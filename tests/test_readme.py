@@ -33,7 +33,9 @@ def command(name: str) -> str:
 def test_python_blocks_run(block: str, tmp_path: Path) -> None:
     script = tmp_path / "quickstart.py"
     script.write_text(block.replace("runs=200", "runs=3"), encoding="utf-8")
-    done = subprocess.run([sys.executable, script], cwd=ROOT, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, script], cwd=ROOT, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
     published, own = done.stdout.splitlines()
     assert published.startswith("<3 engagements: median miss")
@@ -64,7 +66,11 @@ def test_the_extra_and_the_command_of_the_readme_exist() -> None:
 
 
 def test_constraints_hold_names_and_versions_only() -> None:
-    pins = [line for line in (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines() if line[:1] != "#"]
+    pins = [
+        line
+        for line in (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
+        if line[:1] != "#"
+    ]
     assert all(re.fullmatch(r"[A-Za-z0-9._-]+==[A-Za-z0-9.+!]+", pin) for pin in pins)
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     needed = [*project["dependencies"], *project["optional-dependencies"]["test"]]
@@ -83,12 +89,16 @@ def test_exports_of_experiments_are_loaded_late() -> None:
         "print('pydantic' in sys.modules, 'numpy' in sys.modules); experiments.load_scenario; "
         "print('pydantic' in sys.modules)"
     )
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
     assert done.stdout.split() == ["False", "False", "True"]
 
 
 def test_public_names_of_experiments() -> None:
-    assert set(experiments.__all__) == {name for names in experiments._NAMES.values() for name in names}
+    assert set(experiments.__all__) == {
+        name for names in experiments._NAMES.values() for name in names
+    }
     for name in experiments.__all__:
         assert callable(getattr(experiments, name))
     package: Any = experiments

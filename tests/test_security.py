@@ -1,4 +1,6 @@
-"""What the code must never do, looked for in its own text, and what a file from a stranger must not bring about."""
+"""What the code must never do, looked for in its own text, and what a file from a stranger must not
+bring about.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,13 @@ from tests.records import first_steps
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 PACKAGES = {
     name: Path(spec.origin).parent
-    for name in ("infoset", "infoset.guidance", "infoset.sim", "infoset.rendezvous", "infoset.experiments")
+    for name in (
+        "infoset",
+        "infoset.guidance",
+        "infoset.sim",
+        "infoset.rendezvous",
+        "infoset.experiments",
+    )
     if (spec := find_spec(name)) is not None and spec.origin is not None
 } | ({"benchmarks": BENCHMARKS} if BENCHMARKS.is_dir() else {})
 """Where the packages are installed, and in a checkout the benchmarks."""
@@ -69,7 +77,9 @@ def test_nothing_that_runs_what_a_file_says(trees: dict[Path, ast.Module]) -> No
 def test_arrays_are_read_and_written_without_pickle(trees: dict[Path, ast.Module]) -> None:
     for file, tree in trees.items():
         for call in calls(tree):
-            of_numpy = isinstance(call.func, ast.Attribute) and ast.unparse(call.func).startswith(("np.", "numpy."))
+            of_numpy = isinstance(call.func, ast.Attribute) and ast.unparse(call.func).startswith(
+                ("np.", "numpy.")
+            )
             if of_numpy and name_of(call) in {"load", "read_array", "write_array"}:
                 given = {each.arg: each.value for each in call.keywords}
                 allowed = given.get("allow_pickle")
@@ -94,13 +104,17 @@ def record() -> Record:
     return first_steps(whole, 6)
 
 
-def test_no_code_that_a_file_names_is_run(record: Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_code_that_a_file_names_is_run(
+    record: Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A strategy that is a class in a Python file is loaded only if an option names it."""
     monkeypatch.chdir(tmp_path)
     Path("decoy.py").write_text("open('executed', 'w')\n\nclass Mine:\n    pass\n")
     name = "decoy.py:Mine"
     write_record(dataclasses.replace(record, strategy=name, noise=name), "x.npz")
-    Path("mine.toml").write_text(scenario_text("asteroid-1997").replace('"symmetric-miss"', f'"{name}"', 1))
+    Path("mine.toml").write_text(
+        scenario_text("asteroid-1997").replace('"symmetric-miss"', f'"{name}"', 1)
+    )
     assert infoset("replay", "x.npz", "--html", "page.html") == 0
     assert infoset("engage", "mine.toml") == 2
     assert not Path("executed").exists()
@@ -108,7 +122,11 @@ def test_no_code_that_a_file_names_is_run(record: Record, tmp_path: Path, monkey
 
 @pytest.mark.parametrize("key", ["strategy", "noise"])
 def test_a_record_cannot_steer_the_terminal(
-    key: str, record: Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    key: str,
+    record: Record,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
     write_record(dataclasses.replace(record, **{key: f"x{ESCAPE}"}), "x.npz")  # type: ignore[arg-type]
@@ -119,13 +137,20 @@ def test_a_record_cannot_steer_the_terminal(
 
 
 def test_keys_that_are_shown_cannot_steer_it_either(
-    record: Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    record: Record,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """What is wrong is shown, and may be anything: names of files, of keys, of members of an archive."""
+    """What is wrong is shown, and may be anything: names of files, of keys, of members of an
+    archive.
+    """
     monkeypatch.chdir(tmp_path)
     write_record(record, "x.npz")
     with np.load("x.npz") as arrays:
-        changed = dict(arrays) | {"header": np.frombuffer(json.dumps({ESCAPE: 1}).encode(), dtype=np.uint8)}
+        changed = dict(arrays) | {
+            "header": np.frombuffer(json.dumps({ESCAPE: 1}).encode(), dtype=np.uint8)
+        }
     with Path(f"{ESCAPE.replace('/', '')}.npz").open("wb") as file:
         np.savez(file, **changed)
     Path("mine.toml").write_text('name = "x"\n"a\\u001b[2J" = 1\n["\\u001b]0;owned"]\n')
@@ -140,7 +165,9 @@ def test_keys_that_are_shown_cannot_steer_it_either(
 def test_pages_show_names_as_text(record: Record, tmp_path: Path) -> None:
     scenario = dataclasses.replace(record.scenario, description=SCRIPT)
     file = tmp_path / "x.npz"
-    write_record(dataclasses.replace(record, scenario=scenario, strategy=SCRIPT, noise=SCRIPT), file)
+    write_record(
+        dataclasses.replace(record, scenario=scenario, strategy=SCRIPT, noise=SCRIPT), file
+    )
     found = load_record(file)
     assert found.strategy == SCRIPT
     text = interception_page([found])

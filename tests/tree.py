@@ -1,8 +1,9 @@
-"""The modules of the project as they are installed, for programs that read files: mypy, import-linter, editors.
+"""The modules of the project as they are installed, for programs that read files: mypy,
+import-linter, editors.
 
-In a checkout the package `infoset.sim` is the folder ``sim``, which only Python's import system finds
-(`infoset/__init__.py`). ``python tests/tree.py FOLDER`` makes links to all modules; where links are not allowed, as on
-Windows without the right to make them, copies.
+In a checkout the package `infoset.sim` is the folder ``sim``, which only Python's import system
+finds (`infoset/__init__.py`). ``python tests/tree.py FOLDER`` makes links to all modules; where
+links are not allowed, as on Windows without the right to make them, copies.
 """
 
 from __future__ import annotations

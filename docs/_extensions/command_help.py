@@ -1,4 +1,6 @@
-"""The directive `command-help`: a section for each command of `infoset`, with the output of `--help`."""
+"""The directive `command-help`: a section for each command of `infoset`, with the output of
+`--help`.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,8 @@ class CommandHelp(SphinxDirective):
         self.state.document.note_implicit_target(section, section)
         section += nodes.literal_block(text, text, language="text", classes=["command-help"])
         section += [
-            self._section(f"{name} {inner}", below) for inner, below in getattr(command, "commands", {}).items()
+            self._section(f"{name} {inner}", below)
+            for inner, below in getattr(command, "commands", {}).items()
         ]
         return section
 

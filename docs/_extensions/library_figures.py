@@ -11,7 +11,9 @@ DPI = 110
 
 
 def library_figures(block: Any, block_vars: dict[str, Any], gallery_conf: dict[str, Any]) -> str:
-    """Save the figure with the name `library_figure` of a block, once, and return the text that shows it."""
+    """Save the figure with the name `library_figure` of a block, once, and return the text that
+    shows it.
+    """
     figure = block_vars["example_globals"].pop("library_figure", None)
     if not isinstance(figure, Figure):
         return ""

@@ -1,7 +1,7 @@
 """Formulas as MathML, which browsers render without scripts or fonts from the network.
 
-docutils converts LaTeX to MathML. Three things that it does not do are added here: numbers of equations, bars as
-brackets, and an accent on a symbol with an index.
+docutils converts LaTeX to MathML. Three things that it does not do are added here: numbers of
+equations, bars as brackets, and an accent on a symbol with an index.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from sphinx.util import logging
 from sphinx.writers.html5 import HTML5Translator
 
 _TAG = re.compile(r"\\tag\{([^}]*)\}")
-_LEFT_BAR, _RIGHT_BAR = re.compile(r"(?<!\\left)\\lvert\b"), re.compile(r"(?<!\\right)\\rvert\b")
+_LEFT_BAR = re.compile(r"(?<!\\left)\\lvert\b")
+_RIGHT_BAR = re.compile(r"(?<!\\right)\\rvert\b")
 # docutils puts the index of an accented symbol under it: <munderover> base index accent.
 _ACCENT_AND_INDEX = re.compile(
     r"<munderover>\s*(<mi>[^<]*</mi>)\s*(<m[in]>[^<]*</m[in]>)\s*(<mo stretchy=\"false\">[^<]*</mo>)\s*</munderover>"
@@ -53,5 +54,7 @@ def _visit_block(translator: HTML5Translator, node: nodes.math_block) -> None:
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the renderer `mathml`."""
-    app.add_html_math_renderer("mathml", inline_renderers=(_visit_inline, None), block_renderers=(_visit_block, None))
+    app.add_html_math_renderer(
+        "mathml", inline_renderers=(_visit_inline, None), block_renderers=(_visit_block, None)
+    )
     return {"version": "1", "parallel_read_safe": True}

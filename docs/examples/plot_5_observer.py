@@ -2,10 +2,11 @@
 An observer of your own system
 ==============================
 
-The exact sets of position and speed of a vehicle that measures its position, through a tunnel without measurements.
+The exact sets of position and speed of a vehicle that measures its position, through a tunnel
+without measurements.
 
-The error of a measurement is at most 3 m. The acceleration is known to 0.4 m/s². Nothing is assumed about the
-distribution of the errors.
+The error of a measurement is at most 3 m. The acceleration is known to 0.4 m/s². Nothing is assumed
+about the distribution of the errors.
 """
 
 import matplotlib.pyplot as plt
@@ -49,14 +50,22 @@ plane.plot(*states[10:24:3].T, "x", color="#08306b")
 plane.set(xlabel="position, m", ylabel="speed, m/s", title="sets every 1.5 s")
 steps = np.arange(30)
 for sets, colour in ((estimates, "#3f6f9f"), (smoothed, "#e6842a")):
-    lower, upper = (np.array([getattr(each, end)[1] for each in sets]) for end in ("lower", "upper"))
+    lower, upper = (
+        np.array([getattr(each, end)[1] for each in sets]) for end in ("lower", "upper")
+    )
     speed.fill_between(steps, lower, upper, color=colour, alpha=0.35)
 speed.plot(steps, states[:, 1], color="#08306b")
-speed.set(xlabel="step", ylabel="speed, m/s", ylim=(5, 20), title="bounds of the speed: filtered, smoothed")
+speed.set(
+    xlabel="step",
+    ylabel="speed, m/s",
+    ylim=(5, 20),
+    title="bounds of the speed: filtered, smoothed",
+)
 plt.show()
 
 # %%
-# If a measurement contradicts the model, the set becomes empty. The observer tells the step and the excess.
+# If a measurement contradicts the model, the set becomes empty. The observer tells the step and the
+# excess.
 
 measurements[25] = [measurements[25][0] + 20.0]
 again = LinearObserver(

@@ -2,10 +2,11 @@
 Rendezvous: where several craft meet, and one that visits two targets
 =====================================================================
 
-Three craft near a circular orbit choose the meeting point that is best for the group. A chaser then visits two targets.
+Three craft near a circular orbit choose the meeting point that is best for the group. A chaser then
+visits two targets.
 
-Both problems have exact solutions: quadratic costs, and linear motion in Hill's axes (x radially outward, y along the
-motion, z along the orbit's normal).
+Both problems have exact solutions: quadratic costs, and linear motion in Hill's axes (x radially
+outward, y along the motion, z along the orbit's normal).
 """
 
 import matplotlib.pyplot as plt
@@ -18,8 +19,12 @@ from infoset.rendezvous.pareto import solve_encounter
 
 meeting = solve_encounter(load_problem("pareto-2008").encounter)
 print("meeting at", meeting.meeting_state()[:3].round(1), "m")
-for craft, squared, excess in zip(meeting.encounter.craft, meeting.cost_squared(), meeting.excess(), strict=True):
-    print(f"{craft.name}: cost {np.sqrt(squared):.1f}, alone {np.sqrt(squared - excess):.1f} m/s^1.5")
+for craft, squared, excess in zip(
+    meeting.encounter.craft, meeting.cost_squared(), meeting.excess(), strict=True
+):
+    print(
+        f"{craft.name}: cost {np.sqrt(squared):.1f}, alone {np.sqrt(squared - excess):.1f} m/s^1.5"
+    )
 
 # %%
 # The flights to the meeting.
@@ -27,22 +32,28 @@ for craft, squared, excess in zip(meeting.encounter.craft, meeting.cost_squared(
 library_figure = draw_trajectories(meeting)
 
 # %%
-# A chaser that starts at rest flies by two drifting targets. The first time is free, the last one is given: moving the
-# first visit saves control.
+# A chaser that starts at rest flies by two drifting targets. The first time is free, the last one
+# is given: moving the first visit saves control.
 
 problem = load_problem("service-2")
 order, times_s = (0, 1), np.array(problem.times_s)
 given = problem.tour.fly(order, times_s)
 best = best_times(problem.tour, order, TimeLimits(latest_s=times_s[-1]), [times_s])
-print(f"cost {given.cost:.4g} with the given times, {best.path.cost:.4g} with the best ones: {best.time_s.round(0)} s")
+print(
+    f"cost {given.cost:.4g} with the given times, {best.path.cost:.4g} with the best ones: "
+    f"{best.time_s.round(0)} s"
+)
 
 seconds = np.linspace(0.0, times_s[-1], 400)
 figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
 for path, name, colour in ((given, "given times", "#3f6f9f"), (best.path, "best times", "#e6842a")):
-    axes.plot(seconds, 1e3 * np.linalg.norm(path.control(seconds), axis=-1), color=colour, label=name)
+    axes.plot(
+        seconds, 1e3 * np.linalg.norm(path.control(seconds), axis=-1), color=colour, label=name
+    )
 axes.set(xlabel="time, s", ylabel="control, mm/s²")
 axes.legend()
 plt.show()
 
 # %%
-# `Where several craft meet <../pareto.html>`_ and `Visits <../multipoint.html>`_ have the theory and the commands.
+# `Where several craft meet <../pareto.html>`_ and `Visits <../multipoint.html>`_ have the theory
+# and the commands.

@@ -1,4 +1,6 @@
-"""Figures of a campaign: distributions with bands, convergence of quantiles, and the miss over the initial state."""
+"""Figures of a campaign: distributions with bands, convergence of quantiles, and the miss over the
+initial state.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,12 @@ from infoset.experiments.common.figure_style import (
 )
 from infoset.experiments.common.screen import some_runs
 from infoset.experiments.interception.figures.b_plane import Cloud, draw_b_plane
-from infoset.experiments.interception.figures.distributions import MAX_POINTS, Sample, axis_limit, draw_samples
+from infoset.experiments.interception.figures.distributions import (
+    MAX_POINTS,
+    Sample,
+    axis_limit,
+    draw_samples,
+)
 from infoset.sim import estimate_quantiles
 from infoset.sim.statistics import level_name, shows
 from infoset.sim.storage import CampaignFolder
@@ -34,7 +41,9 @@ from infoset.sim.storage import CampaignFolder
 CONVERGING = {0.5: "-", 0.9: (0, (5, 1.5)), 0.99: (0, (1.5, 1.2))}
 """Levels of the quantiles over the number of runs, with their lines."""
 RUNS_A_BIN = 100
-"""Minimum mean number of runs in a bin of the median and the 90 % quantile over the initial state."""
+"""Minimum mean number of runs in a bin of the median and the 90 % quantile over the initial
+state.
+"""
 _BINNED = (0.5, 0.9)
 _LOOKS = 28
 _DECADES_FROM = 1000
@@ -44,7 +53,8 @@ _QUANTITIES = {"miss_m": "miss, m", "impulse_m_s": "impulse spent, m/s"}
 
 
 def draw_all(folder: CampaignFolder) -> Iterator[Figure]:
-    """Draw the figures of a campaign, one after the other; in space also the misses across the approach.
+    """Draw the figures of a campaign, one after the other; in space also the misses across the
+    approach.
 
     Only the columns of one figure are in memory.
     """
@@ -60,13 +70,19 @@ def _distributions(folder: CampaignFolder) -> list[Sample]:
     """Return what the distributions of each noise show."""
     scenario = folder.manifest.scenario
     sensor = "no" if scenario.range_sensor is None else "with"
-    bound = "guaranteed miss" if scenario.set_model.is_guaranteed else "the paper's $\\Phi$ (not a bound here)"
+    bound = (
+        "guaranteed miss"
+        if scenario.set_model.is_guaranteed
+        else "the paper's $\\Phi$ (not a bound here)"
+    )
     samples = []
     for noise, runs in samples_of(folder, (*_QUANTITIES, "guaranteed_miss_m")).items():
         miss_m, impulse_m_s = (runs[name].to_numpy() for name in _QUANTITIES)
         bounds_m = runs["guaranteed_miss_m"].dropna().to_numpy()
         title = f"{noise} noise, {sensor} range sensor, {some_runs(len(runs))}"
-        samples.append(Sample(title, _look(noise), miss_m, impulse_m_s, bounds_m, f"{noise} noise: {bound}"))
+        samples.append(
+            Sample(title, _look(noise), miss_m, impulse_m_s, bounds_m, f"{noise} noise: {bound}")
+        )
     return samples
 
 
@@ -81,15 +97,19 @@ def _clouds(folder: CampaignFolder) -> list[Cloud]:
         has_bound = scenario.set_model.is_guaranteed and bounds_m.notna().all()
         most_m = float(bounds_m.max()) if has_bound else None
         title = f"{noise} noise, {some_runs(len(runs))}"
-        clouds.append(Cloud(title, runs[[*across]].to_numpy(), runs["miss_m"].to_numpy(), most_m, has_axes))
+        clouds.append(
+            Cloud(title, runs[[*across]].to_numpy(), runs["miss_m"].to_numpy(), most_m, has_axes)
+        )
     return clouds
 
 
 @style()
 def draw_convergence(by_noise: dict[str, pd.DataFrame]) -> Figure:
-    """Draw quantiles of the miss and the impulse of the first n runs over n, with their confidence intervals.
+    """Draw quantiles of the miss and the impulse of the first n runs over n, with their confidence
+    intervals.
 
-    A quantile is drawn from the number of runs on that shows it (`infoset.sim.statistics.shows`). Each noise has a row.
+    A quantile is drawn from the number of runs on that shows it (`infoset.sim.statistics.shows`).
+    Each noise has a row.
     """
     figure, panels = subplots(62.0 * len(by_noise) + 14.0, len(by_noise), 2)
     for row, (noise, runs) in zip(panels, by_noise.items(), strict=True):
@@ -105,7 +125,9 @@ def draw_convergence(by_noise: dict[str, pd.DataFrame]) -> Figure:
 
 
 def _draw_quantiles(axes: Axes, sample: Floats, colour: str) -> None:
-    counts = np.unique(np.geomspace(min(10, sample.size), sample.size, _LOOKS).astype(np.int64)).tolist()
+    counts = np.unique(
+        np.geomspace(min(10, sample.size), sample.size, _LOOKS).astype(np.int64)
+    ).tolist()
     looks = [estimate_quantiles(sample[:count], [*CONVERGING]) for count in counts]
     for index, (level, dashes) in enumerate(CONVERGING.items()):
         found = pd.DataFrame([look[index] for look in looks], index=counts, dtype=np.float64)
@@ -114,7 +136,9 @@ def _draw_quantiles(axes: Axes, sample: Floats, colour: str) -> None:
             axes.plot([], [], color=INK, linestyle=dashes, label=level_name(level))
         point: dict[str, Any] = {"marker": "o", "markersize": 3.0} if len(found) == 1 else {}
         axes.plot(found.index, found["value"], color=colour, linestyle=dashes, zorder=3.0, **point)
-        axes.fill_between(found.index, found["lower"], found["upper"], color=colour, alpha=0.18, linewidth=0.0)
+        axes.fill_between(
+            found.index, found["lower"], found["upper"], color=colour, alpha=0.18, linewidth=0.0
+        )
     axes.set(xlim=(0.9 * counts[0], 1.1 * counts[-1]), xscale="log")
     plain_ticks(axes.xaxis, TICKS if sample.size < _DECADES_FROM else TICKS[:1])
     bottom, top = axes.get_ylim()
@@ -123,7 +147,8 @@ def _draw_quantiles(axes: Axes, sample: Floats, colour: str) -> None:
 
 @style()
 def draw_dispersion(by_noise: dict[str, pd.DataFrame]) -> Figure:
-    """Draw the miss over each component of the initial state: the runs, their median and their 90 % quantile.
+    """Draw the miss over each component of the initial state: the runs, their median and their 90 %
+    quantile.
 
     Each noise has a row, in space one of positions and one of velocities.
     """
@@ -137,13 +162,18 @@ def draw_dispersion(by_noise: dict[str, pd.DataFrame]) -> Figure:
     letters(panels.flat, [f"{noise} noise" for noise, _ in over])
     for row in panels:
         row[0].set_ylabel("miss, m")
-    legend_below(figure, 3, title=f"at most {MAX_POINTS} runs are drawn; quantiles of {RUNS_A_BIN} and more runs")
+    legend_below(
+        figure,
+        3,
+        title=f"at most {MAX_POINTS} runs are drawn; quantiles of {RUNS_A_BIN} and more runs",
+    )
     return figure
 
 
 def _draw_cloud(axes: Axes, name: str, runs: pd.DataFrame, colour: str) -> None:
     """Draw the miss over a component of the start, with quantiles if the runs are enough."""
-    letter, miss_m = name.removeprefix("start_").split("_")[0], runs["miss_m"].to_numpy()
+    letter = name.removeprefix("start_").split("_")[0]
+    miss_m = runs["miss_m"].to_numpy()
     is_speed = letter.startswith("v")
     start = runs[name].to_numpy() * (1.0 if is_speed else 1e-3)
     axes.set_xlabel(f"initial $V_{letter[1:]}$, m/s" if is_speed else f"initial ${letter}$, km")
@@ -153,21 +183,36 @@ def _draw_cloud(axes: Axes, name: str, runs: pd.DataFrame, colour: str) -> None:
     limit = 1.04 * axis_limit([miss_m]) or 1.0
     axes.set_ylim(0.0, limit)
     if beyond := int((miss_m > limit).sum()):
-        place: dict[str, Any] = {"xycoords": "axes fraction", "ha": "right", "va": "top", "path_effects": HALO}
+        place: dict[str, Any] = {
+            "xycoords": "axes fraction",
+            "ha": "right",
+            "va": "top",
+            "path_effects": HALO,
+        }
         axes.annotate(f"{beyond} runs above", (0.97, 0.97), fontsize="small", **place)
     step = -(-miss_m.size // MAX_POINTS)
     size = min(2.2, (MAX_POINTS / miss_m.size) ** 0.25) if step == 1 else 1.0
-    look: dict[str, Any] = {"color": colour, "alpha": 0.4 * size, "markersize": 2.5 * size, "markeredgewidth": 0.0}
+    look: dict[str, Any] = {
+        "color": colour,
+        "alpha": 0.4 * size,
+        "markersize": 2.5 * size,
+        "markeredgewidth": 0.0,
+    }
     axes.plot(start[::step], miss_m[::step], ".", rasterized=True, zorder=2.0, label="runs", **look)
     bins = min(_BINS, miss_m.size // RUNS_A_BIN)
     if bins > 1 and np.ptp(start) > 0.0:
         by_bin = pd.Series(miss_m).groupby(pd.cut(start, bins), observed=True)
         for level in _BINNED:
             values = by_bin.quantile(level)
-            middles, dashes = [each.mid for each in values.index], CONVERGING[level]
-            axes.plot(middles, values, color=INK, linestyle=dashes, zorder=3.0, label=level_name(level))
+            middles = [each.mid for each in values.index]
+            dashes = CONVERGING[level]
+            axes.plot(
+                middles, values, color=INK, linestyle=dashes, zorder=3.0, label=level_name(level)
+            )
 
 
 def _look(noise: str) -> dict[str, Any]:
-    """Return the line style: dark and solid, or light and dashed, which differ also without colours."""
+    """Return the line style: dark and solid, or light and dashed, which differ also without
+    colours.
+    """
     return CURVE_LOOKS[4 if noise == "game" else 1]

@@ -18,22 +18,28 @@ PATIENCE_S = 8.0
 
 RETRIES = 3
 RUNS_OF_A_PROCESS = 1500
-"""Minimum number of runs for each process. Processes take a second to start; later they are up to 1.2 times as fast as
-threads, which share the interpreter's lock."""
+"""Minimum number of runs for each process. Processes take a second to start; later they are up to
+1.2 times as fast as threads, which share the interpreter's lock."""
 
 
 @contextlib.contextmanager
-def workers_of(options: Flight, runs: int, note: Callable[[str], None]) -> Iterator[tuple[Executor | None, int | None]]:
-    """Start the workers that the options choose for a number of runs; yield the arguments of `Campaign.run`.
+def workers_of(
+    options: Flight, runs: int, note: Callable[[str], None]
+) -> Iterator[tuple[Executor | None, int | None]]:
+    """Start the workers that the options choose for a number of runs; yield the arguments of
+    `Campaign.run`.
 
     `note` prints a line.
     """
     if options.dask is not None and options.workers is not None:
-        raise InputError("--workers and --dask (a cluster) cannot be combined; give only one of them")
+        raise InputError(
+            "--workers and --dask (a cluster) cannot be combined; give only one of them"
+        )
     workers = options.workers or os.cpu_count() or 1
     if options.dask is not None:
         with cluster(options.dask, note) as (executor, threads):
-            # With two chunks per thread all threads have work while results are sent, and workers can join later.
+            # With two chunks per thread all threads have work while results are sent, and workers
+            # can join later.
             yield executor, max(2 * threads, 16)
     elif workers > 1 and runs >= RUNS_OF_A_PROCESS * workers:
         with worker_processes(workers) as pool:
@@ -44,33 +50,43 @@ def workers_of(options: Flight, runs: int, note: Callable[[str], None]) -> Itera
 
 @contextlib.contextmanager
 def cluster(address: str, note: Callable[[str], None]) -> Iterator[tuple[Executor, int]]:
-    """Connect to the Dask scheduler at an address such as tcp://host:8786; yield its executor and number of threads.
+    """Connect to the Dask scheduler at an address such as tcp://host:8786; yield its executor and
+    number of threads.
 
     Raise `InputError` if the scheduler does not answer in time, or it has no workers.
     """
     from distributed import Client
 
-    if not address.startswith("tls://") and urlsplit(address).hostname not in ("localhost", "127.0.0.1", "::1"):
+    if not address.startswith("tls://") and urlsplit(address).hostname not in (
+        "localhost",
+        "127.0.0.1",
+        "::1",
+    ):
         note(
-            f"warning: --dask: the connection to {address} is not encrypted, and everyone who reaches that address can "
-            "run programs there: use a private network, or tls:// (see the documentation, campaigns)"
+            f"warning: --dask: the connection to {address} is not encrypted, and everyone who "
+            "reaches that address can run programs there: use a private network, or tls:// (see "
+            "the documentation, campaigns)"
         )
-    # The failure of a scheduler is one message of the command, without tracebacks of the client's threads.
+    # The failure of a scheduler is one message of the command, without tracebacks of the client's
+    # threads.
     for name in ("distributed", "distributed.client", "tornado.application", "asyncio"):
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     with contextlib.ExitStack() as stack:
         try:
             client = stack.enter_context(Client(address, timeout=PATIENCE_S, set_as_default=False))
-        except Exception as error:  # another program may send anything, and reading it may fail in any way
+        except (
+            Exception
+        ) as error:  # another program may send anything, and reading it may fail in any way
             raise InputError(
-                f"--dask: no Dask scheduler answers at {address} ({str(error)[:150]}); start one with: dask scheduler, "
-                "and check the address that it prints"
+                f"--dask: no Dask scheduler answers at {address} ({str(error)[:150]}); start one "
+                "with: dask scheduler, and check the address that it prints"
             ) from None
         try:
             client.wait_for_workers(1, timeout=PATIENCE_S)
         except OSError:
             raise InputError(
-                f"--dask: the scheduler at {address} has no workers; start some with: dask worker {address}"
+                f"--dask: the scheduler at {address} has no workers; start some with: dask worker "
+                f"{address}"
             ) from None
         threads = client.nthreads()
         note(f"{len(threads)} Dask workers, {sum(threads.values())} threads")

@@ -8,7 +8,15 @@ from typing import Annotated, Literal
 
 import typer
 
-from infoset.experiments.common.options import Csv, FileOptions, Json, Overwrite, Quiet, Seed, Settings
+from infoset.experiments.common.options import (
+    Csv,
+    FileOptions,
+    Json,
+    Overwrite,
+    Quiet,
+    Seed,
+    Settings,
+)
 from infoset.experiments.interception.command import (
     MAX_RUNS,
     ModelName,
@@ -42,7 +50,9 @@ class Flight:
     scenario: ScenarioName = "asteroid-1997"
     settings: Settings = None
     runs: Annotated[int, typer.Option(metavar="N", min=1, max=MAX_RUNS, help="Number of runs.")]
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the runs; created if needed.")]
+    out: Annotated[
+        Path, typer.Option(metavar="DIR", help="Folder for the runs; created if needed.")
+    ]
     noise: NoiseName = None
     seed: Seed = 0
     strategy: StrategyName = None
@@ -52,7 +62,10 @@ class Flight:
     overwrite: Overwrite = False
     quiet: Quiet = False
     resume: Annotated[
-        bool, typer.Option("--resume", help="Continue the campaign in DIR; if DIR is empty, start a new one.")
+        bool,
+        typer.Option(
+            "--resume", help="Continue the campaign in DIR; if DIR is empty, start a new one."
+        ),
     ] = False
     chunk: Annotated[
         int | None,
@@ -60,7 +73,10 @@ class Flight:
             metavar="N",
             min=1,
             max=MAX_AT_ONCE,
-            help="Number of runs in a shard; it does not change the results. Default: depends on the number of runs.",
+            help=(
+                "Number of runs in a shard; it does not change the results. Default: depends on "
+                "the number of runs."
+            ),
         ),
     ] = None
     workers: Annotated[
@@ -69,15 +85,19 @@ class Flight:
             metavar="W",
             min=1,
             max=MAX_WORKERS,
-            help="Number of cores of this machine to use: by threads, or by processes in a long campaign. "
-            "Default: all.",
+            help=(
+                "Number of cores of this machine to use: by threads, or by processes in a long "
+                "campaign. Default: all."
+            ),
         ),
     ] = None
     dask: Annotated[
         str | None,
         typer.Option(
             metavar="ADDRESS",
-            help="Simulate on a Dask cluster: address of its scheduler, for example tcp://host:8786.",
+            help=(
+                "Simulate on a Dask cluster: address of its scheduler, for example tcp://host:8786."
+            ),
         ),
     ] = None
 
@@ -86,12 +106,13 @@ class Flight:
 class Campaign(Flight):
     """Simulate a campaign: thousands of runs, stored in a folder.
 
-    The runs are stored in DIR in shards (files of many runs). A shard is written as soon as its runs are complete.
-    After any interruption, the same command with --resume continues the campaign; with a greater --runs it extends the
-    campaign. The numbers depend only on the scenario, the seed and the run, not on workers, shards or interruptions.
-    With --noise mixed, even runs have random noise and odd ones game noise.
-    Run K with a noise is the same engagement as in: infoset engage DIR/scenario.toml --noise NOISE --seed SEED --run K.
-    To see the results: infoset report DIR.
+    The runs are stored in DIR in shards (files of many runs). A shard is written as soon as its
+    runs are complete. After any interruption, the same command with --resume continues the
+    campaign; with a greater --runs it extends the campaign. The numbers depend only on the
+    scenario, the seed and the run, not on workers, shards or interruptions. With --noise mixed,
+    even runs have random noise and odd ones game noise. Run K with a noise is the same engagement
+    as in: infoset engage DIR/scenario.toml --noise NOISE --seed SEED --run K. To see the results:
+    infoset report DIR.
     """
 
     until: Annotated[
@@ -106,7 +127,10 @@ class Campaign(Flight):
         bool,
         typer.Option(
             "--guarantee/--no-guarantee",
-            help="Compute the bound Phi in the model guaranteed (1.1 to 1.9 times the time, with rates up to 9).",
+            help=(
+                "Compute the bound Phi in the model guaranteed (1.1 to 1.9 times the time, with "
+                "rates up to 9)."
+            ),
         ),
     ] = True
     csv: Csv = None
@@ -116,34 +140,43 @@ class Campaign(Flight):
 class Sweep(Flight):
     """Find the values of a scenario's keys that meet a requirement.
 
-    For example, to find which sensor and which engine hit a body of a given size. Each combination of values is a cell.
-    It meets the requirement, does not meet it, or is undecided. All cells have the same initial states and random
-    errors, and are stored like a campaign. DIR contains the runs; one table, sweep.parquet, with one row for each cell;
-    and a figure for each noise: lines for one key, maps for two keys. With --noise mixed, even runs have random
-    noise and odd ones game noise.
+    For example, to find which sensor and which engine hit a body of a given size. Each combination
+    of values is a cell. It meets the requirement, does not meet it, or is undecided. All cells have
+    the same initial states and random errors, and are stored like a campaign. DIR contains the
+    runs; one table, sweep.parquet, with one row for each cell; and a figure for each noise: lines
+    for one key, maps for two keys. With --noise mixed, even runs have random noise and odd ones
+    game noise.
 
     Forms of --vary: KEY=FROM:TO:COUNT, equal spacing; KEY=log:FROM:TO:COUNT, logarithmic spacing;
-    KEY1=KEY2=FROM:TO:COUNT, two keys with the same values; KEY.min or KEY.max, an end of a pair; angle_sensor.scale, a
-    factor of all error bounds of a sensor. For example: --vary angle_sensor.scale=1:8:8 --vary
-    thruster.max_impulse_m_s=2.5:20:8.
+    KEY1=KEY2=FROM:TO:COUNT, two keys with the same values; KEY.min or KEY.max, an end of a pair;
+    angle_sensor.scale, a factor of all error bounds of a sensor. For example: --vary
+    angle_sensor.scale=1:8:8 --vary thruster.max_impulse_m_s=2.5:20:8.
     """
 
-    runs: Annotated[int, typer.Option(metavar="N", min=1, max=MAX_RUNS, help="Number of runs of each cell.")] = 400
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the runs; created if needed.")] = Path("sweep")
+    runs: Annotated[
+        int, typer.Option(metavar="N", min=1, max=MAX_RUNS, help="Number of runs of each cell.")
+    ] = 400
+    out: Annotated[
+        Path, typer.Option(metavar="DIR", help="Folder for the runs; created if needed.")
+    ] = Path("sweep")
     vary: Annotated[
         list[str],
         typer.Option(
             metavar="KEY=VALUES,...",
-            help="Keys of the scenario file and their values, in the units of the file; the forms are above. Can be "
-            "repeated.",
+            help=(
+                "Keys of the scenario file and their values, in the units of the file; the forms "
+                "are above. Can be repeated."
+            ),
         ),
     ]
     require: Required = None
     until: Annotated[
         Literal["decided"] | None,
         typer.Option(
-            help="decided: add runs to each cell until the requirement is met or not met there, at most --max-runs. "
-            "The confidence of the decisions holds although runs are added."
+            help=(
+                "decided: add runs to each cell until the requirement is met or not met there, at "
+                "most --max-runs. The confidence of the decisions holds although runs are added."
+            )
         ),
     ] = None
     max_runs: Annotated[
@@ -156,7 +189,10 @@ class Sweep(Flight):
         ),
     ] = None
     guarantee: Annotated[
-        bool, typer.Option("--guarantee/--no-guarantee", help="Compute the bound Phi in the model guaranteed.")
+        bool,
+        typer.Option(
+            "--guarantee/--no-guarantee", help="Compute the bound Phi in the model guaranteed."
+        ),
     ] = False
 
 
@@ -164,13 +200,17 @@ class Sweep(Flight):
 class Report(FileOptions):
     """Report on a stored campaign or sweep.
 
-    The campaign or sweep may be incomplete. For a campaign: quantiles with 95 % confidence intervals, outcomes of the
-    runs, correlation of the miss with the initial state, and the ten worst runs, each with the command that simulates
-    it again; with --out, figures of the distributions, of the convergence of the quantiles, and of the miss against the
-    initial state. For a sweep: the values that meet the requirement; with --out, the table and the figures. --require
-    is for sweeps. Without --out or --json no file is written.
+    The campaign or sweep may be incomplete. For a campaign: quantiles with 95 % confidence
+    intervals, outcomes of the runs, correlation of the miss with the initial state, and the ten
+    worst runs, each with the command that simulates it again; with --out, figures of the
+    distributions, of the convergence of the quantiles, and of the miss against the initial state.
+    For a sweep: the values that meet the requirement; with --out, the table and the figures.
+    --require is for sweeps. Without --out or --json no file is written.
     """
 
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder written by infoset campaign or infoset sweep.")]
+    folder: Annotated[
+        Path,
+        typer.Argument(metavar="DIR", help="Folder written by infoset campaign or infoset sweep."),
+    ]
     require: Required = None
     csv: Csv = None

@@ -13,7 +13,11 @@ from infoset.experiments.campaigns.command import Flight
 from infoset.experiments.common.errors import InputError
 from infoset.experiments.common.output import need_writable
 from infoset.experiments.common.screen import NOT_FINITE, progress_bar, say, say_warnings
-from infoset.experiments.interception.scenario_file import feasibility_warnings, scenario_warnings, study_scenario
+from infoset.experiments.interception.scenario_file import (
+    feasibility_warnings,
+    scenario_warnings,
+    study_scenario,
+)
 from infoset.experiments.interception.strategies import OwnNoise, chosen_noise, own_code_errors
 from infoset.sim import Campaign, CampaignNoise, Scenario
 from infoset.sim.storage import MANIFEST, CampaignFolder, StorageError, need_free, read_manifest
@@ -27,7 +31,9 @@ MAX_WARNINGS = 5
 
 
 def scenario_of(options: Flight) -> tuple[Scenario, list[str]]:
-    """Return the scenario that the options describe, with the campaign's noise, and lines about it for the screen."""
+    """Return the scenario that the options describe, with the campaign's noise, and lines about it
+    for the screen.
+    """
     resumed = None
     if options.resume and (options.out / MANIFEST).is_file():
         resumed = read_manifest(options.out).scenario.information_set.model
@@ -45,26 +51,40 @@ def noise_of(options: Flight) -> CampaignNoise | OwnNoise | None:
     return CampaignNoise(chosen) if isinstance(chosen, str) else chosen
 
 
-def fly(campaign: Campaign, options: Flight, notes: Sequence[str]) -> tuple[CampaignFolder, list[str], float]:
-    """Simulate the engagements that the folder of a campaign does not contain yet, with messages on stderr.
+def fly(
+    campaign: Campaign, options: Flight, notes: Sequence[str]
+) -> tuple[CampaignFolder, list[str], float]:
+    """Simulate the engagements that the folder of a campaign does not contain yet, with messages on
+    stderr.
 
     Return the folder, the warnings about the scenarios, and the time of this session, s.
     """
     need_free(options.out, resume=options.resume)
     need_writable(options.out)
     scenarios = campaign.cells or (campaign.scenario,)
-    warnings = list(dict.fromkeys(line for scenario in scenarios for line in scenario_warnings(scenario)))
+    warnings = list(
+        dict.fromkeys(line for scenario in scenarios for line in scenario_warnings(scenario))
+    )
     corners = dict.fromkeys((scenarios[0], scenarios[-1]))
-    for name, scenario in zip(("first cell: ", "last cell: ") if campaign.cells else ("",), corners, strict=False):
+    for name, scenario in zip(
+        ("first cell: ", "last cell: ") if campaign.cells else ("",), corners, strict=False
+    ):
         warnings += [f"{name}{line}" for line in feasibility_warnings(scenario)]
     say_warnings(warnings[: MAX_WARNINGS if campaign.cells else None], options.quiet, notes)
     with (
-        workers_of(options, campaign.engagements, partial(say, quiet=options.quiet)) as (executor, workers),
+        workers_of(options, campaign.engagements, partial(say, quiet=options.quiet)) as (
+            executor,
+            workers,
+        ),
         progress_bar(options.quiet) as begin,
     ):
         began_s = time.perf_counter()
         folder = campaign.run(
-            executor, workers=workers, resume=options.resume, progress=begin("campaign"), within_chunks=True
+            executor,
+            workers=workers,
+            resume=options.resume,
+            progress=begin("campaign"),
+            within_chunks=True,
         )
     return folder, warnings, time.perf_counter() - began_s
 
@@ -79,13 +99,15 @@ def campaign_errors(resume_hint: str = "") -> Iterator[None]:
         raise KeyboardInterrupt(resume_hint) from None
     except MemoryError as error:
         raise InputError(
-            f"not enough memory ({error}); free some, or give fewer --workers or a smaller --chunk{resume_hint}"
+            f"not enough memory ({error}); free some, or give fewer --workers or a smaller "
+            f"--chunk{resume_hint}"
         ) from None
     except StorageError as error:
         raise InputError(str(error)) from None
     except VersionError as error:
         raise InputError(
-            f"--dask: other versions may compute other numbers: {error}; install the same versions there{resume_hint}"
+            f"--dask: other versions may compute other numbers: {error}; install the same versions "
+            f"there{resume_hint}"
         ) from None
     except FloatingPointError:
         raise InputError(NOT_FINITE) from None
@@ -95,4 +117,6 @@ def campaign_errors(resume_hint: str = "") -> Iterator[None]:
         if not isinstance(error, CancelledError | BrokenExecutor) and not is_of_cluster:
             raise
         reason = str(error)[:200] or type(error).__name__
-        raise InputError(f"a worker process or the cluster has stopped ({reason}){resume_hint}") from None
+        raise InputError(
+            f"a worker process or the cluster has stopped ({reason}){resume_hint}"
+        ) from None

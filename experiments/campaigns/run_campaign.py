@@ -3,7 +3,14 @@
 from __future__ import annotations
 
 from infoset.experiments.campaigns.command import Campaign as Options
-from infoset.experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, campaign_errors, fly, noise_of, scenario_of
+from infoset.experiments.campaigns.flight import (
+    RESUME_HINT,
+    SCENARIO_FILE,
+    campaign_errors,
+    fly,
+    noise_of,
+    scenario_of,
+)
 from infoset.experiments.campaigns.run_tables import heading, records, summary, summary_parts
 from infoset.experiments.common.errors import input_errors
 from infoset.experiments.common.input_file import to_toml
@@ -43,7 +50,11 @@ def run(options: Options) -> None:
             "elapsed_s": elapsed_s,
             "samples": records(table.drop(columns="cell")),
         }
-        stopped = "" if manifest.stopped_after is None else f" of {manifest.runs}, stopped by the rule {manifest.until}"
+        stopped = (
+            ""
+            if manifest.stopped_after is None
+            else f" of {manifest.runs}, stopped by the rule {manifest.until}"
+        )
         parts = [
             study_title(manifest.scenario, manifest.strategy, manifest.seed),
             f"{some_runs(stored.finished_runs)}{stopped}, {duration_text(elapsed_s)}; "
@@ -51,7 +62,9 @@ def run(options: Options) -> None:
             *summary_parts(stored, table),
         ]
         if manifest.until is not None and manifest.stopped_after is None:
-            parts.append(f"the rule {manifest.until} is not met; continue with --resume and a greater --runs")
+            parts.append(
+                f"the rule {manifest.until} is not met; continue with --resume and a greater --runs"
+            )
         written.enter(options.out, "shards")
         written.save(SCENARIO_FILE, to_toml(scenario))
         written.save(SUMMARY, to_json(results), "--json")

@@ -19,7 +19,12 @@ from infoset.experiments.campaigns.run_tables import (
     worst_runs,
 )
 from infoset.experiments.campaigns.sample_rows import noises_of
-from infoset.experiments.campaigns.sweep_report import TABLE, SweepReport, figure_names, read_requirement
+from infoset.experiments.campaigns.sweep_report import (
+    TABLE,
+    SweepReport,
+    figure_names,
+    read_requirement,
+)
 from infoset.experiments.campaigns.sweep_table import sweep_table
 from infoset.experiments.common.errors import InputError
 from infoset.experiments.common.input_file import to_toml
@@ -43,7 +48,11 @@ def run(options: Report) -> None:
     with campaign_errors():
         folder = _read(options)
         swept = bool(folder.manifest.axes)
-        figures = [*figure_files(*figure_names(noises_of(folder))), TABLE] if swept else figure_files(*_figures(folder))
+        figures = (
+            [*figure_files(*figure_names(noises_of(folder))), TABLE]
+            if swept
+            else figure_files(*_figures(folder))
+        )
         with output_of(options, [*figures, "report.json", SCENARIO_FILE]) as written:
             parts = (_report_sweep if swept else _report_campaign)(folder, options, written)
             written.save(SCENARIO_FILE, to_toml(folder.manifest.scenario))
@@ -58,10 +67,14 @@ def _figures(folder: CampaignFolder) -> Sequence[str]:
 def _read(options: Report) -> CampaignFolder:
     path = options.folder
     if not path.is_dir():
-        raise InputError(f"{path}: is no folder; name the folder of infoset campaign or infoset sweep")
+        raise InputError(
+            f"{path}: is no folder; name the folder of infoset campaign or infoset sweep"
+        )
     folder = CampaignFolder.read(path)
     if not folder.finished_runs:
-        raise InputError(f"{path}: contains no runs yet; continue with: infoset {folder.manifest.kind} --resume")
+        raise InputError(
+            f"{path}: contains no runs yet; continue with: infoset {folder.manifest.kind} --resume"
+        )
     if not folder.complete:
         most = "at most " if folder.manifest.until else ""
         stored = f"{folder.finished_runs} of {most}{folder.wanted_runs} runs are stored"
@@ -73,10 +86,14 @@ def _report_sweep(folder: CampaignFolder, options: Report, written: Output) -> I
     scenario = folder.manifest.scenario
     sized = bool(folder.runs(["hit"])["hit"].count())
     required = read_requirement(options.require or folder.manifest.require, has_size=sized)
-    if required.quantity == "guaranteed_miss_m" and scenario.set_model.is_guaranteed and not folder.manifest.guarantee:
+    if (
+        required.quantity == "guaranteed_miss_m"
+        and scenario.set_model.is_guaranteed
+        and not folder.manifest.guarantee
+    ):
         raise InputError(
-            f"--require {required}: this sweep was simulated without the bound Phi; simulate it in a new folder with "
-            "infoset sweep --guarantee, or give a bound of miss_m"
+            f"--require {required}: this sweep was simulated without the bound Phi; simulate it in "
+            "a new folder with infoset sweep --guarantee, or give a bound of miss_m"
         )
     report = SweepReport(folder, sweep_table(folder, required))
     written.save("report.json", to_json(report.to_json()), "--json")
@@ -87,7 +104,9 @@ def _report_sweep(folder: CampaignFolder, options: Report, written: Output) -> I
 
 def _report_campaign(folder: CampaignFolder, options: Report, written: Output) -> Iterator[Part]:
     if options.require is not None:
-        raise InputError(f"--require: is only for a sweep, and {folder.path} is a campaign; omit it")
+        raise InputError(
+            f"--require: is only for a sweep, and {folder.path} is a campaign; omit it"
+        )
     table = summary(folder)
     related = correlations(folder)
     worst = worst_runs(folder, _scenario_file(folder, options.out))
@@ -108,22 +127,29 @@ def _report_campaign(folder: CampaignFolder, options: Report, written: Output) -
 
 
 def _scenario_file(folder: CampaignFolder, out: Path | None) -> Path:
-    """Return the file that the commands of single runs name: in the folder, or the one that the report writes."""
+    """Return the file that the commands of single runs name: in the folder, or the one that the
+    report writes.
+    """
     stored = folder.path / SCENARIO_FILE
     return stored if out is None or stored.is_file() else out / SCENARIO_FILE
 
 
-def _parts(folder: CampaignFolder, table: pd.DataFrame, related: pd.DataFrame, worst: pd.DataFrame) -> Iterator[Part]:
+def _parts(
+    folder: CampaignFolder, table: pd.DataFrame, related: pd.DataFrame, worst: pd.DataFrame
+) -> Iterator[Part]:
     manifest = folder.manifest
     stopped = "" if manifest.stopped_after is None else f", stopped by the rule {manifest.until}"
     yield study_title(manifest.scenario, manifest.strategy, manifest.seed)
     yield f"{some_runs(folder.finished_runs)}{stopped}"
     yield from summary_parts(folder, table)
     yield from ("", "correlation of the miss with the initial state (95 % CI by Fisher's z):")
-    yield screen_table(related.rename(columns=lambda name: name.replace("_l", "\nl").replace("_u", "\nu")), 2)
+    yield screen_table(
+        related.rename(columns=lambda name: name.replace("_l", "\nl").replace("_u", "\nu")), 2
+    )
     yield from ("", "the worst runs, each with the command that simulates it again:")
     for row in records(worst):
-        miss, impulse = number(row["miss_m"]), number(row["impulse_m_s"])
+        miss = number(row["miss_m"])
+        impulse = number(row["impulse_m_s"])
         how = ending(row["outcome"], row["hit"], row["cause"])
         yield f"  miss {miss} m, impulse {impulse} m/s, {how}: {row['replay']}"
     if not (folder.path / SCENARIO_FILE).is_file():

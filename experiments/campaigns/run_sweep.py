@@ -3,7 +3,14 @@
 from __future__ import annotations
 
 from infoset.experiments.campaigns.command import Sweep as Options
-from infoset.experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, campaign_errors, fly, noise_of, scenario_of
+from infoset.experiments.campaigns.flight import (
+    RESUME_HINT,
+    SCENARIO_FILE,
+    campaign_errors,
+    fly,
+    noise_of,
+    scenario_of,
+)
 from infoset.experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
 from infoset.experiments.campaigns.sweep_report import SweepReport, read_requirement
 from infoset.experiments.campaigns.sweep_table import sweep_table

@@ -1,4 +1,6 @@
-"""Tables of the stored runs of a campaign or a sweep: their summary, correlations with the start, the worst runs."""
+"""Tables of the stored runs of a campaign or a sweep: their summary, correlations with the start,
+the worst runs.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,15 @@ from infoset.experiments.interception.study import (
     redrawn_text,
     set_warnings,
 )
-from infoset.sim import CampaignNoise, HitEstimate, Outcome, Results, Scenario, estimate_hits, estimate_quantiles
+from infoset.sim import (
+    CampaignNoise,
+    HitEstimate,
+    Outcome,
+    Results,
+    Scenario,
+    estimate_hits,
+    estimate_quantiles,
+)
 from infoset.sim.columns import columns_of
 from infoset.sim.miss_cause import EXPLAINED, MissCause, max_of_cause
 from infoset.sim.statistics import average_ranks, correlation_interval, level_name, shows
@@ -45,18 +55,24 @@ CI = ("95 % CI\nfrom", "\nto")
 """Titles of the ends of an interval in a table for the screen."""
 
 
-def summary(folder: CampaignFolder, levels: Sequence[float] = LEVELS, more: Sequence[Step] = ()) -> pd.DataFrame:
+def summary(
+    folder: CampaignFolder, levels: Sequence[float] = LEVELS, more: Sequence[Step] = ()
+) -> pd.DataFrame:
     """Return a table with a row for each cell and noise, followed by the keys of `more` steps.
 
-    The columns are the varied keys; the numbers of all runs, of those with each outcome, and of those in which the
-    sets and the bound Phi held; the share of hits; the misses by cause, and what explains them; and for each quantity
-    the maximum and the quantiles at some levels. Shares and quantiles have the ends of their 95 % confidence intervals.
-    NaN is unknown: the share of hits of a body without a size, and a quantile that so few runs do not show.
+    The columns are the varied keys; the numbers of all runs, of those with each outcome, and of
+    those in which the sets and the bound Phi held; the share of hits; the misses by cause, and what
+    explains them; and for each quantity the maximum and the quantiles at some levels. Shares and
+    quantiles have the ends of their 95 % confidence intervals. NaN is unknown: the share of hits of
+    a body without a size, and a quantile that so few runs do not show.
     """
     steps = [
         Step(("outcome", "hit", "truth_kept", "set_emptied", "phi_held"), _counts),
         Step(("cause",), _causes),
-        *(Step(("cause", column), partial(_explained, name)) for name, (_, column) in EXPLAINED.items()),
+        *(
+            Step(("cause", column), partial(_explained, name))
+            for name, (_, column) in EXPLAINED.items()
+        ),
         Step(("redraws",), _redrawn_share),
         *(Step((quantity,), partial(_quantiles, levels=levels)) for quantity in QUANTITIES),
         *more,
@@ -86,12 +102,18 @@ def _counts(runs: pd.DataFrame) -> dict[str, Any]:
 
 
 def _causes(runs: pd.DataFrame) -> dict[str, Any]:
-    return {f"missed_{cause.value}": int((runs["cause"] == cause.value).sum()) for cause in MissCause}
+    return {
+        f"missed_{cause.value}": int((runs["cause"] == cause.value).sum()) for cause in MissCause
+    }
 
 
 def _explained(name: str, runs: pd.DataFrame) -> dict[str, float]:
     cause, column = EXPLAINED[name]
-    return {f"missed_{name}": or_nan(max_of_cause(runs["cause"].to_numpy(), runs[column].to_numpy(), cause))}
+    return {
+        f"missed_{name}": or_nan(
+            max_of_cause(runs["cause"].to_numpy(), runs[column].to_numpy(), cause)
+        )
+    }
 
 
 def _redrawn_share(runs: pd.DataFrame) -> dict[str, float]:
@@ -108,23 +130,28 @@ def _quantiles(runs: pd.DataFrame, levels: Sequence[float]) -> dict[str, float]:
     estimates = estimate_quantiles(known, levels) if known.size else [None] * len(levels)
     for level, estimate in zip(levels, estimates, strict=True):
         name = f"{quantity}_{level_name(level)}"
-        row[name] = estimate.value if estimate is not None and shows(known.size, level) else math.nan
+        row[name] = (
+            estimate.value if estimate is not None and shows(known.size, level) else math.nan
+        )
         row |= {f"{name}_{end}": or_nan(getattr(estimate, end, None)) for end in ("lower", "upper")}
     return row | {f"{quantity}_max": float(known.max()) if known.size else math.nan}
 
 
 def start_columns(scenario: Scenario) -> tuple[str, ...]:
-    """Return the columns of the runs with the components of the initial state, in a plane without y."""
+    """Return the columns of the runs with the components of the initial state, in a plane without
+    y.
+    """
     columns = [column for column in columns_of(Results) if column.name.startswith("start_")]
     return tuple(column.name for column in columns if scenario.is_spatial or not column.optional)
 
 
 def correlations(folder: CampaignFolder) -> pd.DataFrame:
-    """Return Pearson's and Spearman's correlation of the miss with each component of the initial state, by noise.
+    """Return Pearson's and Spearman's correlation of the miss with each component of the initial
+    state, by noise.
 
-    Each has the ends of its 95 % confidence interval. The moduli of the lateral components are included, for example
-    `|start_z_m|`. A correlation is NaN where the component or the miss does not vary, and so are its ends with fewer
-    than 4 runs.
+    Each has the ends of its 95 % confidence interval. The moduli of the lateral components are
+    included, for example `|start_z_m|`. A correlation is NaN where the component or the miss does
+    not vary, and so are its ends with fewer than 4 runs.
     """
     # Components of one step share the ranks of the miss.
     start = start_columns(folder.manifest.scenario)
@@ -147,7 +174,9 @@ def correlations(folder: CampaignFolder) -> pd.DataFrame:
 
 
 def _correlations_with_miss(runs: pd.DataFrame) -> dict[str, Any]:
-    """Return the number of runs, and both correlations of each component that is known, and of its modulus."""
+    """Return the number of runs, and both correlations of each component that is known, and of its
+    modulus.
+    """
     miss_m = runs["miss_m"]
     ranks = pd.Series(average_ranks(miss_m.to_numpy()))
 
@@ -167,15 +196,22 @@ def _correlations_with_miss(runs: pd.DataFrame) -> dict[str, Any]:
 
 
 def worst_runs(folder: CampaignFolder, scenario_file: Path) -> pd.DataFrame:
-    """Return the runs with the largest miss, the worst first; `replay` is the command that simulates a run again."""
+    """Return the runs with the largest miss, the worst first; `replay` is the command that
+    simulates a run again.
+    """
     # The manifest's name of a strategy or a noise in a file: mine.py:Mine sha256:...
     file, _, version = folder.manifest.strategy.rpartition(" sha256:")
     own = f" --strategy {shlex.quote(file)}" if version and file else ""
     own_noise = shlex.quote((folder.manifest.own_noise or "").partition(" sha256:")[0])
     worst = _rows_of_worst(folder)
-    command = f"infoset engage {shlex.quote(str(scenario_file))} --noise {{}} --seed {folder.manifest.seed} --run {{}}"
+    command = (
+        f"infoset engage {shlex.quote(str(scenario_file))} --noise {{}} --seed "
+        f"{folder.manifest.seed} --run {{}}"
+    )
     noises = worst["noise"].astype(str).replace(CampaignNoise.OWN.value, own_noise)
-    replay = [command.format(noise, run) + own for noise, run in zip(noises, worst["run"], strict=True)]
+    replay = [
+        command.format(noise, run) + own for noise, run in zip(noises, worst["run"], strict=True)
+    ]
     return worst.assign(replay=replay)
 
 
@@ -225,7 +261,9 @@ def campaign_notes(folder: CampaignFolder) -> list[str]:
 
 
 def summary_parts(folder: CampaignFolder, table: pd.DataFrame) -> Iterator[Part]:
-    """Yield the summary of a campaign for the screen: the quantiles, and lines about hits, sets and outcomes."""
+    """Yield the summary of a campaign for the screen: the quantiles, and lines about hits, sets and
+    outcomes.
+    """
     manifest = folder.manifest
     samples = [row for row in records(table) if row["runs"]]
     yield screen_table(_quantile_table(samples, bound_name(manifest.scenario)), 2)
@@ -239,8 +277,8 @@ def summary_parts(folder: CampaignFolder, table: pd.DataFrame) -> Iterator[Part]
     yield from campaign_notes(folder)
     if manifest.stopped_after is not None:
         yield (
-            "the intervals are computed with 95 % confidence for a fixed number of runs; the campaign stopped when an "
-            "interval was narrow, so their confidence is about 92 to 95 %"
+            "the intervals are computed with 95 % confidence for a fixed number of runs; the "
+            "campaign stopped when an interval was narrow, so their confidence is about 92 to 95 %"
         )
 
 
@@ -258,32 +296,46 @@ def _quantile_table(samples: Sequence[Mapping[str, Any]], phi: str) -> pd.DataFr
     return pd.DataFrame(rows, columns=["noise", "quantity", "quantile", "value", *CI])
 
 
-def _notes(folder: CampaignFolder, row: Mapping[str, Any], sets: SetCounts, noises: int) -> Iterator[str]:
+def _notes(
+    folder: CampaignFolder, row: Mapping[str, Any], sets: SetCounts, noises: int
+) -> Iterator[str]:
     """Yield lines about the quantiles that are not shown, hits, sets and outcomes of a noise."""
     yield from quantile_notes(row["runs"], LEVELS, noises)
     if row["hits"] is not None:
         ends = (row["hit_probability"], row["hit_lower"], row["hit_upper"])
         yield hit_text(HitEstimate(row["runs"], row["hits"], *ends), folder.manifest.scenario)
-        missed = {name.removeprefix("missed_"): value for name, value in row.items() if name.startswith("missed_")}
+        missed = {
+            name.removeprefix("missed_"): value
+            for name, value in row.items()
+            if name.startswith("missed_")
+        }
         if causes := miss_text(missed, row["runs"], folder.manifest.scenario):
             yield causes
     if started := redrawn_text(row.get("redrawn_share")):
         yield started
-    outcomes = ", ".join(f"{row[name]} {outcome}" for name, outcome in OUTCOMES.items() if row[name])
+    outcomes = ", ".join(
+        f"{row[name]} {outcome}" for name, outcome in OUTCOMES.items() if row[name]
+    )
     yield f"{certificate(sets, row['phi_held'], row['phi_known'])}; outcomes: {outcomes}"
 
 
 def records(table: pd.DataFrame) -> list[dict[str, Any]]:
     """Return the rows of a table as JSON values, NaN as None."""
-    values: list[dict[str, Any]] = table.astype(object).where(table.notna(), None).to_dict("records")
+    values: list[dict[str, Any]] = (
+        table.astype(object).where(table.notna(), None).to_dict("records")
+    )
     return values
 
 
 def screen_table(table: pd.DataFrame, left: int) -> Table:
-    """Return a table for the screen, with the first `left` columns as text and numbers rounded; NaN is `-`."""
+    """Return a table for the screen, with the first `left` columns as text and numbers rounded; NaN
+    is `-`.
+    """
     printed = number_table(*table.columns, left=left)
     for row in records(table):
-        printed.add_row(*(value if isinstance(value, str) else number(value) for value in row.values()))
+        printed.add_row(
+            *(value if isinstance(value, str) else number(value) for value in row.values())
+        )
     return printed
 
 

@@ -1,4 +1,6 @@
-"""Rows of tables from the stored runs of a campaign or a sweep, with a few columns in memory at a time."""
+"""Rows of tables from the stored runs of a campaign or a sweep, with a few columns in memory at a
+time.
+"""
 
 from __future__ import annotations
 
@@ -13,10 +15,12 @@ from infoset.sim.columns import columns_of
 from infoset.sim.storage import CampaignFolder
 
 PASS_BYTES = 160_000_000
-"""Memory of the columns that are read together: two columns of numbers of ten million runs, all of a million.
+"""Memory of the columns that are read together: two columns of numbers of ten million runs, all of
+a million.
 
-A pass needs up to four times as much, with the Parquet files and the work on one column. Every pass opens all files,
-which takes as long as reading a few of their columns, so the columns of small campaigns are read together.
+A pass needs up to four times as much, with the Parquet files and the work on one column. Every pass
+opens all files, which takes as long as reading a few of their columns, so the columns of small
+campaigns are read together.
 """
 _BYTES = {float: 8, int: 8, bool: 2}
 _TEXT_BYTES = 4
@@ -26,7 +30,9 @@ _BYTES_A_RUN = {column.name: _BYTES.get(column.kind, _TEXT_BYTES) for column in 
 
 @dataclass(frozen=True)
 class Step:
-    """A part of the rows of a table: `keys_of` returns keys and values from these columns of a sample."""
+    """A part of the rows of a table: `keys_of` returns keys and values from these columns of a
+    sample.
+    """
 
     columns: tuple[str, ...]
     keys_of: Callable[[pd.DataFrame], dict[str, Any]]
@@ -38,9 +44,11 @@ def noises_of(folder: CampaignFolder) -> list[str]:
 
 
 def rows_of_samples(folder: CampaignFolder, steps: Sequence[Step]) -> Iterator[dict[str, Any]]:
-    """Yield the keys of all steps for each cell and noise, whose sample may be empty; a campaign has one cell.
+    """Yield the keys of all steps for each cell and noise, whose sample may be empty; a campaign
+    has one cell.
 
-    Only the columns of a few steps of one cell are in memory, at most about `PASS_BYTES` or one step.
+    Only the columns of a few steps of one cell are in memory, at most about `PASS_BYTES` or one
+    step.
     """
     noises = noises_of(folder)
     for cell, chunks in enumerate(folder.stored_chunks()):

@@ -1,4 +1,5 @@
-"""The keys of a scenario file that a sweep varies, each over a range of values in the unit of the file.
+"""The keys of a scenario file that a sweep varies, each over a range of values in the unit of the
+file.
 
 A cell is valid exactly when a file with its values is, and has the same error messages.
 """
@@ -27,25 +28,39 @@ _RANGE = re.compile(rf"(log:)?\s*{_NUMBER}\s*:\s*{_NUMBER}\s*:\s*([0-9]{{1,9}})"
 
 
 def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
-    """Read the value of --vary: `table.key=FROM:TO:COUNT` or `table.key=log:FROM:TO:COUNT`, separated by commas.
+    """Read the value of --vary: `table.key=FROM:TO:COUNT` or `table.key=log:FROM:TO:COUNT`,
+    separated by commas.
 
-    Of a key that is an interval, `table.key.min` or `table.key.max` is varied. `one.key=other.key=FROM:TO:COUNT` gives
-    both keys the same values. `sensor.scale` is a factor of all error bounds of a sensor. Raise `InputError` if the
-    text has another form, or scenarios have no such key; the message suggests the most similar key.
+    Of a key that is an interval, `table.key.min` or `table.key.max` is varied.
+    `one.key=other.key=FROM:TO:COUNT` gives both keys the same values. `sensor.scale` is a factor of
+    all error bounds of a sensor. Raise `InputError` if the text has another form, or scenarios have
+    no such key; the message suggests the most similar key.
     """
     pieces = text.split(",")
     if len(pieces) > MAX_AXES:
-        raise InputError(f"--vary: at most {MAX_AXES} keys can be varied at once, found {len(pieces)}; leave some out")
+        raise InputError(
+            f"--vary: at most {MAX_AXES} keys can be varied at once, found {len(pieces)}; leave "
+            "some out"
+        )
     axes = tuple(_axis(piece.strip(), scenario) for piece in pieces)
     bounds = _error_bounds(scenario)
-    varied = [(key, tied) for axis in axes for tied in tied_keys(axis.key) for key in bounds.get(tied, {tied: 0.0})]
+    varied = [
+        (key, tied)
+        for axis in axes
+        for tied in tied_keys(axis.key)
+        for key in bounds.get(tied, {tied: 0.0})
+    ]
     for key, _ in varied:
         names = [tied for other, tied in varied if other == key]
         if len(names) > 1:
-            raise InputError(f"--vary: {' and '.join(names)} vary the same value; name each key once")
+            raise InputError(
+                f"--vary: {' and '.join(names)} vary the same value; name each key once"
+            )
     cells = math.prod(len(axis.values) for axis in axes)
     if cells > MAX_CELLS:
-        raise InputError(f"--vary: {cells} cells are more than the limit of {MAX_CELLS}; give fewer values")
+        raise InputError(
+            f"--vary: {cells} cells are more than the limit of {MAX_CELLS}; give fewer values"
+        )
     return axes
 
 
@@ -61,15 +76,22 @@ def sweep_cells(scenario: Scenario, axes: Sequence[Axis]) -> tuple[Scenario, ...
         for axis, value in zip(axes, values, strict=True):
             for key in tied_keys(axis.key):
                 scaled = {name: value * bound for name, bound in bounds.get(key, {}).items()}
-                changes |= {name: float(f"{number:.12g}") for name, number in scaled.items()} or {key: value}
-        changes = {key: round(value) if numeric_key(Scenario, key) is int else value for key, value in changes.items()}
+                changes |= {name: float(f"{number:.12g}") for name, number in scaled.items()} or {
+                    key: value
+                }
+        changes = {
+            key: round(value) if numeric_key(Scenario, key) is int else value
+            for key, value in changes.items()
+        }
         text = ", ".join(f"{key} = {value:.12g}" for key, value in changes.items())
         cells.append(changed(scenario, changes, f"{scenario.name} with {text}"))
     return tuple(cells)
 
 
 def _error_bounds(scenario: Scenario) -> dict[str, dict[str, float]]:
-    """Return the error bounds of each sensor by key, under the name of their common factor: `angle_sensor.scale`."""
+    """Return the error bounds of each sensor by key, under the name of their common factor:
+    `angle_sensor.scale`.
+    """
     return {
         f"{sensor.table}.{SCALE}": {
             f"{sensor.table}.{name}": value
@@ -86,32 +108,45 @@ def _axis(piece: str, scenario: Scenario) -> Axis:
     factors = _error_bounds(scenario)
     for key in keys:
         if key not in factors and numeric_key(Scenario, key) is None:
-            guess = similar_key(key, [known for known in [*keys_of(Scenario), *factors] if known != key])
+            guess = similar_key(
+                key, [known for known in [*keys_of(Scenario), *factors] if known != key]
+            )
             remedy = f"; did you mean {guess}?" if guess else ""
             raise InputError(f"--vary: a scenario has no numeric key {shown(key)}{remedy}")
     if len({unit_of(key) for key in keys}) > 1:
         units = ", ".join(f"{key} in {unit_of(key) or 'no unit'}" for key in keys)
-        raise InputError(f"--vary: keys with the same values must have the same unit, found {units}")
+        raise InputError(
+            f"--vary: keys with the same values must have the same unit, found {units}"
+        )
     match = _RANGE.fullmatch(written)
     if not keys or match is None:
         raise InputError(
-            f"--vary: {shown(piece)} is not written as KEY=FROM:TO:COUNT or KEY=log:FROM:TO:COUNT; for example "
-            "--vary angle_sensor.scale=1:8:8,thruster.max_impulse_m_s=2.5:20:8"
+            f"--vary: {shown(piece)} is not written as KEY=FROM:TO:COUNT or KEY=log:FROM:TO:COUNT; "
+            "for example --vary angle_sensor.scale=1:8:8,thruster.max_impulse_m_s=2.5:20:8"
         )
-    is_log, first, last, count = bool(match[1]), float(match[2]), float(match[3]), int(match[4])
+    is_log = bool(match[1])
+    first = float(match[2])
+    last = float(match[3])
+    count = int(match[4])
     if not 0.0 < last - first < math.inf or not 2 <= count <= MAX_VALUES:
         raise InputError(
-            f"--vary: {keys[0]}: must go from a smaller to a greater value, with a count from 2 to {MAX_VALUES}, found "
-            f"{shown(written)}"
+            f"--vary: {keys[0]}: must go from a smaller to a greater value, with a count from 2 to "
+            f"{MAX_VALUES}, found {shown(written)}"
         )
     if first <= 0 and (is_log or any(key in factors for key in keys)):
-        raise InputError(f"--vary: {keys[0]}: factors and logarithmic values must be greater than 0, found {match[2]}")
+        raise InputError(
+            f"--vary: {keys[0]}: factors and logarithmic values must be greater than 0, found "
+            f"{match[2]}"
+        )
     between = (np.geomspace if is_log else np.linspace)(first, last, count)[1:-1]
     values = [first, *(float(f"{value:.12g}") for value in between), last]
     if any(numeric_key(Scenario, key) is int for key in keys):
         values = [float(round(value)) for value in values]
     if len(set(values)) < count:
-        raise InputError(f"--vary: {keys[0]}: {count} values in {shown(written)} are not all different; give fewer")
+        raise InputError(
+            f"--vary: {keys[0]}: {count} values in {shown(written)} are not all different; give "
+            "fewer"
+        )
     with input_errors("--vary"):
         return Axis("=".join(keys), tuple(values), "log" if is_log else "linear")
 
@@ -127,7 +162,9 @@ def unit_of(key: str) -> str:
 
 
 def key_label(key: str, factor: str = "") -> str:
-    """Return a key as the label of an axis, with a factor of its unit: `angle sensor: error at nominal range, rad`."""
+    """Return a key as the label of an axis, with a factor of its unit: `angle sensor: error at
+    nominal range, rad`.
+    """
     names = []
     for single in tied_keys(key):
         end = single[-4:] if single.endswith((".min", ".max")) else ""

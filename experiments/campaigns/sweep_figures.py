@@ -1,7 +1,9 @@
-"""Figures of a sweep: the decisions about the requirement, and quantiles as lines (one key) or heat maps (two keys).
+"""Figures of a sweep: the decisions about the requirement, and quantiles as lines (one key) or heat
+maps (two keys).
 
-The values of a key are drawn at the positions 0, 1, 2, ...: those of `--vary` are equally spaced on its scale, linear
-or logarithmic, and lines between them interpolate on this scale, as `sweep_table.limits` does.
+The values of a key are drawn at the positions 0, 1, 2, ...: those of `--vary` are equally spaced on
+its scale, linear or logarithmic, and lines between them interpolate on this scale, as
+`sweep_table.limits` does.
 """
 
 from __future__ import annotations
@@ -42,7 +44,11 @@ from infoset.sim.requirement import AnyRequirement, Decision
 from infoset.sim.statistics import level_name, number_text
 from infoset.sim.storage import Axis
 
-DECISION_COLOURS = {Decision.MET: "#7fb0d6", Decision.UNDECIDED: "#ececec", Decision.NOT_MET: "#f2a65a"}
+DECISION_COLOURS = {
+    Decision.MET: "#7fb0d6",
+    Decision.UNDECIDED: "#ececec",
+    Decision.NOT_MET: "#f2a65a",
+}
 """Colours that differ in grey too, and for colour-blind readers."""
 MAX_NUMBERS = 120
 """Maximum number of cells for which numbers are drawn in the cells."""
@@ -66,8 +72,9 @@ _NO_VALUE = "\N{EN DASH}"
 def draw_sweep(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> Figure:
     """Draw the decisions and the quantiles of a sweep with one or two axes, for one noise.
 
-    With one axis there is a panel for each quantity, with the quantiles as lines; with two axes there is a map of the
-    decisions, and a heat map for each other quantile that the runs show. The panel of the requirement is the first.
+    With one axis there is a panel for each quantity, with the quantiles as lines; with two axes
+    there is a map of the decisions, and a heat map for each other quantile that the runs show. The
+    panel of the requirement is the first.
     """
     figure = (_lines if len(table.axes) == 1 else _maps)(table, table.of_noise(noise), shown)
     figure.suptitle(f"{noise} noise")
@@ -75,9 +82,13 @@ def draw_sweep(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> 
 
 
 def _panels(count: int) -> tuple[Figure, Any]:
-    rows, columns = -(-count // 2), min(2, count)
+    rows = -(-count // 2)
+    columns = min(2, count)
     figure, grid = subplots(
-        rows * _PANEL_MM + _LEGEND_MM, rows, columns, width_mm=WIDTH_MM if columns > 1 else 0.7 * WIDTH_MM
+        rows * _PANEL_MM + _LEGEND_MM,
+        rows,
+        columns,
+        width_mm=WIDTH_MM if columns > 1 else 0.7 * WIDTH_MM,
     )
     return figure, first_panels(grid, count)
 
@@ -89,7 +100,9 @@ def _lines(table: SweepTable, cells: pd.DataFrame, shown: Sequence[QuantileName]
     if not isinstance(required, Requirement):
         lines[required.quantity].append(("required_value", {"color": INK, "marker": "o"}))
     for quantile in shown:
-        look = LINE_LOOKS[levels.index(quantile.level) % len(LINE_LOOKS)] | {"label": level_name(quantile.level)}
+        look = LINE_LOOKS[levels.index(quantile.level) % len(LINE_LOOKS)] | {
+            "label": level_name(quantile.level)
+        }
         lines.setdefault(quantile.quantity, []).append((_column(table, quantile), look))
     figure, panels = _panels(len(lines))
     for axes, (quantity, columns) in zip(panels, lines.items(), strict=True):
@@ -104,40 +117,73 @@ def _lines(table: SweepTable, cells: pd.DataFrame, shown: Sequence[QuantileName]
             axes.set_ylim(0.0)
         if quantity == required.quantity:
             _shade_decisions(axes, cells)
-            axes.axhline(required.bound, color=IMPULSE, linewidth=1.0, label=f"required: {requirement_words(required)}")
-        if quantity == "miss_m" and required.quantity == "hit" and cells["limit_bound"].nunique() == 1:
+            axes.axhline(
+                required.bound,
+                color=IMPULSE,
+                linewidth=1.0,
+                label=f"required: {requirement_words(required)}",
+            )
+        if (
+            quantity == "miss_m"
+            and required.quantity == "hit"
+            and cells["limit_bound"].nunique() == 1
+        ):
             radius_m = float(cells["limit_bound"].iloc[0])
-            axes.axhline(radius_m, color=LIMIT, linewidth=1.0, linestyle="--", label="radius of the body")
+            axes.axhline(
+                radius_m, color=LIMIT, linewidth=1.0, linestyle="--", label="radius of the body"
+            )
         _name_values(axes.xaxis, axis)
         axes.set(xlim=(-0.5, len(axis.values) - 0.5), ylabel=QUANTITY_NAMES[quantity])
     letters(panels)
-    legend_below(figure, 4, title="bars: 95 % confidence intervals; arrows: too few runs for an upper end")
+    legend_below(
+        figure, 4, title="bars: 95 % confidence intervals; arrows: too few runs for an upper end"
+    )
     return figure
 
 
 def _draw_estimates(axes: Axes, cells: pd.DataFrame, column: str, look: dict[str, Any]) -> None:
-    """Draw a column with its intervals, with an arrow up where there are too few runs for an upper end."""
-    at, name = np.arange(len(cells)), column.removesuffix("_value")
-    value, lower, upper = (cells[each].to_numpy(np.float64) for each in (column, f"{name}_lower", f"{name}_upper"))
+    """Draw a column with its intervals, with an arrow up where there are too few runs for an upper
+    end.
+    """
+    at = np.arange(len(cells))
+    name = column.removesuffix("_value")
+    value, lower, upper = (
+        cells[each].to_numpy(np.float64) for each in (column, f"{name}_lower", f"{name}_upper")
+    )
     axes.plot(at, value, markersize=3.5, zorder=3.0, **look)
-    top, colour = np.where(np.isnan(upper), np.fmax(value, lower), upper), look["color"]
+    top = np.where(np.isnan(upper), np.fmax(value, lower), upper)
+    colour = look["color"]
     axes.vlines(at, lower, top, color=colour, linewidth=0.8, zorder=2.0)
     arrows = np.where(np.isnan(upper), top, np.nan)
-    axes.plot(at, arrows, color=colour, linestyle="", marker="$\\uparrow$", markersize=7.0, zorder=2.0)
+    axes.plot(
+        at, arrows, color=colour, linestyle="", marker="$\\uparrow$", markersize=7.0, zorder=2.0
+    )
 
 
 def _shade_decisions(axes: Axes, cells: pd.DataFrame) -> None:
     for decision, colour in DECISION_COLOURS.items():
         for number in np.flatnonzero(cells["requirement"] == decision.value):
-            axes.axvspan(number - 0.5, number + 0.5, facecolor=colour, alpha=0.5, label=str(decision), zorder=0.5)
+            axes.axvspan(
+                number - 0.5,
+                number + 0.5,
+                facecolor=colour,
+                alpha=0.5,
+                label=str(decision),
+                zorder=0.5,
+            )
 
 
 def _maps(table: SweepTable, cells: pd.DataFrame, shown: Sequence[QuantileName]) -> Figure:
     columns = {quantile: _column(table, quantile) for quantile in shown}
-    drawn = {name: column for name, column in columns.items() if column != "required_value" and cells[column].count()}
+    drawn = {
+        name: column
+        for name, column in columns.items()
+        if column != "required_value" and cells[column].count()
+    }
     figure, panels = _panels(1 + len(drawn))
     _draw_decisions(panels[0], table, cells)
-    titles, notes = [requirement_words(table.required)], []
+    titles = [requirement_words(table.required)]
+    notes = []
     for axes, (quantile, column) in zip(panels[1:], drawn.items(), strict=True):
         _draw_heat(figure, axes, _grid(table, cells[column]))
         name, unit = QUANTITY_NAMES[quantile.quantity].split(", ")
@@ -148,7 +194,11 @@ def _maps(table: SweepTable, cells: pd.DataFrame, shown: Sequence[QuantileName])
         _name_values(axes.yaxis, table.axes[1])
     letters(panels, titles)
     if len(cells) <= MAX_NUMBERS:
-        level = f", {level_name(table.required.share)}" if isinstance(table.required, Requirement) else ""
+        level = (
+            f", {level_name(table.required.share)}"
+            if isinstance(table.required, Requirement)
+            else ""
+        )
         notes.append(f"numbers in (a): {QUANTITY_NAMES[table.required.quantity]}{level}")
     if cells[["required_value", *columns.values()]].isna().any(axis=None):
         notes.append(f"{_NO_VALUE} or no map: too few runs for the quantile")
@@ -157,38 +207,68 @@ def _maps(table: SweepTable, cells: pd.DataFrame, shown: Sequence[QuantileName])
 
 
 def _draw_decisions(axes: Axes, table: SweepTable, cells: pd.DataFrame) -> None:
-    """Draw decision and estimate of each cell, and the lines on which quantiles equal their bound."""
-    codes = cells["requirement"].map({decision.value: code for code, decision in enumerate(DECISION_COLOURS)})
-    _draw_cells(axes, _grid(table, codes), cmap=ListedColormap([*DECISION_COLOURS.values()]), vmin=-0.5, vmax=2.5)
+    """Draw decision and estimate of each cell, and the lines on which quantiles equal their
+    bound.
+    """
+    codes = cells["requirement"].map(
+        {decision.value: code for code, decision in enumerate(DECISION_COLOURS)}
+    )
+    _draw_cells(
+        axes,
+        _grid(table, codes),
+        cmap=ListedColormap([*DECISION_COLOURS.values()]),
+        vmin=-0.5,
+        vmax=2.5,
+    )
     for decision, colour in DECISION_COLOURS.items():
         if decision.value in set(cells["requirement"]):
             axes.fill([], [], color=colour, label=str(decision))
     values = _grid(table, cells["required_value"])
     _write_numbers(axes, values, np.zeros(values.shape, dtype=bool), path_effects=HALO)
     if {Decision.MET.value, Decision.NOT_MET.value} <= set(cells["requirement"]):
-        _draw_zero(axes, table, cells, "limit_quantile", color=INK, label="limit, interpolated between cells")
+        _draw_zero(
+            axes,
+            table,
+            cells,
+            "limit_quantile",
+            color=INK,
+            label="limit, interpolated between cells",
+        )
     if "closed_form_m" in cells:
-        look = {"color": GUARANTEED, "linestyle": "--", "label": "closed form: worst errors, no later images"}
+        look = {
+            "color": GUARANTEED,
+            "linestyle": "--",
+            "label": "closed form: worst errors, no later images",
+        }
         _draw_zero(axes, table, cells, "closed_form_m", **look)
 
 
-def _draw_zero(axes: Axes, table: SweepTable, cells: pd.DataFrame, column: str, **look: Any) -> None:
+def _draw_zero(
+    axes: Axes, table: SweepTable, cells: pd.DataFrame, column: str, **look: Any
+) -> None:
     """Draw the line on which a quantile equals its bound."""
     above = _grid(table, above_bound(cells, column))
     if (above < 0.0).any() and (above > 0.0).any():
         dashes = look.get("linestyle", "-")
-        axes.contour(above, levels=[0.0], colors=look["color"], linestyles=dashes).set(path_effects=HALO)
+        axes.contour(above, levels=[0.0], colors=look["color"], linestyles=dashes).set(
+            path_effects=HALO
+        )
         axes.plot([], [], **look)  # the entry in the legend
 
 
 def _draw_heat(figure: Figure, axes: Axes, values: Floats) -> None:
-    """Draw a quantile as a heat map, with a logarithmic scale of colours if it varies by more than a factor of 10."""
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    """Draw a quantile as a heat map, with a logarithmic scale of colours if it varies by more than
+    a factor of 10.
+    """
+    low = float(np.nanmin(values))
+    high = float(np.nanmax(values))
     norm = LogNorm(low, high) if high > 10.0 * low > 0.0 else Normalize(low, max(high, low + 1e-9))
     bar = figure.colorbar(_draw_cells(axes, values, cmap="Blues", norm=norm), ax=axes)
     if isinstance(norm, LogNorm):
         plain_ticks(bar.ax.yaxis, TICKS)
-    _write_numbers(axes, values, np.ma.filled(norm(np.ma.masked_invalid(values)) > _DARK, fill_value=False))
+    _write_numbers(
+        axes, values, np.ma.filled(norm(np.ma.masked_invalid(values)) > _DARK, fill_value=False)
+    )
 
 
 def _grid(table: SweepTable, values: Any) -> Floats:
@@ -209,20 +289,37 @@ def _write_numbers(axes: Axes, values: Floats, is_dark: Any, **look: Any) -> Non
         return
     size = min(7.0, 54.0 / values.shape[1])
     for (row, column), value in np.ndenumerate(values):
-        text = _NO_VALUE if np.isnan(value) else f"{value:.3g}" if value < 1000.0 else f"{value:.0f}"
+        text = (
+            _NO_VALUE if np.isnan(value) else f"{value:.3g}" if value < 1000.0 else f"{value:.0f}"
+        )
         colour = "white" if is_dark[row, column] else INK
-        axes.text(column, row, text, color=colour, ha="center", va="center", fontsize=size, zorder=4.0, **look)
+        axes.text(
+            column,
+            row,
+            text,
+            color=colour,
+            ha="center",
+            va="center",
+            fontsize=size,
+            zorder=4.0,
+            **look,
+        )
 
 
 def _name_values(one: MatplotlibAxis, axis: Axis) -> None:
-    """Label an axis with its key, and its positions 0, 1, 2, ... with the values, a few of them if they are many."""
+    """Label an axis with its key, and its positions 0, 1, 2, ... with the values, a few of them if
+    they are many.
+    """
     maximum = max(map(abs, axis.values))
     power = 0 if 0.01 <= maximum < 1e5 else math.floor(math.log10(maximum))
     names = [f"{value / 10.0**power:.4g}" for value in axis.values]
     step = -(-len(names) * max(map(len, names)) // _TICK_LETTERS)
     one.set_ticks(range(0, len(names), step), names[::step])
     one.set_label_text(
-        textwrap.fill(key_label(axis.key, f"$10^{{{power}}}$\N{NO-BREAK SPACE}" if power else ""), _LABEL_LETTERS)
+        textwrap.fill(
+            key_label(axis.key, f"$10^{{{power}}}$\N{NO-BREAK SPACE}" if power else ""),
+            _LABEL_LETTERS,
+        )
     )
 
 

@@ -9,7 +9,13 @@ from dataclasses import dataclass
 import pandas as pd
 from rich.table import Table
 
-from infoset.experiments.campaigns.run_tables import CI, campaign_notes, heading, records, screen_table
+from infoset.experiments.campaigns.run_tables import (
+    CI,
+    campaign_notes,
+    heading,
+    records,
+    screen_table,
+)
 from infoset.experiments.campaigns.sweep_axes import unit_of
 from infoset.experiments.campaigns.sweep_table import SweepTable, limits
 from infoset.experiments.common.errors import InputError, input_errors
@@ -18,16 +24,26 @@ from infoset.experiments.common.screen import Part, some_runs
 from infoset.experiments.interception.study import SetCounts, random_note, set_warnings, study_title
 from infoset.guidance import NoiseKind
 from infoset.sim import QuantileName, Requirement
-from infoset.sim.requirement import CONFIDENCE, MAX_RUNS_NEEDED, AnyRequirement, Decision, parse_requirement
+from infoset.sim.requirement import (
+    CONFIDENCE,
+    MAX_RUNS_NEEDED,
+    AnyRequirement,
+    Decision,
+    parse_requirement,
+)
 from infoset.sim.storage import CampaignFolder
 
 TABLE = "sweep.parquet"
-SHOWN = tuple(QuantileName(quantity, level) for quantity in ("miss_m", "impulse_m_s") for level in (0.5, 0.99))
+SHOWN = tuple(
+    QuantileName(quantity, level) for quantity in ("miss_m", "impulse_m_s") for level in (0.5, 0.99)
+)
 """Quantiles in figures, after the required one."""
 MAX_ROWS = 100
 """Maximum number of cells that are printed for each noise."""
 _FIXED = "a fixed number of runs"
-"""Condition under which the confidence of an interval holds: no runs are added after a look at the results."""
+"""Condition under which the confidence of an interval holds: no runs are added after a look at the
+results.
+"""
 
 
 def figure_names(noises: Sequence[str]) -> list[str]:
@@ -55,7 +71,12 @@ class SweepReport:
             **({"notes": notes} if (notes := self._notes()) else {}),
             **({} if elapsed_s is None else {"elapsed_s": elapsed_s}),
             "axes": [
-                {"key": axis.key, "unit": unit_of(axis.key), "scale": axis.scale, "values": list(axis.values)}
+                {
+                    "key": axis.key,
+                    "unit": unit_of(axis.key),
+                    "scale": axis.scale,
+                    "values": list(axis.values),
+                }
                 for axis in self.table.axes
             ],
             "require": str(self.table.required),
@@ -70,7 +91,9 @@ class SweepReport:
         }
 
     def save(self, written: Output) -> None:
-        """Write the table, and for one or two axes a figure of each noise, into the output's folder."""
+        """Write the table, and for one or two axes a figure of each noise, into the output's
+        folder.
+        """
         written.save(TABLE, self.table.rows.to_parquet(index=False))
         if self.is_drawn and written.folder is not None:
             from infoset.experiments.campaigns.sweep_figures import draw_sweep
@@ -83,26 +106,36 @@ class SweepReport:
                 written.figure(name, draw_sweep(self.table, shown, noise))
 
     def parts(self) -> Iterator[Part]:
-        """Yield the decision of every cell, and the limits of the values that meet the requirement, for the screen."""
-        manifest, rows = self.folder.manifest, self.table.rows
+        """Yield the decision of every cell, and the limits of the values that meet the requirement,
+        for the screen.
+        """
+        manifest = self.folder.manifest
+        rows = self.table.rows
         watched = " although runs were added" if manifest.is_watched else ""
         yield study_title(manifest.scenario, manifest.strategy, manifest.seed)
         yield f"{manifest.cells} cells, {some_runs(self.folder.finished_runs)}"
         yield (
-            f"the decision in each cell has a confidence of at least {100 * CONFIDENCE:g} %{watched}; this holds for "
-            "each cell, and for all cells along a key together only if the outcome of every run is monotone in it"
+            f"the decision in each cell has a confidence of at least {100 * CONFIDENCE:g} "
+            f"%{watched}; this holds for each cell, and for all cells along a key together only if "
+            "the outcome of every run is monotone in it"
         )
         for noise in self.table.noises:
             yield from self._decisions(noise)
-        sets = SetCounts(*(int(rows[name].sum()) for name in ("runs", "truth_kept", "set_emptied", "set_failed")))
+        sets = SetCounts(
+            *(int(rows[name].sum()) for name in ("runs", "truth_kept", "set_emptied", "set_failed"))
+        )
         yield from self._notes()
         yield f"all cells: {sets}"
         yield from set_warnings(manifest.scenario.information_set.model, sets)
 
     def _decisions(self, noise: str) -> Iterator[Part]:
-        """Yield the number of cells with each decision, and tables of the limits and of the decisions."""
-        required, rows = self.table.required, self.table.of_noise(noise)
-        counts, first = Counter(rows["requirement"]), self.table.axes[0].key
+        """Yield the number of cells with each decision, and tables of the limits and of the
+        decisions.
+        """
+        required = self.table.required
+        rows = self.table.of_noise(noise)
+        counts = Counter(rows["requirement"])
+        first = self.table.axes[0].key
         is_bounded = required.quantity in ("miss_m", "hit", "cause")  # game noise is one adversary
         against = " against this adversary" if noise == NoiseKind.GAME.value and is_bounded else ""
         decisions = ", ".join(
@@ -114,13 +147,21 @@ class SweepReport:
         found = found[found["noise"] == noise].drop(columns="noise")
         if len(found):
             titles = {"met": "met at", "not_met": "not met at", "interpolated": "by interpolation"}
-            yield from ("", f"limits along {first}:", self._screen_table(found.rename(columns=titles)))
+            yield from (
+                "",
+                f"limits along {first}:",
+                self._screen_table(found.rename(columns=titles)),
+            )
         yield from ("", "decisions:", self._screen_table(self._printed(rows.head(MAX_ROWS))))
         if len(rows) > MAX_ROWS:
             yield f"{len(rows) - MAX_ROWS} more cells are in {TABLE}, --json and --csv"
-        runs, known = int(rows["runs"].sum()), int(rows["required_known"].sum())
+        runs = int(rows["runs"].sum())
+        known = int(rows["required_known"].sum())
         if known < runs:
-            yield f"{known} of {runs} runs have a value of {required.quantity}; the others do not satisfy the bound"
+            yield (
+                f"{known} of {runs} runs have a value of {required.quantity}; the others do not "
+                "satisfy the bound"
+            )
         if counts[Decision.UNDECIDED.value]:
             more = (
                 f"a greater --max-runs than {self.folder.manifest.runs}"
@@ -130,12 +171,16 @@ class SweepReport:
             yield f"to add runs to the undecided cells: repeat infoset sweep with --resume and {more}"
 
     def _screen_table(self, table: pd.DataFrame) -> Table:
-        """Return a table for the screen; its first columns are keys, with the names of table and key in two lines."""
+        """Return a table for the screen; its first columns are keys, with the names of table and
+        key in two lines.
+        """
         keys = {key: key.replace(".", ".\n", 1) for key in self.table.keys if key in table}
         return screen_table(table.rename(columns=keys), len(keys))
 
     def _printed(self, rows: pd.DataFrame) -> pd.DataFrame:
-        """Return the decisions as a table for the screen, with the values of the keys as they are."""
+        """Return the decisions as a table for the screen, with the values of the keys as they
+        are.
+        """
         required = self.table.required
         name = str(required.quantile) if isinstance(required, Requirement) else required.name
         printed = rows[self.table.keys].map("{:.6g}".format)
@@ -145,30 +190,42 @@ class SweepReport:
         printed[list(CI)] = rows[["required_lower", "required_upper"]]
         undecided = rows["requirement"] == Decision.UNDECIDED.value
         if undecided.any():
-            needed = rows["runs_needed"].astype(str).mask(rows["runs_needed"].isna(), f"> {MAX_RUNS_NEEDED}")
+            needed = (
+                rows["runs_needed"]
+                .astype(str)
+                .mask(rows["runs_needed"].isna(), f"> {MAX_RUNS_NEEDED}")
+            )
             printed["runs\nneeded"] = needed.where(undecided, "")
         return printed
 
     def _notes(self) -> list[str]:
-        """Return lines about keys without an effect, and about what results with random noise and game noise are."""
-        rows, keys, lines = self.table.rows, self.table.keys, []
+        """Return lines about keys without an effect, and about what results with random noise and
+        game noise are.
+        """
+        rows = self.table.rows
+        keys = self.table.keys
+        lines = []
         results = rows.columns[rows.columns.get_loc("noise") + 1 :].drop(["limit_bound"])
         for axis, key in zip(self.table.axes, keys, strict=True):
             fixed = rows.groupby(["noise", *(other for other in keys if other != key)])[[*results]]
             if rows["runs"].all() and (fixed.nunique(dropna=False) == 1).all(axis=None):
-                lines.append(f"{axis.key} has no effect: cells that differ only in it have the same results")
+                lines.append(
+                    f"{axis.key} has no effect: cells that differ only in it have the same results"
+                )
         if NoiseKind.RANDOM.value in self.table.noises:
             lines.append(random_note(self.folder.manifest.scenario))
         return lines + campaign_notes(self.folder)
 
 
 def read_requirement(text: str | None, *, has_size: bool) -> AnyRequirement:
-    """Read the value of --require; None is a hit if the body has a size, else a bound of the miss."""
+    """Read the value of --require; None is a hit if the body has a size, else a bound of the
+    miss.
+    """
     with input_errors("--require"):
         required = parse_requirement(text or ("hit>=0.95" if has_size else "miss_m p99<10"))
     if required.quantity in ("hit", "cause") and not has_size:
         raise InputError(
-            f"--require {required}: the scenario has no [body] with a radius; give a bound of the miss, for example "
-            "miss_m p99<10"
+            f"--require {required}: the scenario has no [body] with a radius; give a bound of the "
+            "miss, for example miss_m p99<10"
         )
     return required

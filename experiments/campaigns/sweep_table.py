@@ -1,4 +1,6 @@
-"""The table of a sweep: the summary and the decision of each cell, and the limits of the values that decide."""
+"""The table of a sweep: the summary and the decision of each cell, and the limits of the values
+that decide.
+"""
 
 from __future__ import annotations
 
@@ -34,12 +36,13 @@ class SweepTable:
     ----------
     rows : DataFrame
         A row for each cell and noise; the last of the axes varies fastest. The columns are those of
-        `run_tables.summary` and those of the decision: `requirement` (a value of `Decision`; none without runs), the
-        required estimate with its interval, `required_value`, `_lower` and `_upper`, the runs with a value of the
-        quantity, `required_known`, and the runs of all noises that would decide, `runs_needed` (NaN if more than
-        `requirement.MAX_RUNS_NEEDED`). `limit_quantile` and `limit_bound` are compared by interpolation: the
-        required quantile and its bound; for hits, the quantile of the miss and the radius of the body.
-        `closed_form_m` is the guaranteed miss by the closed form of a camera (`closed_form.py`), if the requirement is
+        `run_tables.summary` and those of the decision: `requirement` (a value of `Decision`; none
+        without runs), the required estimate with its interval, `required_value`, `_lower` and
+        `_upper`, the runs with a value of the quantity, `required_known`, and the runs of all
+        noises that would decide, `runs_needed` (NaN if more than `requirement.MAX_RUNS_NEEDED`).
+        `limit_quantile` and `limit_bound` are compared by interpolation: the required quantile and
+        its bound; for hits, the quantile of the miss and the radius of the body. `closed_form_m` is
+        the guaranteed miss by the closed form of a camera (`closed_form.py`), if the requirement is
         about it.
     """
 
@@ -59,35 +62,50 @@ class SweepTable:
 
 
 def sweep_table(folder: CampaignFolder, required: AnyRequirement) -> SweepTable:
-    """Return the table of a sweep, finished or not, with the levels `LEVELS` and that of the required quantile."""
+    """Return the table of a sweep, finished or not, with the levels `LEVELS` and that of the
+    required quantile.
+    """
     levels = set(LEVELS)
     if isinstance(required, Requirement):
         levels.add(required.quantile.level)
     columns = tuple(dict.fromkeys((required.quantity, "miss_m")))
     decided = Step(columns, partial(_decision, required=required, folder=folder))
-    rows = summary(folder, sorted(levels), [decided]).astype({"required_known": "Int64", "runs_needed": "Int64"})
-    axes, noises = folder.manifest.axes, noises_of(folder)
-    rows["limit_bound"] = required.bound if isinstance(required, Requirement) else _radii_m(folder, rows)
+    rows = summary(folder, sorted(levels), [decided]).astype(
+        {"required_known": "Int64", "runs_needed": "Int64"}
+    )
+    axes = folder.manifest.axes
+    noises = noises_of(folder)
+    rows["limit_bound"] = (
+        required.bound if isinstance(required, Requirement) else _radii_m(folder, rows)
+    )
     if required.quantity == "guaranteed_miss_m" and folder.manifest.scenario.camera is not None:
         rows["closed_form_m"] = np.repeat(_closed_forms(folder), len(noises))
     return SweepTable(axes, tuple(noises), required, rows)
 
 
-def _decision(runs: pd.DataFrame, required: AnyRequirement, folder: CampaignFolder) -> dict[str, Any]:
+def _decision(
+    runs: pd.DataFrame, required: AnyRequirement, folder: CampaignFolder
+) -> dict[str, Any]:
     values = required.numbers(runs[required.quantity])
     verdict = judge(values, required, watched=folder.manifest.is_watched) if values.size else None
     row: dict[str, Any] = {"requirement": None if verdict is None else verdict.decision.value}
-    row |= {f"required_{name}": or_nan(getattr(verdict, name, None)) for name in ("value", "lower", "upper", "known")}
+    row |= {
+        f"required_{name}": or_nan(getattr(verdict, name, None))
+        for name in ("value", "lower", "upper", "known")
+    }
     # Numbers of runs are those of all noises, like --runs and --max-runs.
     row["runs_needed"] = len(noises_of(folder)) * or_nan(getattr(verdict, "runs_needed", None))
     if isinstance(required, Requirement):
         return row | {"limit_quantile": row["required_value"]}
     shown = required.cause is None and shows(len(runs), required.share) and len(runs)
-    return row | {"limit_quantile": float(np.quantile(runs["miss_m"], required.share)) if shown else math.nan}
+    return row | {
+        "limit_quantile": float(np.quantile(runs["miss_m"], required.share)) if shown else math.nan
+    }
 
 
 def _radii_m(folder: CampaignFolder, table: pd.DataFrame) -> Any:
-    scenario, axes = folder.manifest.scenario, folder.manifest.axes
+    scenario = folder.manifest.scenario
+    axes = folder.manifest.axes
     if not any("body.radius_" in axis.key for axis in axes):
         return or_nan(scenario.radius_m)
     radii_m = [cell.radius_m for cell in sweep_cells(scenario, axes)]
@@ -95,7 +113,9 @@ def _radii_m(folder: CampaignFolder, table: pd.DataFrame) -> Any:
 
 
 def _closed_forms(folder: CampaignFolder) -> list[float]:
-    """Return the closed form of the guaranteed miss of each cell, m; NaN in cells with fewer than two images."""
+    """Return the closed form of the guaranteed miss of each cell, m; NaN in cells with fewer than
+    two images.
+    """
     values = []
     for cell in sweep_cells(folder.manifest.scenario, folder.manifest.axes):
         try:
@@ -106,15 +126,18 @@ def _closed_forms(folder: CampaignFolder) -> list[float]:
 
 
 def limits(table: SweepTable) -> pd.DataFrame:
-    """Return the limits along the first axis: a row for each noise, combination of the other values, and limit.
+    """Return the limits along the first axis: a row for each noise, combination of the other
+    values, and limit.
 
-    A limit lies between the values `met` and `not_met` of two decided cells; cells without runs are undecided.
-    `interpolated` has no confidence. It is where the interpolated `limit_quantile` of two neighbouring cells equals its
-    bound, on the scale of the axis; logarithms of the quantiles if `spans_decades`. It is NaN if undecided cells lie
-    between the two, or a quantile is not known or is on the other side of the bound than the decision. A probability of
-    hits is not interpolated: between two cells it can be a step.
+    A limit lies between the values `met` and `not_met` of two decided cells; cells without runs are
+    undecided. `interpolated` has no confidence. It is where the interpolated `limit_quantile` of
+    two neighbouring cells equals its bound, on the scale of the axis; logarithms of the quantiles
+    if `spans_decades`. It is NaN if undecided cells lie between the two, or a quantile is not known
+    or is on the other side of the bound than the decision. A probability of hits is not
+    interpolated: between two cells it can be a step.
     """
-    axis, others = table.axes[0], ["noise", *table.keys[1:]]
+    axis = table.axes[0]
+    others = ["noise", *table.keys[1:]]
     rows = [
         {**dict(zip(others, at, strict=True)), **limit}
         for at, cells in table.rows.groupby(others, sort=False)
@@ -124,27 +147,36 @@ def limits(table: SweepTable) -> pd.DataFrame:
 
 
 def _limits_along(axis: Axis, cells: pd.DataFrame) -> Iterator[dict[str, float]]:
-    above, met = above_bound(cells), (cells["requirement"] == Decision.MET.value).to_numpy()
+    above = above_bound(cells)
+    met = (cells["requirement"] == Decision.MET.value).to_numpy()
     decided = np.flatnonzero(met | (cells["requirement"] == Decision.NOT_MET.value))
     for left, right in itertools.pairwise(decided):
         if met[left] == met[right]:
             continue
-        near, far = axis.values[left], axis.values[right]
+        near = axis.values[left]
+        far = axis.values[right]
         good, bad = (left, right) if met[left] else (right, left)
         value = math.nan
         if right == left + 1 and above[good] < 0.0 <= above[bad]:
             share = above[left] / (above[left] - above[right])
-            value = near * (far / near) ** share if axis.scale == "log" else near + share * (far - near)
+            value = (
+                near * (far / near) ** share if axis.scale == "log" else near + share * (far - near)
+            )
         yield {"met": axis.values[good], "not_met": axis.values[bad], "interpolated": value}
 
 
 def above_bound(cells: pd.DataFrame, quantile: str = "limit_quantile") -> Floats:
-    """Return how far a quantile is above its bound in each cell, or the difference of their logarithms; NaN unknown."""
-    values, bounds = cells[quantile].to_numpy(np.float64), cells["limit_bound"].to_numpy(np.float64)
+    """Return how far a quantile is above its bound in each cell, or the difference of their
+    logarithms; NaN unknown.
+    """
+    values = cells[quantile].to_numpy(np.float64)
+    bounds = cells["limit_bound"].to_numpy(np.float64)
     is_log = spans_decades(cells["limit_quantile"])
     return np.asarray(np.log(values) - np.log(bounds) if is_log else values - bounds)
 
 
 def spans_decades(values: pd.Series) -> bool:
-    """Return whether values are positive and differ so much that they are drawn on a logarithmic axis."""
+    """Return whether values are positive and differ so much that they are drawn on a logarithmic
+    axis.
+    """
     return bool(values.max() > _LOG_FROM * values.min() > 0.0)

@@ -15,7 +15,9 @@ SCENARIO = "scenario"
 
 
 class ProblemKind(NamedTuple):
-    """Command of a kind of problem, and the module in `infoset.experiments` and the name of its dataclass."""
+    """Command of a kind of problem, and the module in `infoset.experiments` and the name of its
+    dataclass.
+    """
 
     command: str
     module: str
@@ -29,7 +31,9 @@ PROBLEMS = {
     "reachable-system": ProblemKind("reach", "reachability.system_file", "ReachableSystem"),
     "pursuit-evasion": ProblemKind("pursuit", "pursuit.file", "PursuitProblem"),
     "observer": ProblemKind("observe", "observer.file", "ObserverProblem"),
-    "trajectory": ProblemKind("scenarios from-states", "interception.trajectory_file", "Trajectory"),
+    "trajectory": ProblemKind(
+        "scenarios from-states", "interception.trajectory_file", "Trajectory"
+    ),
 }
 """Kinds of problems by the `kind` of their files."""
 
@@ -53,7 +57,8 @@ def built_in_files() -> Mapping[str, BuiltIn]:
             if file.name.endswith(".toml"):
                 text = file.read_text(encoding="utf-8")
                 values = tomllib.loads(text)
-                name, kind = file.name.removesuffix(".toml"), values.get("kind", SCENARIO)
+                name = file.name.removesuffix(".toml")
+                kind = values.get("kind", SCENARIO)
                 found.append(BuiltIn(name, kind, values["description"], text))
     return {file.name: file for file in sorted(found)}
 
@@ -64,16 +69,24 @@ def built_in_names(kinds: Collection[str]) -> list[str]:
 
 
 def built_in(name: str, kinds: Collection[str]) -> BuiltIn:
-    """Return the built-in file of a name; `InputError` if there is none, or it has none of these kinds."""
+    """Return the built-in file of a name; `InputError` if there is none, or it has none of these
+    kinds.
+    """
     file = built_in_files().get(name)
     if file is not None and file.kind not in kinds:
         raise InputError(f"{name}: {taken_by(file.kind, name)}")
-    known = choice("built-in scenario" if SCENARIO in kinds else "built-in problem", name, built_in_names(kinds))
+    known = choice(
+        "built-in scenario" if SCENARIO in kinds else "built-in problem",
+        name,
+        built_in_names(kinds),
+    )
     return built_in_files()[known]
 
 
 def kind_of(document: Mapping[str, Any]) -> str | None:
-    """Return the kind of a parsed file: a kind of problem, or `SCENARIO` for tables of a scenario; None for others."""
+    """Return the kind of a parsed file: a kind of problem, or `SCENARIO` for tables of a scenario;
+    None for others.
+    """
     kind = document.get("kind")
     if isinstance(kind, str) and kind in PROBLEMS:
         return kind

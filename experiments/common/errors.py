@@ -12,7 +12,9 @@ _LONGEST_WORD = 100
 
 
 def on_a_screen(message: str) -> str:
-    """Return a message with a question mark for each unprintable character: parts may come from a hostile file."""
+    """Return a message with a question mark for each unprintable character: parts may come from a
+    hostile file.
+    """
     return "".join(letter if letter.isprintable() or letter == "\n" else "?" for letter in message)
 
 
@@ -24,8 +26,12 @@ class InputError(Exception):
 
 
 @contextlib.contextmanager
-def input_errors(source: str, remedy: str = "", kind: type[Exception] = ValueError) -> Iterator[None]:
-    """Turn an error into an `InputError` with the name of the file, option or problem, and a remedy at its end."""
+def input_errors(
+    source: str, remedy: str = "", kind: type[Exception] = ValueError
+) -> Iterator[None]:
+    """Turn an error into an `InputError` with the name of the file, option or problem, and a remedy
+    at its end.
+    """
     try:
         yield
     except kind as error:
@@ -39,7 +45,9 @@ def shown(value: object) -> str:
     if isinstance(value, list):
         text = f"[{', '.join('[...]' if isinstance(item, list) else shown(item) for item in value[:LONGEST_SHOWN])}]"
     elif isinstance(value, str):
-        text = '"' + "".join(c if c.isprintable() else "?" for c in value[: LONGEST_SHOWN + 1]) + '"'
+        text = (
+            '"' + "".join(c if c.isprintable() else "?" for c in value[: LONGEST_SHOWN + 1]) + '"'
+        )
     else:
         text = str(value).lower().replace("infinity", "inf")
     return text if len(text) <= LONGEST_SHOWN else text[: LONGEST_SHOWN - 3] + "..."

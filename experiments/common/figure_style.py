@@ -1,4 +1,6 @@
-"""The style of all figures: the sheet `infoset.mplstyle`, and colours and lines that differ in grey too."""
+"""The style of all figures: the sheet `infoset.mplstyle`, and colours and lines that differ in grey
+too.
+"""
 
 from __future__ import annotations
 
@@ -68,7 +70,8 @@ LINE_LOOKS: tuple[dict[str, Any], ...] = (
 def style() -> Iterator[None]:
     """Apply the style of the figures: a context, or with ``@style()`` a decorator.
 
-    It begins with Matplotlib's defaults, so that settings of the user, as TeX for all texts, change no figure.
+    It begins with Matplotlib's defaults, so that settings of the user, as TeX for all texts, change
+    no figure.
     """
     with matplotlib.style.context(STYLE, after_reset=True):
         yield
@@ -100,7 +103,9 @@ def first_panels(grid: NDArray[Any], count: int) -> list[Axes]:
 
 
 def label_axes(axes: Any, titles: Sequence[str]) -> None:
-    """Write the titles of two or three axes, with a few ticks each and room around what is drawn."""
+    """Write the titles of two or three axes, with a few ticks each and room around what is
+    drawn.
+    """
     for name, title in zip("xyz", titles, strict=False):
         getattr(axes, f"set_{name}label")(title, labelpad=-2.0 if len(titles) > 2 else None)
     axes.locator_params(nbins=5)
@@ -110,7 +115,8 @@ def label_axes(axes: Any, titles: Sequence[str]) -> None:
 
 
 def letters(panels: Iterable[Axes], titles: Sequence[str] = (), **look: Any) -> None:
-    """Write (a), (b) ... above axes, with their titles if there are any; no letter above a single one.
+    """Write (a), (b) ... above axes, with their titles if there are any; no letter above a single
+    one.
 
     `look` are arguments of `matplotlib.text.Text`.
     """
@@ -130,7 +136,9 @@ def legend_below(figure: Figure, columns: int, **more: Any) -> None:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
     for count in range(columns, 0, -1):
-        legend = figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=count, **more)
+        legend = figure.legend(
+            handles.values(), handles.keys(), loc="outside lower center", ncols=count, **more
+        )
         if count == 1 or legend.get_window_extent().width <= figure.bbox.width:
             return
         legend.remove()
@@ -148,13 +156,17 @@ def plain_ticks(one: Axis, subs: Sequence[float] = ()) -> None:
 
 
 def plain(text: str) -> str:
-    """Return a text of a file so that a figure shows it as it is: two dollars would begin a formula."""
+    """Return a text of a file so that a figure shows it as it is: two dollars would begin a
+    formula.
+    """
     return text.replace("$", r"\$")
 
 
 @style()
 def figure_bytes(figure: Figure) -> list[tuple[str, bytes]]:
-    """Return a figure as PDF and as PNG, each with its file ending; the same figure gives the same bytes."""
+    """Return a figure as PDF and as PNG, each with its file ending; the same figure gives the same
+    bytes.
+    """
     files = []
     for kind, undated in (("pdf", "CreationDate"), ("png", "Software")):
         content = io.BytesIO()

@@ -1,4 +1,6 @@
-"""Hill's axes, in which relative motion is given and shown; their titles; conversion from the axes of two papers."""
+"""Hill's axes, in which relative motion is given and shown; their titles; conversion from the axes
+of two papers.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +14,8 @@ AXIS_TITLES = ("x (radial)", "y (along-track)", "z (normal)")
 INERTIAL_TITLES = ("x (inertial)", "y (inertial)", "z (inertial)")
 
 _PAPER_AXES = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-"""Axes of Barseghyan and Stepanyan (2008) and of Shorikov and Goranov (2021), as rows in Hill's axes: x against the
-motion, y radially outward, z along the orbit's normal."""
+"""Axes of Barseghyan and Stepanyan (2008) and of Shorikov and Goranov (2021), as rows in Hill's
+axes: x against the motion, y radially outward, z along the orbit's normal."""
 
 
 def component_titles(symbol: str) -> list[str]:
@@ -22,12 +24,16 @@ def component_titles(symbol: str) -> list[str]:
 
 
 def from_paper(vectors: ArrayLike) -> Floats:
-    """Convert positions, velocities, controls or states, shape (..., 3) or (..., 6), from the axes of the papers."""
+    """Convert positions, velocities, controls or states, shape (..., 3) or (..., 6), from the axes
+    of the papers.
+    """
     return _turned(np.asarray(vectors, dtype=float), _PAPER_AXES)
 
 
 def to_paper(vectors: ArrayLike) -> Floats:
-    """Convert positions, velocities, controls or states, shape (..., 3) or (..., 6), to the axes of the papers."""
+    """Convert positions, velocities, controls or states, shape (..., 3) or (..., 6), to the axes of
+    the papers.
+    """
     return _turned(np.asarray(vectors, dtype=float), _PAPER_AXES.T)
 
 

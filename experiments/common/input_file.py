@@ -1,8 +1,9 @@
 """Files of the user: the tables and keys of a TOML file are the fields of a frozen dataclass.
 
-Every kind of file is read here. A key may be written in any unit of its quantity (`units.py`), a number
-is rounded once, and an interval may be written as one number, which is both of its ends. The dataclass declares types,
-limits and defaults; pydantic walks through it and finds all errors at once.
+Every kind of file is read here. A key may be written in any unit of its quantity (`units.py`), a
+number is rounded once, and an interval may be written as one number, which is both of its ends. The
+dataclass declares types, limits and defaults; pydantic walks through it and finds all errors at
+once.
 """
 
 from __future__ import annotations
@@ -19,11 +20,28 @@ from enum import Enum
 from functools import cache
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple, TypeVar, Union, cast, get_args, get_origin, get_type_hints
+from typing import (
+    Annotated,
+    Any,
+    NamedTuple,
+    TypeVar,
+    Union,
+    cast,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 from pydantic import ValidationError
 
-from infoset.experiments.common.built_in_files import PROBLEMS, SCENARIO, built_in, built_in_names, kind_of, taken_by
+from infoset.experiments.common.built_in_files import (
+    PROBLEMS,
+    SCENARIO,
+    built_in,
+    built_in_names,
+    kind_of,
+    taken_by,
+)
 from infoset.experiments.common.errors import InputError, nearest, shown
 from infoset.experiments.common.units import quantity_and_unit, si_factor, units_like
 from infoset.limits import LONGEST_DESCRIPTION, plain_number
@@ -35,15 +53,17 @@ KeyPath = tuple[str, ...]
 Kind = TypeVar("Kind")
 
 _UNTRAPPED = Context(prec=60, traps=[])
-"""Products beyond the range of decimal numbers are infinite, which is refused as any infinite value."""
+"""Products beyond the range of decimal numbers are infinite, which is refused as any infinite
+value.
+"""
 _MAX_FAULTS = 50
 MAX_FILE_BYTES = 100_000
 """Size of the largest TOML file that is read."""
 MAX_KEY_PARTS = 20
 """Maximum number of parts of a dotted key of a TOML file; the longest key of our files has three.
 
-The time of the parser grows as the square of this number: for a file of `MAX_FILE_BYTES` with parts of one letter it is
-0.3 s with 20 parts, 1 s with 100, and 11 s with half of the file in one key."""
+The time of the parser grows as the square of this number: for a file of `MAX_FILE_BYTES` with parts
+of one letter it is 0.3 s with 20 parts, 1 s with 100, and 11 s with half of the file in one key."""
 _TOKENS = re.compile(
     r"""(?P<dot>\.)|(?P<blank>[ \t]++)|(?P<comment>\#[^\n]*+)"""
     r'''|(?P<part>"""(?:[^"\\]|\\.|"(?!""))*+(?:"{3,5})?|"(?:[^"\\\n]|\\.)*+"?|[A-Za-z0-9_-]++'''
@@ -51,12 +71,14 @@ _TOKENS = re.compile(
     r"|(?P<other>.)",
     re.DOTALL,
 )
-"""Tokens of TOML: strings and bare words (`part`), which are the parts of keys, and what stands between them. No token
-is read twice, so the time is proportional to the length of the text."""
+"""Tokens of TOML: strings and bare words (`part`), which are the parts of keys, and what stands
+between them. No token is read twice, so the time is proportional to the length of the text."""
 
 
 class KeyField(NamedTuple):
-    """What the value of a key is: a table of a dataclass, many of them, an interval, or anything else."""
+    """What the value of a key is: a table of a dataclass, many of them, an interval, or anything
+    else.
+    """
 
     table: type | None
     many: bool
@@ -64,7 +86,9 @@ class KeyField(NamedTuple):
     numeric: type | None
 
 
-def read_file(owner: type[Kind], name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> Kind:
+def read_file(
+    owner: type[Kind], name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None
+) -> Kind:
     """Read a built-in file or a file of the user as a dataclass.
 
     Parameters
@@ -72,10 +96,12 @@ def read_file(owner: type[Kind], name_or_path: str | os.PathLike[str], settings:
     owner : type
         The dataclass; its class variable ``kind``, if any, is the ``kind`` of such files.
     name_or_path : str or path
-        A built-in name wins over a file of that name, unless the argument has a path separator or ends in ``.toml``.
+        A built-in name wins over a file of that name, unless the argument has a path separator or
+        ends in ``.toml``.
     settings : sequence of str or None
-        KEY=VALUE: values in place of those of the file, for example ``thruster.budget_m_s=500``. A key of an array of
-        tables has the number of its table, ``craft.2.weight``; ``.min`` and ``.max`` are the ends of an interval.
+        KEY=VALUE: values in place of those of the file, for example ``thruster.budget_m_s=500``. A
+        key of an array of tables has the number of its table, ``craft.2.weight``; ``.min`` and
+        ``.max`` are the ends of an interval.
 
     Raises
     ------
@@ -90,7 +116,9 @@ def read_file(owner: type[Kind], name_or_path: str | os.PathLike[str], settings:
     return made  # type: ignore[no-any-return]  # the type of the result is `owner`
 
 
-def load_problem(name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> Any:
+def load_problem(
+    name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None
+) -> Any:
     """Read a built-in problem or a problem file of any kind, with `settings` as in `read_file`.
 
     Returns the dataclass of its kind; raises `InputError` as `read_file` does.
@@ -98,16 +126,23 @@ def load_problem(name_or_path: str | os.PathLike[str], settings: Sequence[str] |
     text, source = source_of(name_or_path, PROBLEMS)
     kind = kind_of(parse(text, source))
     if kind is None:
-        raise InputError(f"{source}: kind: must be one of {', '.join(PROBLEMS)}; write it above the first table")
+        raise InputError(
+            f"{source}: kind: must be one of {', '.join(PROBLEMS)}; write it above the first table"
+        )
     if kind == SCENARIO:
         raise InputError(f"{source}: {taken_by(kind)}")
-    owner: type = getattr(import_module(f"infoset.experiments.{PROBLEMS[kind].module}"), PROBLEMS[kind].owner)
+    owner: type = getattr(
+        import_module(f"infoset.experiments.{PROBLEMS[kind].module}"), PROBLEMS[kind].owner
+    )
     return read_file(owner, name_or_path, settings)
 
 
-def read_text(owner: type[Kind], text: str, source: str, settings: Sequence[str] | None = None) -> Kind:
+def read_text(
+    owner: type[Kind], text: str, source: str, settings: Sequence[str] | None = None
+) -> Kind:
     """Return the dataclass of the text of a file, as `read_file`; messages name `source`."""
-    document, wanted = parse(text, source), kind_name(owner)
+    document = parse(text, source)
+    wanted = kind_name(owner)
     kind = kind_of(document)
     if kind is not None and kind != wanted:
         raise InputError(f"{source}: {taken_by(kind)}")
@@ -121,9 +156,13 @@ def read_text(owner: type[Kind], text: str, source: str, settings: Sequence[str]
 
 
 def source_of(name_or_path: str | os.PathLike[str], kinds: Collection[str]) -> tuple[str, str]:
-    """Return the text of a built-in file of these kinds or of a file of the user, and its name for messages."""
+    """Return the text of a built-in file of these kinds or of a file of the user, and its name for
+    messages.
+    """
     given = os.fspath(name_or_path)
-    is_name = isinstance(name_or_path, str) and not given.endswith(".toml") and Path(given).name == given
+    is_name = (
+        isinstance(name_or_path, str) and not given.endswith(".toml") and Path(given).name == given
+    )
     if is_name and (given in built_in_names(kinds) or not os.path.lexists(given)):
         return built_in(given, kinds).text, f"{given} (built in)"
     try:
@@ -133,7 +172,9 @@ def source_of(name_or_path: str | os.PathLike[str], kinds: Collection[str]) -> t
 
 
 def read_input(file: Path, max_bytes: int) -> bytes:
-    """Return the content of a file of the user; `InputError` if it has more than `max_bytes`, or cannot be read."""
+    """Return the content of a file of the user; `InputError` if it has more than `max_bytes`, or
+    cannot be read.
+    """
     try:
         with file.open("rb") as stream:
             content = stream.read(max_bytes + 1)
@@ -150,17 +191,21 @@ def kind_name(owner: type) -> str:
 
 
 class _Reading:
-    """A file that is being read: its faults, and its keys and values as written, by their paths in SI."""
+    """A file that is being read: its faults, and its keys and values as written, by their paths in
+    SI.
+    """
 
     def __init__(self, owner: type, source: str) -> None:
-        self._owner, self._source = owner, source
+        self._owner = owner
+        self._source = source
         self._faults: dict[KeyPath, str] = {}
         self._written: dict[KeyPath, tuple[str, object]] = {}
         self._guessed: set[KeyPath] = set()
 
     def in_si(self, table: Mapping[str, Any], owner: type, path: KeyPath) -> dict[str, Any]:
         """Return a table by the names of the fields, numbers in SI; find unknown keys."""
-        known, values = fields_of(owner), dict[str, Any]()
+        known = fields_of(owner)
+        values = dict[str, Any]()
         for key, value in table.items():
             name = next((name for name in known if si_factor(key, name) is not None), None)
             if name is None:
@@ -176,17 +221,25 @@ class _Reading:
                 values[name] = self.in_si(value, field.table, here)
             elif field.table is not None and isinstance(value, list):
                 values[name] = [
-                    self.in_si(each, field.table, (*here, str(index))) if isinstance(each, dict) else each
+                    self.in_si(each, field.table, (*here, str(index)))
+                    if isinstance(each, dict)
+                    else each
                     for index, each in enumerate(value)
                 ]
             else:
                 values[name] = _scaled(value, si_factor(key, name) or Decimal(1))
-                if field.pair and isinstance(values[name], float | int) and not isinstance(value, bool):
+                if (
+                    field.pair
+                    and isinstance(values[name], float | int)
+                    and not isinstance(value, bool)
+                ):
                     values[name] = [values[name]] * 2
         return values
 
     def _unknown(self, path: KeyPath, known: Mapping[str, KeyField]) -> None:
-        """Note a key that no field has, with the nearest one of its table, or the same key of another table."""
+        """Note a key that no field has, with the nearest one of its table, or the same key of
+        another table.
+        """
         if len(self._faults) > _MAX_FAULTS:
             return
         with_unit = _with_wrong_unit(path[-1], known)
@@ -208,11 +261,17 @@ class _Reading:
         """Replace a value by that of KEY=VALUE."""
         key, mark, literal = (part.strip() for part in setting.partition("="))
         if not mark or not key or not literal:
-            raise InputError(f"--set: must be KEY=VALUE, found {shown(setting)}; for example --set name=mine")
+            raise InputError(
+                f"--set: must be KEY=VALUE, found {shown(setting)}; for example --set name=mine"
+            )
         found = _found(values, self._owner, key)
         if found is None:
             prefix, _, last = key.rpartition(".")
-            siblings = [name.rsplit(".", 1)[-1] for name in keys_of(self._owner) if name.rpartition(".")[0] == prefix]
+            siblings = [
+                name.rsplit(".", 1)[-1]
+                for name in keys_of(self._owner)
+                if name.rpartition(".")[0] == prefix
+            ]
             with_unit = _with_wrong_unit(last, siblings)
             guess = similar_key(key, keys_of(self._owner))
             hint = f"; did you mean {guess}?" if guess else ""
@@ -229,7 +288,9 @@ class _Reading:
                 raise InputError(f"--set: {key}: must be a number, found {shown(given)}")
             pair = table.get(name)
             if not isinstance(pair, list) or len(pair) != 2:
-                raise InputError(f"--set: {key}: the file has no such interval; set both ends, KEY=[1.0, 2.0]")
+                raise InputError(
+                    f"--set: {key}: the file has no such interval; set both ends, KEY=[1.0, 2.0]"
+                )
             value = [value[0], pair[1]] if end == 0 else [pair[0], value[0]]
         table[name] = value
 
@@ -242,7 +303,9 @@ class _Reading:
             for details in error.errors(include_url=False):
                 self._invalid(details)
         if made is None or self._faults:
-            lines = [f"{self._source}: {self._line(path, text)}" for path, text in self._faults.items()]
+            lines = [
+                f"{self._source}: {self._line(path, text)}" for path, text in self._faults.items()
+            ]
             rest = ["... and more; correct these first"] if len(lines) > _MAX_FAULTS else []
             raise InputError("\n".join([*lines[:_MAX_FAULTS], *rest]))
         return made
@@ -260,15 +323,20 @@ class _Reading:
             path = (*path, name)
             text = rest
         while path and path not in self._written and path[-1].isdecimal():
-            text, path = f"number {int(path[-1]) + 1} {text}", path[:-1]
+            text = f"number {int(path[-1]) + 1} {text}"
+            path = path[:-1]
         self._faults.setdefault(path, text)
 
     def _line(self, path: KeyPath, text: str) -> str:
-        """Return a fault with its key as written, its value, and the SI unit of its limits if the key has another."""
+        """Return a fault with its key as written, its value, and the SI unit of its limits if the
+        key has another.
+        """
         key, value = self._written.get(path, (path[-1] if path else "", None))
         si_unit = quantity_and_unit(path[-1])[1] if path else ""
         unit = f" (in {si_unit})" if path and key != path[-1] and re.search(r"[1-9]", text) else ""
-        found = f", found {shown(value)}" if value is not None and not isinstance(value, dict) else ""
+        found = (
+            f", found {shown(value)}" if value is not None and not isinstance(value, dict) else ""
+        )
         parts = [f"#{int(part) + 1}" if part.isdecimal() else part for part in path[:-1]]
         where = ".".join([*parts, key if key.isidentifier() else shown(key)])
         return f"{where}: {text}{unit}{found}" if path else text
@@ -291,12 +359,17 @@ def _key_field(hint: Any) -> KeyField:
     table = inner[0] if many else hint
     is_table = isinstance(table, type) and is_dataclass(table)
     return KeyField(
-        table if is_table else None, many, hint == tuple[float, float], hint if hint in (int, float) else None
+        table if is_table else None,
+        many,
+        hint == tuple[float, float],
+        hint if hint in (int, float) else None,
     )
 
 
 def keys_of(owner: type, prefix: str = "") -> list[str]:
-    """Return the keys of a file with their tables; those of an array of tables have the number 1."""
+    """Return the keys of a file with their tables; those of an array of tables have the number
+    1.
+    """
     keys = []
     for name, field in fields_of(owner).items():
         if field.table is None:
@@ -309,15 +382,25 @@ def keys_of(owner: type, prefix: str = "") -> list[str]:
 def similar_key(key: str, known: Sequence[str]) -> str | None:
     """Return the most similar known key, or up to three keys with the same last part, or None."""
     last = key.rsplit(".", 1)[-1]
-    alike = [name for name in known if name.rsplit(".", 1)[-1] == last or si_factor(last, name.rsplit(".", 1)[-1])]
+    alike = [
+        name
+        for name in known
+        if name.rsplit(".", 1)[-1] == last or si_factor(last, name.rsplit(".", 1)[-1])
+    ]
     return " or ".join(alike[:3]) or nearest(key, known)
 
 
 def _with_wrong_unit(key: str, known: Iterable[str]) -> str | None:
-    """Return the known key that a key is except for its unit: `pixel_error_rad` for `pixel_error_mas`."""
+    """Return the known key that a key is except for its unit: `pixel_error_rad` for
+    `pixel_error_mas`.
+    """
     for name in known:
         quantity, unit = quantity_and_unit(name)
-        if unit and (key == quantity or key.startswith(f"{quantity}_")) and si_factor(key, name) is None:
+        if (
+            unit
+            and (key == quantity or key.startswith(f"{quantity}_"))
+            and si_factor(key, name) is None
+        ):
             return name
     return None
 
@@ -328,7 +411,9 @@ def _units_text(name: str) -> str:
 
 
 def numeric_key(owner: type, key: str) -> type[int] | type[float] | None:
-    """Return whether the value of a key may be a whole number or any number; None if neither, or there is no key."""
+    """Return whether the value of a key may be a whole number or any number; None if neither, or
+    there is no key.
+    """
     found = _found({}, owner, key)
     if found is None:
         return None
@@ -337,12 +422,16 @@ def numeric_key(owner: type, key: str) -> type[int] | type[float] | None:
     return float if field.pair else field.numeric
 
 
-def _found(values: dict[str, Any], owner: type, key: str) -> tuple[dict[str, Any], type, str, int | None] | None:
-    """Return the table and dataclass of a key, the name of its field, and the number of an end of an interval.
+def _found(
+    values: dict[str, Any], owner: type, key: str
+) -> tuple[dict[str, Any], type, str, int | None] | None:
+    """Return the table and dataclass of a key, the name of its field, and the number of an end of
+    an interval.
 
     A table that is missing in `values` is added. None if there is no such key.
     """
-    path, table = key.split("."), cast(Any, values)
+    path = key.split(".")
+    table = cast(Any, values)
     end = ENDS.index(path.pop()) if len(path) > 1 and path[-1] in ENDS else None
     for part in path[:-1]:
         if isinstance(table, list):
@@ -354,9 +443,14 @@ def _found(values: dict[str, Any], owner: type, key: str) -> tuple[dict[str, Any
             field = fields_of(owner).get(part)
             if field is None or field.table is None or not isinstance(table, dict):
                 return None
-            owner, table = field.table, table.setdefault(part, [] if field.many else {})
+            owner = field.table
+            table = table.setdefault(part, [] if field.many else {})
     name = next((name for name in fields_of(owner) if si_factor(path[-1], name)), None)
-    if not isinstance(table, dict) or name is None or (end is not None and not fields_of(owner)[name].pair):
+    if (
+        not isinstance(table, dict)
+        or name is None
+        or (end is not None and not fields_of(owner)[name].pair)
+    ):
         return None
     return table, owner, name, end
 
@@ -369,17 +463,25 @@ def _value(literal: str) -> Any:
         return tomllib.loads(f"value = {literal}", parse_float=Decimal)["value"]
     except (ValueError, RecursionError, InvalidOperation):
         return (
-            Decimal(literal) if re.fullmatch(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?", literal) else literal
+            Decimal(literal)
+            if re.fullmatch(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?", literal)
+            else literal
         )
 
 
 def _scaled(value: Any, factor: Decimal) -> Any:
-    """Return a value with its numbers times a factor, each rounded once; whole numbers without a unit stay whole."""
+    """Return a value with its numbers times a factor, each rounded once; whole numbers without a
+    unit stay whole.
+    """
     if isinstance(value, list):
         return [_scaled(item, factor) for item in value]
     if isinstance(value, bool) or not isinstance(value, int | Decimal):
         return value
-    return value if isinstance(value, int) and factor == 1 else float(_UNTRAPPED.multiply(Decimal(value), factor))
+    return (
+        value
+        if isinstance(value, int) and factor == 1
+        else float(_UNTRAPPED.multiply(Decimal(value), factor))
+    )
 
 
 def parse(text: str, source: str) -> dict[str, Any]:
@@ -387,7 +489,8 @@ def parse(text: str, source: str) -> dict[str, Any]:
     line = _line_of_long_key(text)
     if line is not None:
         raise InputError(
-            f"{source}: line {line}: a key has more than {MAX_KEY_PARTS} parts; no key has more than three"
+            f"{source}: line {line}: a key has more than {MAX_KEY_PARTS} parts; no key has more "
+            "than three"
         )
     try:
         return tomllib.loads(text, parse_float=Decimal)
@@ -397,7 +500,9 @@ def parse(text: str, source: str) -> dict[str, Any]:
 
 
 def _line_of_long_key(text: str) -> int | None:
-    """Return the number of the first line with a key of more than `MAX_KEY_PARTS` parts, or None."""
+    """Return the number of the first line with a key of more than `MAX_KEY_PARTS` parts, or
+    None.
+    """
     parts, follows_dot = 0, False
     for token in _TOKENS.finditer(text):
         kind = token.lastgroup
@@ -430,7 +535,11 @@ def _lines(value: Any, prefix: str) -> Iterator[str]:
             yield f"{name} = {_literal(inner)}"
         else:
             tables += [
-                (f"[[{prefix}{name}]]" if field.many else f"[{prefix}{name}]", each, f"{prefix}{name}.")
+                (
+                    f"[[{prefix}{name}]]" if field.many else f"[{prefix}{name}]",
+                    each,
+                    f"{prefix}{name}.",
+                )
                 for each in (inner if field.many else (inner,))
             ]
     for heading, table, inner_prefix in tables:
@@ -448,5 +557,8 @@ def _literal(value: Any) -> str:
 def changed(value: Kind, changes: Mapping[str, float | int], source: str) -> Kind:
     """Return a dataclass with other values by key, checked as a file with these values is."""
     return read_text(
-        type(value), to_toml(value), source, [f"{key}={plain_number(number)!r}" for key, number in changes.items()]
+        type(value),
+        to_toml(value),
+        source,
+        [f"{key}={plain_number(number)!r}" for key, number in changes.items()],
     )

@@ -20,28 +20,45 @@ def _silence_the_compile_notice(quiet: bool) -> bool:
 
 
 ProblemName = Annotated[
-    str, typer.Argument(metavar="PROBLEM", help="A built-in problem (see: infoset problems list), or a problem file.")
+    str,
+    typer.Argument(
+        metavar="PROBLEM",
+        help="A built-in problem (see: infoset problems list), or a problem file.",
+    ),
 ]
 Settings = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
         metavar="KEY=VALUE",
-        help="Replace a value of the file, in the unit of the file; a key of a table is written TABLE.KEY. May be "
-        "given several times.",
+        help=(
+            "Replace a value of the file, in the unit of the file; a key of a table is written "
+            "TABLE.KEY. May be given several times."
+        ),
     ),
 ]
 Seed = Annotated[
-    int, typer.Option("--seed", metavar="N", min=0, help="Root seed. The same seed gives the same random numbers.")
+    int,
+    typer.Option(
+        "--seed", metavar="N", min=0, help="Root seed. The same seed gives the same random numbers."
+    ),
 ]
 Out = Annotated[
-    Path | None, typer.Option("--out", metavar="DIR", help="Folder for figures and results; created if needed.")
+    Path | None,
+    typer.Option("--out", metavar="DIR", help="Folder for figures and results; created if needed."),
 ]
-Json = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write results as JSON; - prints JSON only.")]
+Json = Annotated[
+    Path | None,
+    typer.Option("--json", metavar="FILE", help="Write results as JSON; - prints JSON only."),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Csv = Annotated[
     Path | None,
-    typer.Option("--csv", metavar="FILE", help="Write a table as CSV, units in the headings; - prints CSV only."),
+    typer.Option(
+        "--csv",
+        metavar="FILE",
+        help="Write a table as CSV, units in the headings; - prints CSV only.",
+    ),
 ]
 Html = Annotated[
     Path | None,
@@ -54,7 +71,12 @@ Html = Annotated[
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")]
 Quiet = Annotated[
     bool,
-    typer.Option("--quiet", "-q", callback=_silence_the_compile_notice, help="Print no progress and no tables."),
+    typer.Option(
+        "--quiet",
+        "-q",
+        callback=_silence_the_compile_notice,
+        help="Print no progress and no tables.",
+    ),
 ]
 
 
@@ -74,4 +96,6 @@ def choice(option: str, name: str, valid: Sequence[str]) -> str:
         return name
     guess = nearest(name, valid)
     hint = f"did you mean {guess}? " if guess else ""
-    raise InputError(f"{option}: there is no {shown(name)}; {hint}choose one of: {', '.join(valid)}")
+    raise InputError(
+        f"{option}: there is no {shown(name)}; {hint}choose one of: {', '.join(valid)}"
+    )

@@ -14,17 +14,20 @@ EARTH_M3_S2, EARTH_RADIUS_M = 3.986004418e14, 6378137.0
 
 
 def check_angle(key: str, duration_s: float, rate_rad_s: float) -> None:
-    """Raise ValueError if the orbit turns by an unlikely angle in a time; `key` is that of the time."""
+    """Raise ValueError if the orbit turns by an unlikely angle in a time; `key` is that of the
+    time.
+    """
     angle = duration_s * rate_rad_s
     if not MIN_RADIANS <= angle <= MAX_RADIANS:
         raise ValueError(
-            f"{key} is {angle:.3g} radians of the orbit, and {MIN_RADIANS:g} to {MAX_RADIANS:g} make sense: check "
-            "its unit and that of the orbit's rate"
+            f"{key} is {angle:.3g} radians of the orbit, and {MIN_RADIANS:g} to {MAX_RADIANS:g} "
+            "make sense: check its unit and that of the orbit's rate"
         )
 
 
 def check_orbit(key: str, state: tuple[ArrayLike, ArrayLike], mu_m3_s2: float) -> None:
-    """Raise ValueError, which begins with `key`, if the orbit of a state (position and velocity, SI) meets its planet.
+    """Raise ValueError, which begins with `key`, if the orbit of a state (position and velocity,
+    SI) meets its planet.
 
     The orbit is an ellipse; the planet is that of `densest_m`.
     """
@@ -35,15 +38,19 @@ def check_orbit(key: str, state: tuple[ArrayLike, ArrayLike], mu_m3_s2: float) -
 
 
 def check_flight(key: str, state: Floats, mu_m3_s2: float, before_s: float, after_s: float) -> None:
-    """Raise ValueError, which begins with `key`, if a body that coasts through a state, SI, meets its planet.
+    """Raise ValueError, which begins with `key`, if a body that coasts through a state, SI, meets
+    its planet.
 
-    It coasts along any conic, from `before_s` before the `state`, shape (6,), to `after_s` after it; the planet is that
-    of `densest_m`.
+    It coasts along any conic, from `before_s` before the `state`, shape (6,), to `after_s` after
+    it; the planet is that of `densest_m`.
     """
-    position, velocity = state[:3], state[3:]
+    position = state[:3]
+    velocity = state[3:]
     for direction, duration_s in ((-1.0, before_s), (1.0, after_s)):
         try:
-            fault = flight_fault(position, direction * velocity, mu_m3_s2, densest_m(mu_m3_s2), duration_s)
+            fault = flight_fault(
+                position, direction * velocity, mu_m3_s2, densest_m(mu_m3_s2), duration_s
+            )
         except ValueError as error:
             raise ValueError(f"{key}: {error}") from None
         if fault is not None:
@@ -51,14 +58,17 @@ def check_flight(key: str, state: Floats, mu_m3_s2: float, before_s: float, afte
 
 
 def densest_m(mu_m3_s2: float) -> float:
-    """Return the radius of a planet with the density of the Earth; no planet or moon is denser, or smaller."""
+    """Return the radius of a planet with the density of the Earth; no planet or moon is denser, or
+    smaller.
+    """
     return float(EARTH_RADIUS_M * (mu_m3_s2 / EARTH_M3_S2) ** (1.0 / 3.0))
 
 
 def check_rate(rate_rad_s: float, eccentricity: float = 0.0) -> None:
     """Raise ValueError if there is no orbit of this mean motion about the Earth, see `check_orbit`.
 
-    The rate at the surface of a planet depends on its density only, so that the Earth stands for all of them.
+    The rate at the surface of a planet depends on its density only, so that the Earth stands for
+    all of them.
     """
     axis_m = (EARTH_M3_S2 / rate_rad_s**2) ** (1.0 / 3.0)
     state = OrbitalElements(axis_m, eccentricity, 0.0, 0.0, 0.0, 0.0).state(EARTH_M3_S2)

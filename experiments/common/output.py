@@ -1,4 +1,6 @@
-"""Files that commands write: no file is replaced unasked, each is written completely or not at all."""
+"""Files that commands write: no file is replaced unasked, each is written completely or not at
+all.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,9 @@ if TYPE_CHECKING:
 
 STDOUT = "-"
 ENDINGS = {"--html": (".html", ".htm"), "--gif": (".gif",), "--record": (".npz",)}
-"""Endings of the files of options that other programs open by their endings: browsers, viewers, `infoset replay`."""
+"""Endings of the files of options that other programs open by their endings: browsers, viewers,
+`infoset replay`.
+"""
 
 
 class Output:
@@ -50,7 +54,9 @@ class Output:
         return self.folder is not None or option in self.files
 
     def save(self, name: str, content: str | bytes, option: str | None = None) -> None:
-        """Write a file of the folder under its name, and the file of an option with the same content."""
+        """Write a file of the folder under its name, and the file of an option with the same
+        content.
+        """
         if self.folder is not None:
             self._write(self.folder / name, content)
         if option is not None:
@@ -72,16 +78,26 @@ class Output:
             for kind, content in figure_bytes(figure):
                 self._write(self.folder / f"{name}.{kind}", content)
 
-    def draw(self, names: Sequence[str], figures: Iterable[Figure | None], progress: Callable[[float], None]) -> None:
-        """Write figures under their names, each as soon as it is drawn; None is a figure that a result lacks."""
+    def draw(
+        self,
+        names: Sequence[str],
+        figures: Iterable[Figure | None],
+        progress: Callable[[float], None],
+    ) -> None:
+        """Write figures under their names, each as soon as it is drawn; None is a figure that a
+        result lacks.
+        """
         for done, (name, figure) in enumerate(zip(names, figures, strict=True), start=1):
             if figure is not None:
                 self.figure(name, figure)
             progress(done / len(names))
 
     def enter(self, folder: Path, *names: str) -> None:
-        """Continue in a folder into which another function has written these files; files there are replaced."""
-        self.folder, self._overwrite = folder, True
+        """Continue in a folder into which another function has written these files; files there are
+        replaced.
+        """
+        self.folder = folder
+        self._overwrite = True
         self.written += [folder / name for name in names]
 
     def _write(self, file: Path, content: str | bytes) -> None:
@@ -95,12 +111,14 @@ def output_of(
 ) -> Iterator[Output]:
     """Yield the output of a command, and list the written files on stderr at the end.
 
-    Single files are those of the options ``json``, ``csv`` and ``html``, and of `files`, by option; `names` are those
-    that the command writes into the folder of ``--out``. Raise `InputError` before the work if a file exists and
-    ``--overwrite`` is not given, two files have the same path, a file has the ending of another kind, or a folder
-    cannot be written.
+    Single files are those of the options ``json``, ``csv`` and ``html``, and of `files`, by option;
+    `names` are those that the command writes into the folder of ``--out``. Raise `InputError`
+    before the work if a file exists and ``--overwrite`` is not given, two files have the same path,
+    a file has the ending of another kind, or a folder cannot be written.
     """
-    given = {f"--{option}": getattr(options, option, None) for option in ("json", "csv", "html")} | dict(files or {})
+    given = {
+        f"--{option}": getattr(options, option, None) for option in ("json", "csv", "html")
+    } | dict(files or {})
     single = {option: path for option, path in given.items() if path is not None}
     folder = options.out if names else None
     for option, path in single.items():
@@ -108,7 +126,9 @@ def output_of(
     paths = [*single.values(), *(folder / name for name in names if folder is not None)]
     for number, path in enumerate(paths):
         if path in paths[:number]:
-            raise InputError(f"{path}: is given twice; choose another name for one of the two files")
+            raise InputError(
+                f"{path}: is given twice; choose another name for one of the two files"
+            )
         if str(path) != STDOUT:
             _check_new(path, options.overwrite)
         elif files and path in files.values():
@@ -131,18 +151,24 @@ def _check_ending(option: str, path: Path) -> None:
     endings = ENDINGS.get(name)
     if endings is not None and str(path) != STDOUT and path.suffix.lower() not in endings:
         example = f"{path.stem}{endings[0]}"
-        raise InputError(f"{name}: {path}: the file must end in {endings[0]}; for example {example}")
+        raise InputError(
+            f"{name}: {path}: the file must end in {endings[0]}; for example {example}"
+        )
 
 
 def need_writable(folder: Path) -> None:
-    """Raise `InputError` if no file can be written into a folder. Folders that are missing are made, and removed."""
+    """Raise `InputError` if no file can be written into a folder. Folders that are missing are
+    made, and removed.
+    """
     missing = [each for each in (folder, *folder.parents) if not each.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
-        raise InputError(f"{folder}: cannot be written: {error.strerror}; choose another folder") from None
+        raise InputError(
+            f"{folder}: cannot be written: {error.strerror}; choose another folder"
+        ) from None
     finally:
         for each in missing:
             with contextlib.suppress(OSError):  # those that could not be made
@@ -153,7 +179,9 @@ def _check_new(file: Path, overwrite: bool) -> None:
     if file.is_dir():
         raise InputError(f"{file}: is a folder; give the name of a file")
     if file.exists() and not (overwrite and file.is_file()):
-        raise InputError(f"{file}: exists already; choose another name, or give --overwrite to replace a file")
+        raise InputError(
+            f"{file}: exists already; choose another name, or give --overwrite to replace a file"
+        )
 
 
 def write_file(file: Path, content: str | bytes, *, overwrite: bool = False) -> None:
@@ -168,16 +196,23 @@ def write_file(file: Path, content: str | bytes, *, overwrite: bool = False) -> 
 
 def outcome_columns(results: Results) -> dict[str, list[Cell]]:
     """Return the columns of results by name, without run numbers, starts and hits."""
-    return {name: values for name, values in results.to_dict().items() if not name.startswith(("run", "start_", "hit"))}
+    return {
+        name: values
+        for name, values in results.to_dict().items()
+        if not name.startswith(("run", "start_", "hit"))
+    }
 
 
 def hit_key(hits: HitEstimate | None, missed: Mapping[str, object]) -> dict[str, object]:
-    """Return the keys `hit` and `missed` of a curve or a sample in JSON; nothing if the body has no size."""
+    """Return the keys `hit` and `missed` of a curve or a sample in JSON; nothing if the body has no
+    size.
+    """
     return {} if hits is None else {"hit": vars(hits), "missed": missed}
 
 
 def to_json(value: object) -> str:
-    """Return a value as indented JSON, keys in the order given; raise ValueError if a number is not finite.
+    """Return a value as indented JSON, keys in the order given; raise ValueError if a number is not
+    finite.
 
     Arrays become lists, enumerations their values, dataclasses dicts.
     """

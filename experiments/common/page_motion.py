@@ -18,10 +18,11 @@ _FLAT = np.cos(np.radians(4.0))
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """A path: points in SI of shape (n, 3) at the times of the page, and the index of its line style and mark.
+    """A path: points in SI of shape (n, 3) at the times of the page, and the index of its line
+    style and mark.
 
-    A path that ends earlier has fewer points. `choice` is the index of the choice with which it is shown; None shows it
-    with every choice.
+    A path that ends earlier has fewer points. `choice` is the index of the choice with which it is
+    shown; None shows it with every choice.
     """
 
     name: str
@@ -32,7 +33,9 @@ class Track:
 
 @dataclass(frozen=True, eq=False)
 class Mark:
-    """A fixed point in SI: cross, plus or diamond, as no moving point; an empty name is left out of the legend."""
+    """A fixed point in SI: cross, plus or diamond, as no moving point; an empty name is left out of
+    the legend.
+    """
 
     name: str
     point: Floats
@@ -43,8 +46,8 @@ class Mark:
 class Sets:
     """A set that changes with time.
 
-    The faces of a set are polygons of shape (k, 3) in space, or (k, 2) in the plane of the view, SI. `of_frame` is the
-    index of the set at each of the times of the page.
+    The faces of a set are polygons of shape (k, 3) in space, or (k, 2) in the plane of the view,
+    SI. `of_frame` is the index of the set at each of the times of the page.
     """
 
     name: str
@@ -80,8 +83,8 @@ class Curve:
 class Graph:
     """Curves over time.
 
-    `levels` are values of horizontal lines, SI. `band` has the smallest and the largest possible value at each time,
-    SI, shape (n, 2). With `stairs` the values are constant between the times.
+    `levels` are values of horizontal lines, SI. `band` has the smallest and the largest possible
+    value at each time, SI, shape (n, 2). With `stairs` the values are constant between the times.
     """
 
     caption: str
@@ -105,8 +108,9 @@ def motion_page(
 ) -> str:
     """Return a page of moving craft as HTML.
 
-    `choices` are names of alternative controls, of which the reader selects one. `own_script` is the text of the script
-    that starts the page, if it is not the common one, and `own_data` further data for it.
+    `choices` are names of alternative controls, of which the reader selects one. `own_script` is
+    the text of the script that starts the page, if it is not the common one, and `own_data` further
+    data for it.
     """
     name, factor = time_unit(float(np.ptp(time_s)))
     data = {
@@ -121,11 +125,15 @@ def motion_page(
         "choices": choices,
         **(own_data or {}),
     }
-    return page(heading, ["motion.js"] if own_script else ["motion.js", "start-motion.js"], data, own_script)
+    return page(
+        heading, ["motion.js"] if own_script else ["motion.js", "start-motion.js"], data, own_script
+    )
 
 
 def faces_of(points: Floats) -> list[Floats]:
-    """Return the faces of the convex hull of points in space, or its outline in a plane or of a flat set."""
+    """Return the faces of the convex hull of points in space, or its outline in a plane or of a
+    flat set.
+    """
     if points.shape[1] == 2 or len(points) < 4:
         return [outline(points)]
     try:
@@ -147,7 +155,9 @@ def outline(points: Floats) -> Floats:
     """Return the vertices of a flat convex set in order; in a plane, without interior points."""
     if points.shape[1] == 2 and len(points) > 3:
         try:
-            return np.asarray(points[ConvexHull(points / np.maximum(np.ptp(points, axis=0), 1e-300)).vertices])
+            return np.asarray(
+                points[ConvexHull(points / np.maximum(np.ptp(points, axis=0), 1e-300)).vertices]
+            )
         except QhullError:
             pass
     centred = points - points.mean(axis=0)

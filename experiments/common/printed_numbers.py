@@ -1,9 +1,10 @@
 """Numbers of papers, read from `experiments/printed`, and their comparison with ours.
 
-A file has the title of a paper, remarks about misprints that are not in its numbers, and tables. Each line of a table
-is a number: its name, and its digits as printed or the fields of `PrintedNumber`. Fields that many numbers share stand
-once, in their table or in ``[defaults]``; a note is a key of ``[notes]``. A table may have ``options`` of a command:
-the names of its numbers are then keys of the results of this command.
+A file has the title of a paper, remarks about misprints that are not in its numbers, and tables.
+Each line of a table is a number: its name, and its digits as printed or the fields of
+`PrintedNumber`. Fields that many numbers share stand once, in their table or in ``[defaults]``; a
+note is a key of ``[notes]``. A table may have ``options`` of a command: the names of its numbers
+are then keys of the results of this command.
 """
 
 from __future__ import annotations
@@ -26,11 +27,15 @@ class Verdict(Enum):
     AGREED = "agreed"
     """Ours is the printed number, to the last digit."""
     POSSIBLE = "possible"
-    """The printed number is that of one run, and runs of ours have it; their interval is too wide to confirm it."""
+    """The printed number is that of one run, and runs of ours have it; their interval is too wide
+    to confirm it.
+    """
     MISPRINT = "misprint"
     """The correct number is known, and it is ours, or that of the other model if there is one."""
     EXPLAINED = "explained by another model"
-    """The numbers differ, and a model other than that of the paper's equations gives the printed number."""
+    """The numbers differ, and a model other than that of the paper's equations gives the printed
+    number.
+    """
     NOT_EXPLAINED = "not explained"
     """The numbers differ for an unknown reason."""
     DISAGREED = "disagreed"
@@ -50,12 +55,14 @@ class PrintedNumber:
     corrected : str or None
         The correct number, if the printed one is known to be a misprint.
     unexplained : float
-        Largest difference for an unknown reason, in units of the last digit; 0 if the numbers should agree.
+        Largest difference for an unknown reason, in units of the last digit; 0 if the numbers
+        should agree.
     note : str
         Explanation of a misprint, or what was tried to explain a difference.
     tolerance : float
-        Largest error of the digits, in units of the last one: 0.5 if rounded, 1 if a paper rounds some numbers and
-        truncates others, or if the last of ten or more digits has the error of another computation.
+        Largest error of the digits, in units of the last one: 0.5 if rounded, 1 if a paper rounds
+        some numbers and truncates others, or if the last of ten or more digits has the error of
+        another computation.
     agrees : (float, float) or None
         Interval in which a number agrees, if it is another one than that of the digits.
     """
@@ -84,12 +91,14 @@ class Ours:
     value : float
         NaN if the computation has no result.
     other : float or None
-        The number of the other model with which the paper's number was probably computed, if one is known.
+        The number of the other model with which the paper's number was probably computed, if one is
+        known.
     beyond : float
         Added to the tolerance, for the rounding of the inputs of the computation.
     spread : (float, float) or None
-        Interval of most of our values, if ours is the median of many runs and the printed number is one run. The
-        printed number must then lie in this interval, which confirms it if its ends differ by less than a factor of 2.
+        Interval of most of our values, if ours is the median of many runs and the printed number is
+        one run. The printed number must then lie in this interval, which confirms it if its ends
+        differ by less than a factor of 2.
     """
 
     value: float
@@ -108,13 +117,17 @@ class Comparison:
     @property
     def band(self) -> tuple[float, float]:
         """Return the interval in which the numbers agree."""
-        number, ours = self.number, self.ours
-        return ours.spread or number.agrees or interval(number.printed, number.tolerance, ours.beyond)
+        number = self.number
+        ours = self.ours
+        return (
+            ours.spread or number.agrees or interval(number.printed, number.tolerance, ours.beyond)
+        )
 
     @property
     def verdict(self) -> Verdict:
         """Return the result of the comparison."""
-        number, ours = self.number, self.ours
+        number = self.number
+        ours = self.ours
         if not math.isfinite(ours.value):
             return Verdict.DISAGREED
         if number.corrected is not None:
@@ -132,7 +145,9 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Paper:
-    """The numbers of a paper by source, options of commands by source, and remarks about other misprints."""
+    """The numbers of a paper by source, options of commands by source, and remarks about other
+    misprints.
+    """
 
     name: str
     title: str
@@ -151,7 +166,11 @@ class Paper:
 
 def read_paper(name: str) -> Paper:
     """Read the numbers of a paper."""
-    text = resources.files("infoset.experiments").joinpath("printed", f"{name}.toml").read_text(encoding="utf-8")
+    text = (
+        resources.files("infoset.experiments")
+        .joinpath("printed", f"{name}.toml")
+        .read_text(encoding="utf-8")
+    )
     data = tomllib.loads(text)
     tables: dict[str, tuple[PrintedNumber, ...]] = {}
     options: dict[str, Mapping[str, Any]] = {}
@@ -167,7 +186,9 @@ def read_paper(name: str) -> Paper:
 
 
 def interval(digits: str, units: float, beyond: float = 0.0) -> tuple[float, float]:
-    """Return the interval of numbers that differ from digits by some units of the last one, plus `beyond`."""
+    """Return the interval of numbers that differ from digits by some units of the last one, plus
+    `beyond`.
+    """
     # A few ulp more, so that a number on the boundary is inside.
     half_width = (units * last_digit(digits) + beyond) * (1.0 + 1e-9)
     return float(digits) - half_width, float(digits) + half_width

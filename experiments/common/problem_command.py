@@ -1,4 +1,6 @@
-"""Commands that solve a problem: they read it, solve it, write files and print the results, all in the same way."""
+"""Commands that solve a problem: they read it, solve it, write files and print the results, all in
+the same way.
+"""
 
 from __future__ import annotations
 
@@ -33,13 +35,15 @@ class ProblemCommand(Generic[Problem, Report]):
     owner : type
         The dataclass of the problem.
     solve : callable
-        Returns the report of a problem for the options of the command; the third argument begins a progress bar.
+        Returns the report of a problem for the options of the command; the third argument begins a
+        progress bar.
     to_json, to_csv, lines, to_html : callable
         Return the keys of the JSON file, the table of the CSV file, what is printed, and the page.
     csv_name : str
         Name of the CSV file in the folder of ``--out``.
     figures : str
-        Module whose function ``draw_all`` yields the figures of a report, or None for one that it lacks.
+        Module whose function ``draw_all`` yields the figures of a report, or None for one that it
+        lacks.
     figure_names : tuple of str
         Their names.
     """
@@ -61,11 +65,17 @@ class ProblemCommand(Generic[Problem, Report]):
         with (
             output_of(options, files) as written,
             progress_bar(options.quiet) as begin,
-            input_errors(problem.name, _REMEDY, ArithmeticError),  # also of sets that are computed when they are drawn
+            input_errors(
+                problem.name, _REMEDY, ArithmeticError
+            ),  # also of sets that are computed when they are drawn
         ):
             with input_errors(problem.name):
                 report = self.solve(problem, options, begin)
-            head = {"versions": versions(), "problem": problem.name, "problem_hash": fingerprint(problem)}
+            head = {
+                "versions": versions(),
+                "problem": problem.name,
+                "problem_hash": fingerprint(problem),
+            }
             with input_errors(problem.name, _REMEDY):  # a number that is not finite is a ValueError
                 results = to_json(head | self.to_json(report))
             page = self.to_html(report) if self.to_html and options.html is not None else ""
@@ -96,8 +106,9 @@ def trajectories_csv(
 ) -> str:
     """Return trajectories as CSV, one line for each craft and time.
 
-    A track has the values of the columns `names`, which identify it, and arrays of n times, shape (n,), of states,
-    shape (n, 6), and of the values of the other `columns`; a value that does not exist is NaN.
+    A track has the values of the columns `names`, which identify it, and arrays of n times, shape
+    (n,), of states, shape (n, 6), and of the values of the other `columns`; a value that does not
+    exist is NaN.
     """
     rows = [
         [*track, *(None if math.isnan(value) else value for value in row)]

@@ -11,7 +11,14 @@ from functools import partial
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    TaskID,
+    TaskProgressColumn,
+    TextColumn,
+    TimeRemainingColumn,
+)
 from rich.table import Table
 from rich.text import Text
 
@@ -25,11 +32,15 @@ Clock = Callable[[], float]
 Part = str | Text | Table
 """A line or a table of a result on the screen."""
 NUMBER_WIDTH = 8
-"""Width of a column of numbers from 0 to 999999.9, and of those with an exponent, such as -1.23e10."""
+"""Width of a column of numbers from 0 to 999999.9, and of those with an exponent, such as
+-1.23e10.
+"""
 LINE_EVERY_S = 30.0
 """Time between two lines of progress in a log."""
 LONG_S, ESTIMATE_AFTER_S = 10.0, 2.0
-"""Time from which a command is long and its estimate is printed, and the time from which the rate is taken."""
+"""Time from which a command is long and its estimate is printed, and the time from which the rate
+is taken.
+"""
 NOT_FINITE = (
     "the numbers of the scenario are so large or so small that the results are not finite; "
     "check its units with: infoset scenarios check FILE"
@@ -65,8 +76,14 @@ def show(parts: Iterable[Part], quiet: bool) -> None:
         for part in parts:
             with console.capture() as captured:
                 if isinstance(part, Table):
-                    for column in part.columns:  # no word and no number is divided: lines may be longer than the screen
-                        words = [word for cell in (column.header, *column.cells) for word in str(cell).split()]
+                    for column in (
+                        part.columns
+                    ):  # no word and no number is divided: lines may be longer than the screen
+                        words = [
+                            word
+                            for cell in (column.header, *column.cells)
+                            for word in str(cell).split()
+                        ]
                         column.min_width = max(map(len, words), default=0)
                     console.print(part, crop=False)
                 else:
@@ -77,7 +94,9 @@ def show(parts: Iterable[Part], quiet: bool) -> None:
 
 
 def number_table(*titles: str, left: int = 1) -> Table:
-    """Return an empty table whose first ``left`` columns are text and whose other columns are numbers."""
+    """Return an empty table whose first ``left`` columns are text and whose other columns are
+    numbers.
+    """
     table = Table(*titles[:left], box=None, pad_edge=False)
     for title in titles[left:]:
         table.add_column(title, justify="right")
@@ -87,13 +106,17 @@ def number_table(*titles: str, left: int = 1) -> Table:
 class RowByRow:
     """A table of numbers whose rows are printed one after another, as they are known.
 
-    The first column has the width of the longest name, and the others that of a large number or of their title.
+    The first column has the width of the longest name, and the others that of a large number or of
+    their title.
     """
 
     def __init__(self, titles: Sequence[str], names: Iterable[str], quiet: bool) -> None:
         self._quiet = quiet
         width = max(max(map(len, title.split()), default=0) for title in titles[1:])
-        self._widths = [max(map(len, [titles[0], *names])), *[max(width, NUMBER_WIDTH)] * (len(titles) - 1)]
+        self._widths = [
+            max(map(len, [titles[0], *names])),
+            *[max(width, NUMBER_WIDTH)] * (len(titles) - 1),
+        ]
         show([self._table(titles, show_header=True)], quiet)
 
     def add(self, *cells: str) -> None:
@@ -117,16 +140,23 @@ def progress_clock() -> float:
 
 @contextlib.contextmanager
 def progress_bar(quiet: bool, clock: Clock | None = None) -> Iterator[BeginProgress]:
-    """Show progress on stderr: bars on a terminal, otherwise a line every `LINE_EVERY_S`; and the estimated time.
+    """Show progress on stderr: bars on a terminal, otherwise a line every `LINE_EVERY_S`; and the
+    estimated time.
 
-    The context is a function that starts a bar with a title, and returns a function that sets the fraction done. The
-    `clock` is `progress_clock` unless another is given.
+    The context is a function that starts a bar with a title, and returns a function that sets the
+    fraction done. The `clock` is `progress_clock` unless another is given.
     """
     if quiet:
         yield lambda _name: lambda _done: None
         return
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    # On a terminal, rows that are printed meanwhile are shown above the bars; into a file they are written as always.
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeRemainingColumn(),
+    )
+    # On a terminal, rows that are printed meanwhile are shown above the bars; into a file they are
+    # written as always.
     bars = Progress(
         *columns,
         console=Console(stderr=True),
@@ -154,7 +184,9 @@ class _Report:
         self._is_told = False
 
     def begin(self, name: str) -> Callable[[float], None]:
-        """Start a bar, and after finished bars a new estimate; return the function that sets the fraction done."""
+        """Start a bar, and after finished bars a new estimate; return the function that sets the
+        fraction done.
+        """
         if all(done >= 1.0 for done in self._done.values()):
             self._done.clear()
             self._first, self._is_told = None, False
@@ -178,7 +210,9 @@ class _Report:
             left = f", {duration_text(round(left_s))} left"
             if not self._is_told and now_s - first_s + left_s > LONG_S:
                 what = f"{name}: " if len(self._done) == 1 else ""
-                self._bars.console.print(f"{what}estimated time {duration_text(round(now_s - first_s + left_s))}")
+                self._bars.console.print(
+                    f"{what}estimated time {duration_text(round(now_s - first_s + left_s))}"
+                )
             self._is_told = True
         if self._bars.disable and now_s >= self._written_s + LINE_EVERY_S:
             self._written_s = now_s
@@ -197,7 +231,9 @@ def parts_of(progress: Callable[[float], None], count: int) -> list[Callable[[fl
 
 
 def number(value: float | None) -> str:
-    """Return a number with three significant digits, from 100 to 1e9 with one decimal, for tables."""
+    """Return a number with three significant digits, from 100 to 1e9 with one decimal, for
+    tables.
+    """
     if value is None:
         return "-"
     return f"{value:.1f}" if 100 <= abs(value) < 1e9 else f"{value:.3g}"
@@ -209,11 +245,16 @@ def some_runs(count: int) -> str:
 
 
 def quantile_notes(runs: int, levels: Sequence[float], noises: int = 1) -> list[str]:
-    """Return a line about the quantiles that so many runs of a noise do not show; no line if they show all."""
+    """Return a line about the quantiles that so many runs of a noise do not show; no line if they
+    show all.
+    """
     hidden = [level for level in levels if not shows(runs, level)]
     if not hidden:
         return []
     needed = max(round(1.0 / min(level, 1.0 - level)) for level in hidden)
     each = f" of each noise (--runs {noises * needed})" if noises > 1 else ""
-    too_few = f"{some_runs(runs)} {'is' if runs == 1 else 'are'} too few for {', '.join(map(level_name, hidden))}"
+    too_few = (
+        f"{some_runs(runs)} {'is' if runs == 1 else 'are'} too few for "
+        f"{', '.join(map(level_name, hidden))}"
+    )
     return [f"{too_few}; {needed} runs{each} show all quantiles"]

@@ -1,4 +1,6 @@
-"""Units at the ends of names, ``range_km`` is the quantity ``range`` in kilometres, and units in tables and figures."""
+"""Units at the ends of names, ``range_km`` is the quantity ``range`` in kilometres, and units in
+tables and figures.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +38,9 @@ UNITS = {
 
 
 def quantity_and_unit(name: str) -> tuple[str, str]:
-    """Return the quantity and the unit of a name, which is empty if it has none: `max_impulse` and `m_s`."""
+    """Return the quantity and the unit of a name, which is empty if it has none: `max_impulse` and
+    `m_s`.
+    """
     parts = name.split("_")
     for first in range(1, len(parts)):
         unit = "_".join(parts[first:])
@@ -46,7 +50,9 @@ def quantity_and_unit(name: str) -> tuple[str, str]:
 
 
 def units_like(name: str) -> list[str]:
-    """Return the units that the quantity of a name can have, the SI unit first; none if the name has no unit."""
+    """Return the units that the quantity of a name can have, the SI unit first; none if the name
+    has no unit.
+    """
     unit = quantity_and_unit(name)[1]
     if not unit:
         return []
@@ -54,7 +60,9 @@ def units_like(name: str) -> list[str]:
 
 
 def si_factor(name: str, si_name: str) -> Decimal | None:
-    """Return the factor from a name's unit to that of another name; None unless both are the same quantity."""
+    """Return the factor from a name's unit to that of another name; None unless both are the same
+    quantity.
+    """
     if name == si_name:
         return Decimal(1)
     (quantity, unit), (wanted, si_unit) = quantity_and_unit(name), quantity_and_unit(si_name)
@@ -81,7 +89,9 @@ def time_unit(span_s: float) -> Unit:
 
 
 def duration_text(seconds: float) -> str:
-    """Return a time in the maximum unit of which it has exactly one or at least two: ``2.5 min``, ``100 s``."""
+    """Return a time in the maximum unit of which it has exactly one or at least two: ``2.5 min``,
+    ``100 s``.
+    """
     fitting = [name for name, unit in SECONDS.items() if seconds == unit or seconds >= 2.0 * unit]
     name = fitting[-1] if fitting else "s"
     return f"{seconds / SECONDS[name]:.3g} {name}"
@@ -95,7 +105,11 @@ def length_text(length_m: float) -> str:
 
 def length_unit(size_m: float) -> Unit:
     """Return the unit for lengths up to a size."""
-    for name, metres, minimum in (("au", float(UNITS["au"][1]), 7.5e9), ("Mm", 1e6, 2e6), ("km", M_PER_KM, 3e3)):
+    for name, metres, minimum in (
+        ("au", float(UNITS["au"][1]), 7.5e9),
+        ("Mm", 1e6, 2e6),
+        ("km", M_PER_KM, 3e3),
+    ):
         if size_m > minimum:
             return name, 1.0 / metres
     return "m", 1.0
@@ -105,6 +119,8 @@ _IN_PRINT = str.maketrans({"_": "/", "2": "\N{SUPERSCRIPT TWO}", "3": "\N{SUPERS
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """Return the words and the unit of a key or a column: ``impulse`` and ``m/s`` of ``impulse_m_s``."""
+    """Return the words and the unit of a key or a column: ``impulse`` and ``m/s`` of
+    ``impulse_m_s``.
+    """
     quantity, unit = quantity_and_unit(name)
     return quantity.replace("_", " "), unit.translate(_IN_PRINT)

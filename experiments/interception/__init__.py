@@ -1,1 +1,3 @@
-"""The interception of an asteroid: scenario and record files, commands, figures, page and printed numbers."""
+"""The interception of an asteroid: scenario and record files, commands, figures, page and printed
+numbers.
+"""

@@ -8,20 +8,34 @@ from typing import Annotated, Literal
 
 import typer
 
-from infoset.experiments.common.options import Csv, FileOptions, Html, Out, Overwrite, Quiet, Seed, Settings
+from infoset.experiments.common.options import (
+    Csv,
+    FileOptions,
+    Html,
+    Out,
+    Overwrite,
+    Quiet,
+    Seed,
+    Settings,
+)
 
 MAX_RUNS = 10_000_000
 
 ScenarioName = Annotated[
-    str, typer.Argument(metavar="SCENARIO", help="A built-in scenario (see: infoset scenarios), or a scenario file.")
+    str,
+    typer.Argument(
+        metavar="SCENARIO", help="A built-in scenario (see: infoset scenarios), or a scenario file."
+    ),
 ]
 StrategyName = Annotated[
     str | None,
     typer.Option(
         "--strategy",
         metavar="NAME",
-        help="Guidance strategy: a built-in name, or FILE.py:CLASS for a class in a Python file. Default: that of the "
-        "scenario.",
+        help=(
+            "Guidance strategy: a built-in name, or FILE.py:CLASS for a class in a Python file. "
+            "Default: that of the scenario."
+        ),
     ),
 ]
 Strategies = Annotated[
@@ -29,8 +43,10 @@ Strategies = Annotated[
     typer.Option(
         "--strategies",
         metavar="A,B,C",
-        help="Strategies, separated by commas: built-in names, or FILE.py:CLASS for a class in a Python file. "
-        "Default: all built-in strategies.",
+        help=(
+            "Strategies, separated by commas: built-in names, or FILE.py:CLASS for a class in a "
+            "Python file. Default: all built-in strategies."
+        ),
     ),
 ]
 NoiseName = Annotated[
@@ -38,27 +54,36 @@ NoiseName = Annotated[
     typer.Option(
         "--noise",
         metavar="NOISE",
-        help="Measurement noise: random, gaussian, correlated, game, or FILE.py:CLASS for a class in a Python file. "
-        "Default: that of the scenario.",
+        help=(
+            "Measurement noise: random, gaussian, correlated, game, or FILE.py:CLASS for a class "
+            "in a Python file. Default: that of the scenario."
+        ),
     ),
 ]
 ModelName = Annotated[
     Literal["paper", "guaranteed"] | None,
     typer.Option(
         "--model",
-        help="Model of the information set. Default: that of the scenario in the commands experiment and engage, "
-        "otherwise guaranteed. Another model than the scenario's starts from its default initial set.",
+        help=(
+            "Model of the information set. Default: that of the scenario in the commands "
+            "experiment and engage, otherwise guaranteed. Another model than the scenario's "
+            "starts from its default initial set."
+        ),
     ),
 ]
 RangeSensor = Annotated[
     bool | None,
     typer.Option(
         "--range-sensor/--no-range-sensor",
-        help="Simulate with or without the scenario's range sensor. Default: with it, if there is one.",
+        help=(
+            "Simulate with or without the scenario's range sensor. Default: with it, if there is "
+            "one."
+        ),
     ),
 ]
 RecordFile = Annotated[
-    Path | None, typer.Option("--record", metavar="FILE.npz", help="Write the record of the engagement.")
+    Path | None,
+    typer.Option("--record", metavar="FILE.npz", help="Write the record of the engagement."),
 ]
 
 
@@ -66,15 +91,17 @@ RecordFile = Annotated[
 class Experiment(FileOptions):
     """Simulate many runs with random noise and with game noise.
 
-    There are four cases (curves): random or game noise, without or with the range sensor. Game noise is measurement
-    errors chosen against the guidance; --noise replaces the random noise, and may not be game. Run K starts from the
-    same state in all four cases, and is the same engagement as in: infoset engage --run K. Without --out, --json or
-    --csv no file is written.
+    There are four cases (curves): random or game noise, without or with the range sensor. Game
+    noise is measurement errors chosen against the guidance; --noise replaces the random noise, and
+    may not be game. Run K starts from the same state in all four cases, and is the same engagement
+    as in: infoset engage --run K. Without --out, --json or --csv no file is written.
     """
 
     scenario: ScenarioName = "asteroid-1997"
     settings: Settings = None
-    runs: Annotated[int, typer.Option(metavar="N", min=1, max=MAX_RUNS, help="Number of runs of each case.")] = 50
+    runs: Annotated[
+        int, typer.Option(metavar="N", min=1, max=MAX_RUNS, help="Number of runs of each case.")
+    ] = 50
     noise: NoiseName = None
     seed: Seed = 0
     strategy: StrategyName = None
@@ -83,9 +110,11 @@ class Experiment(FileOptions):
         bool,
         typer.Option(
             "--remedy",
-            help="For each cause of misses, find the least maximum impulse or budget, the earliest cut-off and the "
-            "greatest errors of the angles without it, with the same random numbers; and the hits of other runs "
-            "with this value.",
+            help=(
+                "For each cause of misses, find the least maximum impulse or budget, the earliest "
+                "cut-off and the greatest errors of the angles without it, with the same random "
+                "numbers; and the hits of other runs with this value."
+            ),
         ),
     ] = False
     csv: Csv = None
@@ -95,9 +124,9 @@ class Experiment(FileOptions):
 class Engage(FileOptions):
     """Simulate one engagement.
 
-    With --noise both, there is one with random and one with game noise, and --record FILE.npz writes FILE-random.npz
-    and FILE-game.npz. Run K has exactly the same numbers as run K of infoset experiment with the same seed. Without
-    --out, --json, --csv or --record no file is written.
+    With --noise both, there is one with random and one with game noise, and --record FILE.npz
+    writes FILE-random.npz and FILE-game.npz. Run K has exactly the same numbers as run K of infoset
+    experiment with the same seed. Without --out, --json, --csv or --record no file is written.
     """
 
     scenario: ScenarioName = "asteroid-1997"
@@ -107,7 +136,9 @@ class Engage(FileOptions):
     strategy: StrategyName = None
     model: ModelName = None
     seed: Seed = 0
-    run: Annotated[int, typer.Option(metavar="K", min=0, max=MAX_RUNS - 1, help="Number of the run, from 0.")] = 0
+    run: Annotated[
+        int, typer.Option(metavar="K", min=0, max=MAX_RUNS - 1, help="Number of the run, from 0.")
+    ] = 0
     record: RecordFile = None
     csv: Csv = None
 
@@ -116,9 +147,10 @@ class Engage(FileOptions):
 class Compare(FileOptions):
     """Compare guidance strategies by miss and spent impulse.
 
-    Run K has the same initial state and the same random numbers for all strategies and noises. Game noise is simulated
-    with each of its four tie rules, and a run is represented by the worst of the four. Run K is the same engagement as
-    in: infoset engage --model guaranteed --run K. Without --out, --json or --csv no file is written.
+    Run K has the same initial state and the same random numbers for all strategies and noises. Game
+    noise is simulated with each of its four tie rules, and a run is represented by the worst of the
+    four. Run K is the same engagement as in: infoset engage --model guaranteed --run K. Without
+    --out, --json or --csv no file is written.
     """
 
     scenario: ScenarioName = "asteroid-1997"
@@ -128,13 +160,19 @@ class Compare(FileOptions):
         str,
         typer.Option(
             metavar="A,B,C",
-            help="Measurement noises, separated by commas: random, gaussian, correlated, game, FILE.py:CLASS for a "
-            "class in a Python file, or all, which are the first four. Which strategy is best, and how large the "
-            "misses are, may depend on them: a table shows it.",
+            help=(
+                "Measurement noises, separated by commas: random, gaussian, correlated, game, "
+                "FILE.py:CLASS for a class in a Python file, or all, which are the first four. "
+                "Which strategy is best, and how large the misses are, may depend on them: a "
+                "table shows it."
+            ),
         ),
     ] = "random,game"
     runs: Annotated[
-        int, typer.Option(metavar="N", min=1, max=MAX_RUNS, help="Number of runs for each strategy and noise.")
+        int,
+        typer.Option(
+            metavar="N", min=1, max=MAX_RUNS, help="Number of runs for each strategy and noise."
+        ),
     ] = 50
     seed: Seed = 0
     model: ModelName = None
@@ -146,11 +184,12 @@ class Compare(FileOptions):
 class Bound(FileOptions):
     """Compute a lower bound of the guaranteed miss.
 
-    It holds for all strategies: two true states whose measurements are equal until some step receive equal impulses
-    until that step, so at least one of them misses. The bound is the maximum miss that such pairs prove; in space, they
-    differ along both axes. Each strategy is simulated with these pairs, and in the searches of infoset adversary. Where
-    range and closing speed are known and there is no gravity, the bound is the value of the game up to a reserve, which
-    is printed. Without --out or --json no file is written.
+    It holds for all strategies: two true states whose measurements are equal until some step
+    receive equal impulses until that step, so at least one of them misses. The bound is the maximum
+    miss that such pairs prove; in space, they differ along both axes. Each strategy is simulated
+    with these pairs, and in the searches of infoset adversary. Where range and closing speed are
+    known and there is no gravity, the bound is the value of the game up to a reserve, which is
+    printed. Without --out or --json no file is written.
     """
 
     scenario: ScenarioName = "asteroid-1997"
@@ -163,8 +202,10 @@ class Bound(FileOptions):
             metavar="N",
             min=0,
             max=MAX_RUNS,
-            help="Number of engagements in the search for the worst one, for each strategy; 0 skips the search, and "
-            "without --strategies all simulations.",
+            help=(
+                "Number of engagements in the search for the worst one, for each strategy; 0 "
+                "skips the search, and without --strategies all simulations."
+            ),
         ),
     ] = 500
     seed: Seed = 0
@@ -174,12 +215,13 @@ class Bound(FileOptions):
 class Adversary(FileOptions):
     """Search for the engagement with the maximum miss.
 
-    The search covers all initial states that the scenario allows, all errors within their bounds and, in the model
-    guaranteed, targets that accelerate at the bound of the model. Two misses of the worst engagement are printed: the
-    maximum one of any state that the set contains when control ends, and that of the simulated truth. Greater misses
-    may exist. If the set became empty in some engagements, a second search includes them, and both results are printed.
-    The same seed and budget give the same result; infoset bound has the searches with --objective fixed-truth. Without
-    --out, --json or --record no file is written.
+    The search covers all initial states that the scenario allows, all errors within their bounds
+    and, in the model guaranteed, targets that accelerate at the bound of the model. Two misses of
+    the worst engagement are printed: the maximum one of any state that the set contains when
+    control ends, and that of the simulated truth. Greater misses may exist. If the set became empty
+    in some engagements, a second search includes them, and both results are printed. The same seed
+    and budget give the same result; infoset bound has the searches with --objective fixed-truth.
+    Without --out, --json or --record no file is written.
     """
 
     scenario: ScenarioName = "asteroid-1997"
@@ -188,13 +230,17 @@ class Adversary(FileOptions):
     model: ModelName = None
     range_sensor: RangeSensor = None
     budget: Annotated[
-        int, typer.Option(metavar="N", min=1, max=MAX_RUNS, help="Number of engagements in a search.")
+        int,
+        typer.Option(metavar="N", min=1, max=MAX_RUNS, help="Number of engagements in a search."),
     ] = 2000
     objective: Annotated[
         Literal["any-state", "fixed-truth"],
         typer.Option(
-            help="What the search maximises: the maximum miss of any state of the set when control ends, which agrees "
-            "with all measurements until then, or the miss of the simulated truth."
+            help=(
+                "What the search maximises: the maximum miss of any state of the set when control "
+                "ends, which agrees with all measurements until then, or the miss of the "
+                "simulated truth."
+            )
         ),
     ] = "any-state"
     seed: Seed = 0
@@ -209,16 +255,24 @@ class Replay:
     """
 
     records: Annotated[
-        list[Path], typer.Argument(metavar="A.npz [B.npz]", help="One record, or two records to show side by side.")
+        list[Path],
+        typer.Argument(
+            metavar="A.npz [B.npz]", help="One record, or two records to show side by side."
+        ),
     ]
     html: Html = None
-    gif: Annotated[Path | None, typer.Option(metavar="FILE.gif", help="Write an animation of the sets.")] = None
+    gif: Annotated[
+        Path | None, typer.Option(metavar="FILE.gif", help="Write an animation of the sets.")
+    ] = None
     out: Out = None
     times: Annotated[
         str,
         typer.Option(
             metavar="T1,T2,...",
-            help="Times of the sets in the figure sets of --out, s, separated by commas; the nearest step is drawn.",
+            help=(
+                "Times of the sets in the figure sets of --out, s, separated by commas; the "
+                "nearest step is drawn."
+            ),
             show_default="0.5,4,8, or in a long flight evenly over the logarithm of the time to go",
         ),
     ] = ""

@@ -1,4 +1,6 @@
-"""The course of recorded engagements over time: time axis, predicted misses of the true state, schedule, and titles."""
+"""The course of recorded engagements over time: time axis, predicted misses of the true state,
+schedule, and titles.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,9 @@ from infoset.sim.results import ending
 from infoset.sim.schedule import schedule
 
 MAX_STEPS = 400
-"""Number of steps above which a flight is long: its time axis is logarithmic in the time before the arrival."""
+"""Number of steps above which a flight is long: its time axis is logarithmic in the time before the
+arrival.
+"""
 
 MAX_COURSES = 1000
 """Maximum number of runs whose courses are kept."""
@@ -28,13 +32,17 @@ MAX_COURSES = 1000
 
 @dataclass(frozen=True)
 class Clock:
-    """The time axis of pictures of engagements: linear in the time, or logarithmic in the time before the arrival."""
+    """The time axis of pictures of engagements: linear in the time, or logarithmic in the time
+    before the arrival.
+    """
 
     counts_down: bool
 
     @classmethod
     def of(cls, records: Sequence[Record]) -> Clock:
-        """Return the time axis for records: logarithmic for long flights, and if times before arrival are scheduled."""
+        """Return the time axis for records: logarithmic for long flights, and if times before
+        arrival are scheduled.
+        """
         return cls(any(record.steps > MAX_STEPS or marks(record.scenario) for record in records))
 
     def at(self, record: Record, times_s: ArrayLike | None = None) -> Floats:
@@ -54,7 +62,11 @@ class Clock:
         to_go_s = record.scenario.nominal_arrival_s - time_s
         if abs(to_go_s) < min_to_go_s(record.scenario):
             return "at the nominal arrival"
-        return f"{duration_text(to_go_s)} to go" if to_go_s > 0.0 else f"{-to_go_s:.3g} s after the nominal arrival"
+        return (
+            f"{duration_text(to_go_s)} to go"
+            if to_go_s > 0.0
+            else f"{-to_go_s:.3g} s after the nominal arrival"
+        )
 
 
 def min_to_go_s(scenario: Scenario) -> float:
@@ -63,7 +75,9 @@ def min_to_go_s(scenario: Scenario) -> float:
 
 
 def evenly(places: NDArray[Any], count: int) -> Integers:
-    """Return at most `count` indices of rising values, evenly distributed over them, with the first and the last."""
+    """Return at most `count` indices of rising values, evenly distributed over them, with the first
+    and the last.
+    """
     wanted = np.linspace(places[0], places[-1], count)
     return np.unique(np.abs(places - wanted[:, None]).argmin(axis=1))
 
@@ -71,8 +85,9 @@ def evenly(places: NDArray[Any], count: int) -> Integers:
 def kept_steps(record: Record) -> list[int]:
     """Return the steps that pages and terminals show: all, or of a long flight at most `MAX_STEPS`.
 
-    The first and last step and image, and up to a quarter of `MAX_STEPS` impulses are among them. The others are
-    evenly distributed, half over the steps and half over the logarithm of the time before arrival.
+    The first and last step and image, and up to a quarter of `MAX_STEPS` impulses are among them.
+    The others are evenly distributed, half over the steps and half over the logarithm of the time
+    before arrival.
     """
     count = record.steps
     if count <= MAX_STEPS:
@@ -84,15 +99,20 @@ def kept_steps(record: Record) -> list[int]:
     kept = {0, count - 1, *fired.tolist(), *seen[[0, -1] if len(seen) else []].tolist()}
     places = -np.log(Clock(counts_down=True).at(record))
     half = (MAX_STEPS - len(kept)) // 2
-    return sorted(kept.union(evenly(places, half).tolist(), evenly(np.arange(count), half).tolist()))
+    return sorted(
+        kept.union(evenly(places, half).tolist(), evenly(np.arange(count), half).tolist())
+    )
 
 
 def marks(scenario: Scenario) -> dict[str, float]:
-    """Return the times before the nominal arrival, s, of the first and the last image and of the last impulse.
+    """Return the times before the nominal arrival, s, of the first and the last image and of the
+    last impulse.
 
-    They are those of the schedule that will happen. A time that the scenario leaves open is left out.
+    They are those of the schedule that will happen. A time that the scenario leaves open is left
+    out.
     """
-    sensor, thruster = scenario.set_model.angle_sensor, scenario.thruster
+    sensor = scenario.set_model.angle_sensor
+    thruster = scenario.thruster
     planned = schedule(scenario)
     if planned is None:
         return {}
@@ -113,7 +133,8 @@ def true_predicted_misses(record: Record) -> Floats:
 
     Notes
     -----
-    omega (x^2 + a^2) = V_a x - V_x a for the coordinate a of an axis, and a + V_a x / |V_x| is the miss.
+    omega (x^2 + a^2) = V_a x - V_x a for the coordinate a of an axis, and a + V_a x / |V_x| is the
+    miss.
     """
     slopes = np.tan(record.true_angle_rad)
     x_squared = record.true_range_m**2 / (1.0 + (slopes**2).sum(axis=1))
@@ -141,9 +162,11 @@ class Courses:
     Attributes
     ----------
     steps : ndarray of int, shape (n,)
-        Steps until the nominal arrival, of a long flight at most about `MAX_STEPS`, with those of scheduled impulses.
+        Steps until the nominal arrival, of a long flight at most about `MAX_STEPS`, with those of
+        scheduled impulses.
     possible_m : ndarray, shape (runs, n)
-        Maximum possible miss without further impulses, m; NaN if the set is empty, or after its first section left.
+        Maximum possible miss without further impulses, m; NaN if the set is empty, or after its
+        first section left.
     impulse_m_s : ndarray, shape (runs, n)
         Modulus of the maximum impulse since the step before, m/s.
     """
@@ -157,27 +180,33 @@ class Courses:
             fired = scenario.impulse_steps or ()
             scheduled = fired if scenario.thruster.is_scheduled else ()
             half = MAX_STEPS // 2
-            self.steps = np.unique([*evenly(places, half), *evenly(every, half), *scheduled]).astype(np.int64)
+            self.steps = np.unique(
+                [*evenly(places, half), *evenly(every, half), *scheduled]
+            ).astype(np.int64)
         self.possible_m = np.full((min(runs, MAX_COURSES), len(self.steps)), np.nan)
         self.impulse_m_s = np.zeros_like(self.possible_m)
 
     @property
     def before_arrival_s(self) -> Floats:
         """Times of the steps before the nominal arrival, s, shape (n,)."""
-        return np.asarray(self.scenario.nominal_arrival_s - self.steps * self.scenario.set_model.step_s)
+        return np.asarray(
+            self.scenario.nominal_arrival_s - self.steps * self.scenario.set_model.step_s
+        )
 
     def observe(self, first: int, step: Step) -> None:
         """Store a step of the batch whose first run has this index."""
         column = int(np.searchsorted(self.steps, step.step))
         batch = slice(first, first + len(step.tracking))
-        impulse, possible = self.impulse_m_s[batch], self.possible_m[batch]
+        impulse = self.impulse_m_s[batch]
+        possible = self.possible_m[batch]
         if column == len(self.steps) or not len(impulse):
             return
         count = len(impulse)
         np.maximum(impulse[:, column], modulus(step.impulse_m_s)[:count], out=impulse[:, column])
         if self.steps[column] != step.step:
             return
-        model, miss = self.scenario.set_model, step.predicted_miss
+        model = self.scenario.set_model
+        miss = step.predicted_miss
         nearest_m, _ = step.information.stored_range_interval_m()
         leaving = nearest_m < model.range_threshold_m + model.closing_speed_m_s * model.step_s
         known = step.tracking & miss.exists & ~leaving
@@ -188,13 +217,17 @@ class Courses:
 
 
 def noise_title(record: Record) -> str:
-    """Return the title of the noise of an engagement: `random noise`, or `game noise, range sensor`."""
+    """Return the title of the noise of an engagement: `random noise`, or `game noise, range
+    sensor`.
+    """
     name = "worst errors found" if record.noise == WORST_FOUND else f"{record.noise_name} noise"
     return name + (", range sensor" if record.scenario.range_sensor is not None else "")
 
 
 def record_titles(records: Sequence[Record]) -> list[str]:
-    """Return a title for each record; equal noises are distinguished by run, seed, strategy, model, tie or scenario."""
+    """Return a title for each record; equal noises are distinguished by run, seed, strategy, model,
+    tie or scenario.
+    """
     titles = [noise_title(record) for record in records]
     candidates = (
         [f"run {record.run}" for record in records],
@@ -213,13 +246,23 @@ def record_titles(records: Sequence[Record]) -> list[str]:
 
 
 def outcome_title(record: Record) -> str:
-    """Return miss and impulse, the outcome if it is not the arrival, and for a body with a size how it ended."""
+    """Return miss and impulse, the outcome if it is not the arrival, and for a body with a size how
+    it ended.
+    """
     result = record.result
-    text = f"miss {_shown(float(result.miss_m[0]))} m, impulse spent {float(result.impulse_m_s[0]):.1f} m/s"
-    outcome, cause = result.outcomes[0], result.causes[0]
+    text = (
+        f"miss {_shown(float(result.miss_m[0]))} m, impulse spent "
+        f"{float(result.impulse_m_s[0]):.1f} m/s"
+    )
+    outcome = result.outcomes[0]
+    cause = result.causes[0]
     text = text if outcome is Outcome.ARRIVED else f"{text}, {outcome.value.replace('-', ' ')}"
     return ending(text, result.hit.tolist()[0], cause and cause.value)
 
 
 def _shown(metres: float) -> str:
-    return f"{metres:.2f}" if metres < 100.0 else f"{metres:,.0f}".replace(",", "\N{NARROW NO-BREAK SPACE}")
+    return (
+        f"{metres:.2f}"
+        if metres < 100.0
+        else f"{metres:,.0f}".replace(",", "\N{NARROW NO-BREAK SPACE}")
+    )

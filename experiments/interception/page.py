@@ -33,7 +33,9 @@ from infoset.sim.gravity import on_board_model
 
 MAX_RECORDS = 2
 TOLERANCE = 5e-4
-"""Tolerance of outlines in a page of a long flight, as a part of their box: about 0.2 pixels on a screen."""
+"""Tolerance of outlines in a page of a long flight, as a part of their box: about 0.2 pixels on a
+screen.
+"""
 STEPS_OF_A_BOX = 65535
 """Steps of the vertex grid across the box of a polygon: about 0.01 pixels on a screen."""
 
@@ -44,7 +46,9 @@ def interception_page(records: Sequence[Record]) -> str:
     in_space = any(record.scenario.is_spatial for record in records)
     data = {
         "heading": heading,
-        "about": list(filter(None, dict.fromkeys(record.scenario.description for record in records))),
+        "about": list(
+            filter(None, dict.fromkeys(record.scenario.description for record in records))
+        ),
         "counts_down": Clock.of(records).counts_down,
         "records": list(map(_data, records, record_titles(records), _kept_steps_of(records))),
     }
@@ -53,7 +57,9 @@ def interception_page(records: Sequence[Record]) -> str:
 
 
 def _kept_steps_of(records: Sequence[Record]) -> list[list[int]]:
-    """Return the steps of each record that the page has: the same ones if the records have steps at the same times."""
+    """Return the steps of each record that the page has: the same ones if the records have steps at
+    the same times.
+    """
     kept = [kept_steps(record) for record in records]
     if len({record.scenario.set_model.step_s for record in records}) > 1:
         return kept
@@ -63,7 +69,8 @@ def _kept_steps_of(records: Sequence[Record]) -> list[list[int]]:
 
 def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
     scenario = record.scenario
-    thruster, model = scenario.thruster, scenario.set_model
+    thruster = scenario.thruster
+    model = scenario.set_model
     modulus_m_s = modulus(record.impulse_m_s.T)
     before, misses_m = computed_again(record, kept)
     states: list[tuple[Section, ...]] = []
@@ -75,7 +82,9 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
         numbers.append((len(states) - 3, len(states) - 2, len(states) - 1))
     sections = [section for state in states for section in state]
     outlines = [section.omega_alpha for section in sections]
-    thinned = f"; the page has {len(kept)} of {record.steps} steps" if len(kept) < record.steps else ""
+    thinned = (
+        f"; the page has {len(kept)} of {record.steps} steps" if len(kept) < record.steps else ""
+    )
     fired = np.flatnonzero(modulus_m_s)
     return {
         "title": title,
@@ -87,8 +96,12 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
         "marks": [[name, duration_text(time), time] for name, time in marks(scenario).items()],
         "guaranteed_miss_m": max_guarantee_m(record.result),
         "closing_speed_m_s": model.closing_speed_m_s,
-        "range_error_relative": scenario.range_sensor.relative_error if scenario.range_sensor is not None else None,
-        "rate_error_rad_s": scenario.rate_sensor.error_rad_s if scenario.rate_sensor is not None else None,
+        "range_error_relative": scenario.range_sensor.relative_error
+        if scenario.range_sensor is not None
+        else None,
+        "rate_error_rad_s": scenario.rate_sensor.error_rad_s
+        if scenario.rate_sensor is not None
+        else None,
         "max_impulse_m_s": thruster.max_impulse_m_s,
         "budget_m_s": thruster.budget_m_s,
         "radius_m": scenario.radius_m,
@@ -96,28 +109,41 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
         "measured_range_m": _known(record.measured["range"][kept])
         if "range" in record.measured
         else [None] * len(kept),
-        "complete_steps": int(np.searchsorted(kept, complete_steps(record).max(initial=-1), side="right")),
+        "complete_steps": int(
+            np.searchsorted(kept, complete_steps(record).max(initial=-1), side="right")
+        ),
         "true_range_m": record.true_range_m[kept].tolist(),
         "next_range_m": record.true_range_m[_next(record, kept)].tolist(),
         "modulus_m_s": modulus_m_s[kept].tolist(),
         "fired_s": record.time_s[fired].tolist(),
         "fired_modulus_m_s": modulus_m_s[fired].tolist(),
-        "budget_left_m_s": np.maximum(thruster.budget_m_s - np.cumsum(modulus_m_s), 0.0)[kept].tolist(),
+        "budget_left_m_s": np.maximum(thruster.budget_m_s - np.cumsum(modulus_m_s), 0.0)[
+            kept
+        ].tolist(),
         "sections": {
             "states": _packed(numbers, "<u4"),
-            "starts": _packed(np.concatenate([[0], np.cumsum([len(state) for state in states])]), "<u4"),
+            "starts": _packed(
+                np.concatenate([[0], np.cumsum([len(state) for state in states])]), "<u4"
+            ),
             "labels_m": _packed([section.label_m for section in sections], "<f8"),
             "ranges_m": _packed([section.range_m for section in sections], "<f8"),
         },
         "axes": [
             {
                 "along": f" along {axis}" if scenario.is_spatial else "",
-                "measured_name": f"measured angle along {axis}" if scenario.is_spatial else "measured angle",
+                "measured_name": f"measured angle along {axis}"
+                if scenario.is_spatial
+                else "measured angle",
                 **_axis_data(record, number, kept),
                 "fired_m_s": record.impulse_m_s[fired, number].tolist(),
                 "outlines": {
-                    "predicted_miss_m": _packed(np.concatenate([misses_m[k][number] for k in kept]), "<f8"),
-                    **packed_outlines([outline[number].polygon() for outline in outlines], TOLERANCE * bool(thinned)),
+                    "predicted_miss_m": _packed(
+                        np.concatenate([misses_m[k][number] for k in kept]), "<f8"
+                    ),
+                    **packed_outlines(
+                        [outline[number].polygon() for outline in outlines],
+                        TOLERANCE * bool(thinned),
+                    ),
                 },
             }
             for number, axis in enumerate(model.axes)
@@ -131,11 +157,15 @@ def _next(record: Record, kept: Sequence[int]) -> list[int]:
 
 
 def _axis_data(record: Record, axis: int, kept: Sequence[int]) -> dict[str, object]:
-    """Return what belongs to one lateral axis: the line of sight in its plane with x, impulses and predicted misses."""
-    name, after = record.scenario.set_model.axes[axis], _next(record, kept)
+    """Return what belongs to one lateral axis: the line of sight in its plane with x, impulses and
+    predicted misses.
+    """
+    name = record.scenario.set_model.axes[axis]
+    after = _next(record, kept)
     model = on_board_model(record.scenario).axis(name)
     angles, rates, misses = (
-        values[:, axis] for values in (record.true_angle_rad, record.true_rate_rad_s, true_predicted_misses(record))
+        values[:, axis]
+        for values in (record.true_angle_rad, record.true_rate_rad_s, true_predicted_misses(record))
     )
     unknown = np.full(record.true_angle_rad.shape, np.nan)
     return {
@@ -163,21 +193,28 @@ def _axis_data(record: Record, axis: int, kept: Sequence[int]) -> dict[str, obje
 def _known(values: Floats) -> list[Any]:
     """Return the values of steps; None where they are not known."""
     known: Flags = np.asarray(np.isfinite(values.reshape(len(values), -1)).all(axis=1))
-    return [value if is_known else None for value, is_known in zip(values.tolist(), known, strict=True)]
+    return [
+        value if is_known else None for value, is_known in zip(values.tolist(), known, strict=True)
+    ]
 
 
 def computed_again(
     record: Record, kept: Collection[int]
 ) -> tuple[Mapping[int, tuple[Section, ...]], Mapping[int, Floats]]:
-    """Return by step what a record does not contain: sections before the measurement, and intervals of misses.
+    """Return by step what a record does not contain: sections before the measurement, and intervals
+    of misses.
 
-    The sections are those predicted to the steps `kept` and to the steps after them; after an impulse k a section is
-    the measured one with V reduced by k. The intervals are those of the predicted misses of each measured section of
-    the steps `kept`, m, shape (C, sections, 2). The cost is that of the steps of the set, a few ms.
+    The sections are those predicted to the steps `kept` and to the steps after them; after an
+    impulse k a section is the measured one with V reduced by k. The intervals are those of the
+    predicted misses of each measured section of the steps `kept`, m, shape (C, sections, 2). The
+    cost is that of the steps of the set, a few ms.
     """
     wanted = {*kept}
-    before, misses_m = {}, {}
-    for number, information in enumerate(replayed(record.scenario, record.measured, record.impulse_m_s)):
+    before = {}
+    misses_m = {}
+    for number, information in enumerate(
+        replayed(record.scenario, record.measured, record.impulse_m_s)
+    ):
         step, is_measured = divmod(number, 2)
         if is_measured and step in wanted:
             intervals = np.stack(information.predicted_miss_by_section_m(), axis=-1)
@@ -188,24 +225,28 @@ def computed_again(
 
 
 def packed_outlines(outlines: Sequence[Floats], tolerance: float = 0.0) -> dict[str, str]:
-    """Return outlines with their boxes exactly and their vertices on a grid of `STEPS_OF_A_BOX` across the box.
+    """Return outlines with their boxes exactly and their vertices on a grid of `STEPS_OF_A_BOX`
+    across the box.
 
-    An outline has at least one vertex. A box is the minimum of each coordinate, then the maximum. With a tolerance, a
-    part of the box, outlines are simplified by the algorithm of Douglas and Peucker.
+    An outline has at least one vertex. A box is the minimum of each coordinate, then the maximum.
+    With a tolerance, a part of the box, outlines are simplified by the algorithm of Douglas and
+    Peucker.
     """
     counts = np.array([len(outline) for outline in outlines], dtype=np.int64)
     if not len(counts):
         return {"boxes": "", "counts": "", "vertices": ""}
     points = np.concatenate(outlines)
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    minimum, maximum = np.minimum.reduceat(points, starts), np.maximum.reduceat(points, starts)
+    minimum = np.minimum.reduceat(points, starts)
+    maximum = np.maximum.reduceat(points, starts)
     width = np.where(maximum > minimum, maximum - minimum, 1.0)
     share = (points - np.repeat(minimum, counts, axis=0)) / np.repeat(width, counts, axis=0)
     if tolerance:
         closed = np.insert(share, np.cumsum(counts), share[starts], axis=0)
         lines = shapely.linestrings(closed, indices=np.repeat(np.arange(len(counts)), counts + 1))
         share, line = shapely.get_coordinates(shapely.simplify(lines, tolerance), return_index=True)
-        share, counts = share[np.append(line[1:] == line[:-1], False)], np.bincount(line) - 1
+        share = share[np.append(line[1:] == line[:-1], False)]
+        counts = np.bincount(line) - 1
     return {
         "boxes": _packed(np.concatenate([minimum, maximum], axis=1), "<f8"),
         "counts": _packed(counts, "<u4"),

@@ -1,4 +1,6 @@
-"""Kumkov and Patsko (1997): the interception, single engagements and the distributions of figure 4."""
+"""Kumkov and Patsko (1997): the interception, single engagements and the distributions of figure
+4.
+"""
 
 from __future__ import annotations
 
@@ -27,13 +29,24 @@ RUNS = 200
 
 
 def compute(progress: Progress) -> dict[str, Sequence[Ours | float]]:
-    """Compute the numbers by source; for the game of one run, with each tie rule that does not draw."""
-    single, many = replace(load_scenario(SINGLE), range_sensor=None), load_scenario(MANY)
+    """Compute the numbers by source; for the game of one run, with each tie rule that does not
+    draw.
+    """
+    single = replace(load_scenario(SINGLE), range_sensor=None)
+    many = load_scenario(MANY)
     # The published procedure: a set that became empty stays lost.
     lost = replace(many, information_set=replace(many.information_set, recovery=Recovery.NONE))
-    curves = [(number, flown) for number, flown in curve_scenarios(many) if flown.range_sensor is None]
-    curves += [(number, flown) for number, flown in curve_scenarios(lost) if flown.range_sensor is not None]
-    ties = [replace(single, noise=NoiseKind.GAME, tie=tie) for tie in TieRule if tie is not TieRule.RANDOM]
+    curves = [
+        (number, flown) for number, flown in curve_scenarios(many) if flown.range_sensor is None
+    ]
+    curves += [
+        (number, flown) for number, flown in curve_scenarios(lost) if flown.range_sensor is not None
+    ]
+    ties = [
+        replace(single, noise=NoiseKind.GAME, tie=tie)
+        for tie in TieRule
+        if tie is not TieRule.RANDOM
+    ]
     runs = [(single, RUNS), *((tie, 1) for tie in ties), *((flown, RUNS) for _, flown in curves)]
     results = simulate_all(
         [
@@ -42,9 +55,14 @@ def compute(progress: Progress) -> dict[str, Sequence[Ours | float]]:
         ]
     )
     both = results[:1], results[1 : 1 + len(ties)]
-    one_run = [_median(values) for found in both for values in zip(*map(_values, found), strict=True)]
+    one_run = [
+        _median(values) for found in both for values in zip(*map(_values, found), strict=True)
+    ]
     figure_4 = {
-        f"figure 4, curve {number}": [*np.quantile(found.miss_m, (0.5, 0.9)), np.quantile(found.impulse_m_s, 0.5)]
+        f"figure 4, curve {number}": [
+            *np.quantile(found.miss_m, (0.5, 0.9)),
+            np.quantile(found.impulse_m_s, 0.5),
+        ]
         for (number, _), found in zip(curves, results[1 + len(ties) :], strict=True)
     }
     return {ONE_RUN: one_run, **figure_4}

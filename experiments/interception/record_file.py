@@ -1,7 +1,7 @@
 """Records of engagements as `.npz` files: arrays without pickle, and a JSON header.
 
-The lateral axes of arrays are those of `SetModel.axes`, in their order. NaN is a value that is not known. The sets are
-not stored: they follow from the measurements and the impulses.
+The lateral axes of arrays are those of `SetModel.axes`, in their order. NaN is a value that is not
+known. The sets are not stored: they follow from the measurements and the impulses.
 """
 
 from __future__ import annotations
@@ -33,11 +33,13 @@ from infoset.sim.gravity import on_board_model
 from infoset.sim.scenario import MAX_STEPS
 from infoset.sim.storage.codec import from_json, to_json
 
-MAX_FILE_BYTES, MAX_HEADER_BYTES, MAX_ARRAY_HEADER_BYTES = 1 << 28, 1 << 20, 1 << 8
+MAX_FILE_BYTES = 1 << 28
+MAX_HEADER_BYTES = 1 << 20
+MAX_ARRAY_HEADER_BYTES = 1 << 8
 LONGEST_REASON = 300
 MAX_SECTION_STEPS = 5 * MAX_STEPS
-"""Maximum number of sections times steps: the longest flight with the five sections of the built-in missions. A section
-takes about 1.4 kB a step when a record is read, so this is 0.7 GB."""
+"""Maximum number of sections times steps: the longest flight with the five sections of the built-in
+missions. A section takes about 1.4 kB a step when a record is read, so this is 0.7 GB."""
 REMEDY = "make a record with `infoset engage --record FILE.npz`"
 
 Arrays = dict[str, NDArray[Any]]
@@ -56,12 +58,16 @@ _OF_STEPS = {
     "time_s": Member(("steps",)),
     "true_range_m": Member(("steps",)),
     "truth_margin_m": Member(("steps",), nullable=True),
-    **dict.fromkeys(("true_angle_rad", "true_rate_rad_s", "impulse_m_s"), Member(("steps", "axes"))),
+    **dict.fromkeys(
+        ("true_angle_rad", "true_rate_rad_s", "impulse_m_s"), Member(("steps", "axes"))
+    ),
     "predicted_miss_m": Member(("steps", "axes", 2), nullable=True),
 }
 """Arrays of a record that are members as they are."""
 _RESULT = {
-    f"result_{each.field}": each for each in columns_of(Results) if not each.derived and each.kind in (float, bool)
+    f"result_{each.field}": each
+    for each in columns_of(Results)
+    if not each.derived and each.kind in (float, bool)
 }
 """The last column of each field of a result that is an array of numbers or flags."""
 _BY_AXIS = {"position_m": ("axes + 1",), "velocity_m_s": ("axes + 1",), "lateral_miss_m": ("axes",)}
@@ -74,7 +80,8 @@ MEMBERS = {
         for name, kind in _MEASURED.items()
     },
     **{
-        name: Member((1, *_BY_AXIS.get(column.field, ())), nullable=column.nullable) for name, column in _RESULT.items()
+        name: Member((1, *_BY_AXIS.get(column.field, ())), nullable=column.nullable)
+        for name, column in _RESULT.items()
     },
 }
 
@@ -96,7 +103,9 @@ class Header:
 
 
 def record_bytes(record: Record) -> bytes:
-    """Return the content of the `.npz` file of a record; `InputError` if the record is too large to be read again."""
+    """Return the content of the `.npz` file of a record; `InputError` if the record is too large to
+    be read again.
+    """
     with input_errors("record"):
         _check_size(record.scenario, record.steps)
     header = Header(
@@ -106,12 +115,16 @@ def record_bytes(record: Record) -> bytes:
     )
     text = json.dumps(to_json(header)).encode()
     stream = io.BytesIO()
-    np.savez(stream, allow_pickle=False, header=np.frombuffer(text, dtype=np.uint8), **_to_arrays(record))
+    np.savez(
+        stream, allow_pickle=False, header=np.frombuffer(text, dtype=np.uint8), **_to_arrays(record)
+    )
     return stream.getvalue()
 
 
 def write_record(record: Record, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-    """Write a record, completely or not at all; `InputError` if the file cannot be written, or exists already."""
+    """Write a record, completely or not at all; `InputError` if the file cannot be written, or
+    exists already.
+    """
     file = Path(path)
     if file.suffix.lower() != ".npz":
         raise InputError(f"{file}: a record is written as .npz; for example {file.stem}.npz")
@@ -121,8 +134,8 @@ def write_record(record: Record, path: str | os.PathLike[str], *, overwrite: boo
 def load_record(path: str | os.PathLike[str]) -> Record:
     """Read the record of an engagement: equal, bit for bit, to the record that was written.
 
-    The sets are computed again; other versions of the packages may give other last digits. `InputError` if the file is
-    not a record, or is damaged.
+    The sets are computed again; other versions of the packages may give other last digits.
+    `InputError` if the file is not a record, or is damaged.
     """
     file = Path(path)
     content = read_input(file, MAX_FILE_BYTES)
@@ -155,12 +168,16 @@ def _to_arrays(record: Record) -> Arrays:
 
 def _read_arrays(content: bytes) -> Arrays:
     """Read the arrays of an archive, whose directory is checked before a member is read."""
-    if content.count(b"PK\x01\x02") > 2 * len(MEMBERS):  # entries of the directory; numbers may look like one, too
+    if content.count(b"PK\x01\x02") > 2 * len(
+        MEMBERS
+    ):  # entries of the directory; numbers may look like one, too
         raise ValueError("it has more members than a record")
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             members = {each.filename: each for each in archive.infolist()}
-            if sorted(members) != sorted(f"{name}.npy" for name in MEMBERS) or len(archive.infolist()) > len(members):
+            if sorted(members) != sorted(f"{name}.npy" for name in MEMBERS) or len(
+                archive.infolist()
+            ) > len(members):
                 raise ValueError("its members are not those of a record")
             if any(each.compress_type != zipfile.ZIP_STORED for each in members.values()):
                 raise ValueError("it is compressed; records are not")
@@ -168,8 +185,12 @@ def _read_arrays(content: bytes) -> Arrays:
                 raise ValueError("the declared sizes of its members are larger than the file")
             if members["header.npy"].file_size > MAX_HEADER_BYTES:
                 raise ValueError("its header is too long")
-        with np.load(io.BytesIO(content), allow_pickle=False, max_header_size=MAX_ARRAY_HEADER_BYTES) as stored:
-            return {name: np.asarray(stored[name]) for name in MEMBERS}  # bytes, if a member is no array
+        with np.load(
+            io.BytesIO(content), allow_pickle=False, max_header_size=MAX_ARRAY_HEADER_BYTES
+        ) as stored:
+            return {
+                name: np.asarray(stored[name]) for name in MEMBERS
+            }  # bytes, if a member is no array
     except Exception as error:  # zipfile and numpy raise errors of many types for damaged files
         raise ValueError(" ".join(str(error).split()) or type(error).__name__) from None
 
@@ -177,11 +198,20 @@ def _read_arrays(content: bytes) -> Arrays:
 def _check(arrays: Arrays, axes: int) -> None:
     """Raise ValueError if arrays do not have their declared types, shapes and values."""
     steps = arrays["time_s"].size
-    sizes: dict[str | int, int] = {"steps": steps, "axes": axes, "axes + 1": axes + 1, "bytes": arrays["header"].size}
+    sizes: dict[str | int, int] = {
+        "steps": steps,
+        "axes": axes,
+        "axes + 1": axes + 1,
+        "bytes": arrays["header"].size,
+    }
     for name, member in MEMBERS.items():
-        values, shape = arrays[name], tuple(sizes.get(size, size) for size in member.shape)
+        values = arrays[name]
+        shape = tuple(sizes.get(size, size) for size in member.shape)
         if (values.dtype.str, values.shape) != (member.dtype, shape):
-            raise ValueError(f"{name} is {values.dtype.str} of shape {values.shape}, not {member.dtype} of {shape}")
+            raise ValueError(
+                f"{name} is {values.dtype.str} of shape {values.shape}, not {member.dtype} of "
+                f"{shape}"
+            )
         if values.dtype.kind == "f":
             known = values[~np.isnan(values)] if member.nullable else values
             if not (np.abs(known) <= MAXIMUM).all():
@@ -198,24 +228,31 @@ def _check_size(scenario: Scenario, steps: int) -> None:
     sections = max(settings.sections, 2 * settings.fewest_sections + 1)
     if sections * steps > MAX_SECTION_STEPS:
         raise ValueError(
-            f"it has {sections} sections in {steps} steps, and their product may be at most {MAX_SECTION_STEPS}: "
-            "reduce information_set.sections or increase step_s"
+            f"it has {sections} sections in {steps} steps, and their product may be at most "
+            f"{MAX_SECTION_STEPS}: reduce information_set.sections or increase step_s"
         )
 
 
-def replayed(scenario: Scenario, measured: Measurements, impulse_m_s: Floats) -> Iterator[InformationSet]:
-    """Yield the set of an engagement before and after the measurement of each step, and predicted from the last step.
+def replayed(
+    scenario: Scenario, measured: Measurements, impulse_m_s: Floats
+) -> Iterator[InformationSet]:
+    """Yield the set of an engagement before and after the measurement of each step, and predicted
+    from the last step.
 
-    It is one object, which changes. It is computed from measurements and impulses, arrays as in `Record`, and equals
-    that of the engagement bit for bit if the versions of the packages are the same.
+    It is one object, which changes. It is computed from measurements and impulses, arrays as in
+    `Record`, and equals that of the engagement bit for bit if the versions of the packages are the
+    same.
     """
     information = InformationSet(on_board_model(scenario), guarantee=False)
     is_known = {
-        name: np.asarray(~np.isnan(values.reshape(len(values), -1)).any(axis=1)) for name, values in measured.items()
+        name: np.asarray(~np.isnan(values.reshape(len(values), -1)).any(axis=1))
+        for name, values in measured.items()
     }
     for step, impulse in enumerate(impulse_m_s):
         yield information
-        values = {name: each[step, ..., None] for name, each in measured.items() if is_known[name][step]}
+        values = {
+            name: each[step, ..., None] for name, each in measured.items() if is_known[name][step]
+        }
         for name, sensor in scenario.sensors.items():
             if name in values:
                 sensor.cut(information, values, np.array([True]))
@@ -228,20 +265,34 @@ def replayed(scenario: Scenario, measured: Measurements, impulse_m_s: Floats) ->
 
 def _to_record(header: Header, arrays: Arrays) -> Record:
     first = header.inconsistency
-    if first is not None and not (0 <= first.step < len(arrays["time_s"]) and abs(first.label_m) <= MAXIMUM):
+    if first is not None and not (
+        0 <= first.step < len(arrays["time_s"]) and abs(first.label_m) <= MAXIMUM
+    ):
         raise ValueError("inconsistency is not at a step of the record")
-    fields: dict[str, Any] = {"runs": np.array([header.run]), "outcomes": (header.outcome,), "causes": (header.cause,)}
+    fields: dict[str, Any] = {
+        "runs": np.array([header.run]),
+        "outcomes": (header.outcome,),
+        "causes": (header.cause,),
+    }
     for name, column in _RESULT.items():
         unknown = np.isnan(arrays[name])
         values: NDArray[Any] = np.where(unknown, 0.0, arrays[name]).astype(column.kind)
-        fields[column.field] = np.ma.MaskedArray(values, mask=unknown) if column.nullable else values
+        fields[column.field] = (
+            np.ma.MaskedArray(values, mask=unknown) if column.nullable else values
+        )
     scenario = header.scenario
-    measured = {kind.name: arrays[name] for name, kind in _MEASURED.items() if kind.name in scenario.sensors}
+    measured = {
+        kind.name: arrays[name] for name, kind in _MEASURED.items() if kind.name in scenario.sensors
+    }
     after_measurements = islice(replayed(scenario, measured, arrays["impulse_m_s"]), 1, None, 2)
     known: dict[str, Any] = {name: getattr(header, name) for name in _OF_HEADER}
     return Record(
         **known | {name: arrays[name] for name in _OF_STEPS},
-        result=Results(**fields, guarantees=scenario.set_model.is_guaranteed, b_plane_t_rad=scenario.b_plane_t_rad),
+        result=Results(
+            **fields,
+            guarantees=scenario.set_model.is_guaranteed,
+            b_plane_t_rad=scenario.b_plane_t_rad,
+        ),
         measured=measured,
         sections=tuple(tuple(information.sections()) for information in after_measurements),
     )

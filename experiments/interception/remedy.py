@@ -1,4 +1,6 @@
-"""Remedies of misses: the least change of one key at which no run misses for a cause, with the same random numbers."""
+"""Remedies of misses: the least change of one key at which no run misses for a cause, with the same
+random numbers.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,9 @@ from infoset.sim import HitEstimate, MissCause, Results, Scenario
 from infoset.sim.parallel import Task
 from infoset.sim.results import join
 
-IMPULSE, BUDGET, CUT_OFF = "thruster.max_impulse_m_s", "thruster.budget_m_s", "thruster.last_impulse_s"
+IMPULSE = "thruster.max_impulse_m_s"
+BUDGET = "thruster.budget_m_s"
+CUT_OFF = "thruster.last_impulse_s"
 PIXEL, SCALE = "camera.pixel_error_rad", "angle_sensor.scale"
 KEYS = {
     MissCause.ENGINE: (IMPULSE, CUT_OFF),
@@ -40,10 +44,11 @@ class Remedy:
     not_enough : float or None
         Nearest value found at which the cause occurs; None if `enough` follows in closed form.
     enough : float or None
-        Value nearest to `now`, of three digits, at which it does not; None if no value up to `not_enough` is enough.
+        Value nearest to `now`, of three digits, at which it does not; None if no value up to
+        `not_enough` is enough.
     hits : HitEstimate or None
-        Of as many other runs with `enough`: the value was chosen for the first ones, so their share of hits is no
-        estimate.
+        Of as many other runs with `enough`: the value was chosen for the first ones, so their share
+        of hits is no estimate.
     missed : mapping of str to int
         Misses of these other runs by cause.
     """
@@ -58,21 +63,29 @@ class Remedy:
 
     def __str__(self) -> str:
         if self.enough is None or self.hits is None:
-            return f"remedy for {self.cause.value}: no {self.key} from {self.now:g} to {self.not_enough:g}"
-        limit = "in closed form" if self.not_enough is None else f"{self.not_enough:g} is not enough"
+            return (
+                f"remedy for {self.cause.value}: no {self.key} from {self.now:g} to "
+                f"{self.not_enough:g}"
+            )
+        limit = (
+            "in closed form" if self.not_enough is None else f"{self.not_enough:g} is not enough"
+        )
         others = ", ".join(f"{name} {count}" for name, count in self.missed.items())
         return (
-            f"remedy for {self.cause.value}: {self.key} = {self.enough:g} instead of {self.now:g} ({limit}); then "
-            f"{self.hits.hits} of {self.hits.runs} other runs hit (95 % CI {percent(self.hits.lower)} to "
+            f"remedy for {self.cause.value}: {self.key} = {self.enough:g} instead of {self.now:g} "
+            f"({limit}); then {self.hits.hits} of {self.hits.runs} other runs hit (95 % CI "
+            f"{percent(self.hits.lower)} to "
             f"{percent(self.hits.upper)}){f', missed by {others}' if others else ''}"
         )
 
 
 def find_remedies(task: Task, results: Results, progress: Progress) -> list[Remedy]:
-    """Return the remedies of all causes in the results of a task, for the keys that its scenario has.
+    """Return the remedies of all causes in the results of a task, for the keys that its scenario
+    has.
 
-    A maximum impulse for the cause `engine` follows in closed form, because its authority is proportional to it. The
-    other values are found by bisection: all runs are simulated again with each value.
+    A maximum impulse for the cause `engine` follows in closed form, because its authority is
+    proportional to it. The other values are found by bisection: all runs are simulated again with
+    each value.
     """
     wanted = [(cause, key) for cause in MissCause if cause in results.causes for key in KEYS[cause]]
     wanted = [(cause, key) for cause, key in wanted if _values(task.scenario, key)]
@@ -84,9 +97,11 @@ def find_remedies(task: Task, results: Results, progress: Progress) -> list[Reme
 
 
 def _remedy(task: Task, results: Results, cause: MissCause, key: str) -> Remedy:
-    scenario, cores = task.scenario, os.cpu_count() or 1
+    scenario = task.scenario
+    cores = os.cpu_count() or 1
     values = _values(scenario, key)
-    now, not_enough = 1.0 if key == SCALE else values[key], None
+    now = 1.0 if key == SCALE else values[key]
+    not_enough = None
 
     @functools.cache
     def simulated(value: float, runs: Sequence[int] = task.runs) -> Results:
@@ -112,14 +127,18 @@ def _remedy(task: Task, results: Results, cause: MissCause, key: str) -> Remedy:
 
 
 def _values(scenario: Scenario, key: str) -> dict[str, float]:
-    """Return the values that a key changes in proportion, by their keys; none if the scenario does not have it."""
+    """Return the values that a key changes in proportion, by their keys; none if the scenario does
+    not have it.
+    """
     table, name = key.split(".")
     owner = {} if getattr(scenario, table) is None else vars(getattr(scenario, table))
     names = [each for each in owner if "error" in each] if key == SCALE else [name]
     return {f"{table}.{each}": owner[each] for each in names if owner.get(each)}
 
 
-def _search(occurs: Callable[[float], bool], now: float, factor: float) -> tuple[float, float | None]:
+def _search(
+    occurs: Callable[[float], bool], now: float, factor: float
+) -> tuple[float, float | None]:
     """Return the nearest values found at which something occurs and does not, from `now` on."""
     not_enough = now
     for _ in range(MAX_DOUBLINGS):

@@ -1,4 +1,6 @@
-"""Files of results and records: `save` writes them, `load_results` and `load_record` read them again."""
+"""Files of results and records: `save` writes them, `load_results` and `load_record` read them
+again.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,9 @@ MAX_FILE_BYTES = 1 << 28
 KEYS = ("format", "guarantees", "b_plane_t_rad", "burns_m_s", "columns")
 
 
-def save(results: Results | Record, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+def save(
+    results: Results | Record, path: str | os.PathLike[str], *, overwrite: bool = False
+) -> None:
     """Write results as JSON or CSV, or the record of one engagement as ``.npz``.
 
     Parameters
@@ -28,8 +32,9 @@ def save(results: Results | Record, path: str | os.PathLike[str], *, overwrite: 
     results : Results or Record
         What `simulate` or `fly_one` returned.
     path : str or path
-        Its suffix selects the format. Results: ``.json``, which `load_results` reads again with all digits, or
-        ``.csv``, a table for other programs. A record: ``.npz``, which `load_record` reads again.
+        Its suffix selects the format. Results: ``.json``, which `load_results` reads again with all
+        digits, or ``.csv``, a table for other programs. A record: ``.npz``, which `load_record`
+        reads again.
     overwrite : bool
         Replace a file that exists.
 
@@ -62,7 +67,8 @@ def save(results: Results | Record, path: str | os.PathLike[str], *, overwrite: 
 
 
 def load_results(path: str | os.PathLike[str]) -> Results:
-    """Read results that `save` wrote as ``.json``: all columns and digits are those of the results that were saved.
+    """Read results that `save` wrote as ``.json``: all columns and digits are those of the results
+    that were saved.
 
     `InputError` if the file has no results, or is damaged.
     """
@@ -82,4 +88,6 @@ def load_results(path: str | os.PathLike[str]) -> Results:
         )
     except (ValueError, TypeError, OverflowError, RecursionError) as error:
         reason = on_a_screen(str(error)[:LONGEST_REASON])
-    raise InputError(f"{file}: are not readable results: {reason}; infoset.save(results, 'FILE.json') makes them")
+    raise InputError(
+        f"{file}: are not readable results: {reason}; infoset.save(results, 'FILE.json') makes them"
+    )

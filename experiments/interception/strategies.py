@@ -1,4 +1,6 @@
-"""Strategies and noises that options name: built-in ones, and classes in Python files (``FILE.py:CLASS``)."""
+"""Strategies and noises that options name: built-in ones, and classes in Python files
+(``FILE.py:CLASS``).
+"""
 
 from __future__ import annotations
 
@@ -37,7 +39,8 @@ def own_strategy(text: str | None, option: str = "--strategy") -> Strategy | Non
 
 
 def chosen_strategies(scenario: Scenario, names: str | None) -> Mapping[str, Strategy | None]:
-    """Return the strategies of ``--strategies`` by name, with the strategy of a Python file, None for a built-in one.
+    """Return the strategies of ``--strategies`` by name, with the strategy of a Python file, None
+    for a built-in one.
 
     None is all built-in strategies. `InputError` if there is no such strategy.
     """
@@ -45,7 +48,9 @@ def chosen_strategies(scenario: Scenario, names: str | None) -> Mapping[str, Str
     chosen: dict[str, Strategy | None] = {}
     for text in valid if names is None else [part.strip() for part in names.split(",")]:
         own = own_strategy(text, "--strategies")
-        chosen[choice("--strategies", text, valid) if own is None else strategy_name(scenario, own)] = own
+        chosen[
+            choice("--strategies", text, valid) if own is None else strategy_name(scenario, own)
+        ] = own
     return chosen
 
 
@@ -58,7 +63,8 @@ def chosen_noise(text: str, names: Sequence[str] = NOISES) -> str | OwnNoise:
 
 
 def chosen_noises(names: str) -> Mapping[str, NoiseSource | None]:
-    """Return the noises of a list by name, with the noise of a Python file, None for a built-in one; `all` is four.
+    """Return the noises of a list by name, with the noise of a Python file, None for a built-in
+    one; `all` is four.
 
     `InputError` if there is no such noise.
     """
@@ -73,8 +79,8 @@ def chosen_noises(names: str) -> Mapping[str, NoiseSource | None]:
 def load_strategy(text: str, option: str = "--strategy", version: str | None = None) -> Strategy:
     """Import a file and return a strategy of one of its classes, from a text ``FILE.py:CLASS``.
 
-    The folder of the file is searched for the modules that it imports. The strategy is pickled as this text with its
-    version: another process imports the same file, or refuses it.
+    The folder of the file is searched for the modules that it imports. The strategy is pickled as
+    this text with its version: another process imports the same file, or refuses it.
     """
     kind, again = _load(text, option, ("start", "decide"), version)
     kind.version, kind.__reduce__ = again[2], lambda _self: (load_strategy, again)
@@ -92,8 +98,10 @@ class OwnNoise:
     """The noise of a Python file: it makes an object of its class for each batch of runs."""
 
     def __init__(self, kind: Any, again: tuple[str, str, str]) -> None:
-        self._kind, self._again = kind, again
-        self.version, self.name = again[2], f"{kind.__module__}.{kind.__qualname__}"
+        self._kind = kind
+        self._again = again
+        self.version = again[2]
+        self.name = f"{kind.__module__}.{kind.__qualname__}"
 
     def __reduce__(self) -> tuple[Any, ...]:
         return load_noise, self._again
@@ -108,12 +116,19 @@ _LOADED: dict[tuple[Path, str], str] = {}
 """The options that named the loaded classes, by file and name."""
 
 
-def _load(text: str, option: str, methods: tuple[str, ...], version: str | None) -> tuple[Any, tuple[str, str, str]]:
-    """Return the class of a text ``FILE.py:CLASS``, and text, option and version that load it in another process."""
+def _load(
+    text: str, option: str, methods: tuple[str, ...], version: str | None
+) -> tuple[Any, tuple[str, str, str]]:
+    """Return the class of a text ``FILE.py:CLASS``, and text, option and version that load it in
+    another process.
+    """
     name, _, class_name = text.rpartition(":")
     file = Path(name).resolve()
     if file.suffix != ".py" or not file.is_file():
-        raise InputError(f"{option}: {shown(text)} must be FILE.py:CLASS, the path of a file that exists and its class")
+        raise InputError(
+            f"{option}: {shown(text)} must be FILE.py:CLASS, the path of a file that exists and "
+            "its class"
+        )
     _LOADED.pop((file, class_name), None)  # the last one is looked at first
     _LOADED[file, class_name] = option
     with own_code_errors():
@@ -122,13 +137,19 @@ def _load(text: str, option: str, methods: tuple[str, ...], version: str | None)
         importlib.invalidate_caches()
         module = importlib.import_module(file.stem)
     if Path(module.__file__ or "").resolve() != file:
-        raise InputError(f"{option}: {file.name} has the name of another Python module; rename the file")
+        raise InputError(
+            f"{option}: {file.name} has the name of another Python module; rename the file"
+        )
     # Kept by the module: the file may change after its import.
-    digest = vars(module).setdefault("_sha256_at_import", hashlib.sha256(file.read_bytes()).hexdigest())
+    digest = vars(module).setdefault(
+        "_sha256_at_import", hashlib.sha256(file.read_bytes()).hexdigest()
+    )
     kind = vars(module).get(class_name)
     if not (isinstance(kind, type) and all(hasattr(kind, method) for method in methods)):
         needed = f"method{'s' if len(methods) > 1 else ''} {' and '.join(methods)}"
-        raise InputError(f"{option}: {name} has no class {shown(class_name)} with the {needed}; check the name")
+        raise InputError(
+            f"{option}: {name} has no class {shown(class_name)} with the {needed}; check the name"
+        )
     found = f"{file.name}:{class_name} sha256:{digest[:16]}"
     if version not in (None, found):
         raise InputError(f"{option}: {text} has changed since the command started; run it again")
@@ -137,7 +158,9 @@ def _load(text: str, option: str, methods: tuple[str, ...], version: str | None)
 
 @contextlib.contextmanager
 def own_code_errors() -> Iterator[None]:
-    """Turn an exception of the code in a loaded file, or about what it returned, into a message with its line."""
+    """Turn an exception of the code in a loaded file, or about what it returned, into a message
+    with its line.
+    """
     try:
         yield
     except (InputError, MemoryError):
@@ -146,10 +169,12 @@ def own_code_errors() -> Iterator[None]:
         trace = "".join(traceback.format_exception(error))  # also that of another process
         for (file, name), option in reversed(_LOADED.items()):
             lines = re.findall(rf'File "{re.escape(str(file))}", line (\d+)', trace)
-            # Without a line: the class needs arguments, or returned a value that `infoset.sim` refuses.
+            # Without a line: the class needs arguments, or returned a value that `infoset.sim`
+            # refuses.
             if lines or re.match(rf"((strategy|noise) )?{name}\b", str(error)):
                 where = f", line {lines[-1]}" if lines else ""
                 raise InputError(
-                    f"{option}: {os.path.relpath(file)}{where}: {type(error).__name__}: {error}; correct the file"
+                    f"{option}: {os.path.relpath(file)}{where}: {type(error).__name__}: {error}; "
+                    "correct the file"
                 ) from None
         raise

@@ -1,4 +1,6 @@
-"""Studies of many runs: curves of the experiment, comparisons of strategies, and what is reported about their sets."""
+"""Studies of many runs: curves of the experiment, comparisons of strategies, and what is reported
+about their sets.
+"""
 
 from __future__ import annotations
 
@@ -30,14 +32,19 @@ def summary(sample: Floats) -> dict[str, float | None]:
 
 
 WANTED_SHARES = tuple(1.0 - 10.0**-digits for digits in range(2, 8))
-"""Probabilities of a hit that a study may have to show: from 99 % to one miss in the number of runs of a campaign."""
+"""Probabilities of a hit that a study may have to show: from 99 % to one miss in the number of runs
+of a campaign.
+"""
 OF_PAPER = ("asteroid-1997", "asteroid-1997-single")
-"""Scenarios of the paper of 1997. Only their results have its names: curves 1 to 4, figures 2 to 4."""
+"""Scenarios of the paper of 1997. Only their results have its names: curves 1 to 4, figures 2 to
+4.
+"""
 
 
 @dataclass(frozen=True)
 class Curve:
-    """Curve of the experiment: 1 random noise, 2 random with range sensor, 3 game noise, 4 game with range sensor.
+    """Curve of the experiment: 1 random noise, 2 random with range sensor, 3 game noise, 4 game
+    with range sensor.
 
     Curves 1 and 2 may have another noise instead.
     """
@@ -48,8 +55,14 @@ class Curve:
     results: Results
 
     def title(self, scenario: Scenario) -> str:
-        """Return the name of the curve in lines and tables: its number only for a scenario of the paper."""
-        return f"curve {self.number}" if is_of_paper(scenario) else case_title(self.noise, self.range_sensor)
+        """Return the name of the curve in lines and tables: its number only for a scenario of the
+        paper.
+        """
+        return (
+            f"curve {self.number}"
+            if is_of_paper(scenario)
+            else case_title(self.noise, self.range_sensor)
+        )
 
 
 def is_of_paper(scenario: Scenario) -> bool:
@@ -62,20 +75,29 @@ def case_title(noise: str, range_sensor: bool) -> str:
     return f"{noise}{' + range sensor' if range_sensor else ''}"
 
 
-def curve_scenarios(scenario: Scenario, noise: NoiseKind = NoiseKind.RANDOM) -> Sequence[tuple[int, Scenario]]:
-    """Return number and scenario of each curve, as in the paper's figure 4; without a range sensor curves 1 and 3."""
+def curve_scenarios(
+    scenario: Scenario, noise: NoiseKind = NoiseKind.RANDOM
+) -> Sequence[tuple[int, Scenario]]:
+    """Return number and scenario of each curve, as in the paper's figure 4; without a range sensor
+    curves 1 and 3.
+    """
     numbered = (
         (1, replace(scenario, noise=noise, range_sensor=None)),
         (2, replace(scenario, noise=noise)),
         (3, replace(scenario, noise=NoiseKind.GAME, range_sensor=None)),
         (4, replace(scenario, noise=NoiseKind.GAME)),
     )
-    return [(number, flown) for number, flown in numbered if scenario.range_sensor is not None or number in (1, 3)]
+    return [
+        (number, flown)
+        for number, flown in numbered
+        if scenario.range_sensor is not None or number in (1, 3)
+    ]
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """One strategy with one noise: results by tie rule of the game noise, or one result with another noise.
+    """One strategy with one noise: results by tie rule of the game noise, or one result with
+    another noise.
 
     All strategies have the same runs.
     """
@@ -90,7 +112,9 @@ class Comparison:
         return f"{self.noise} noise{', worst tie rule' if len(self.results) > 1 else ''}"
 
     def worst(self, column: str) -> Any:
-        """Return a column of the results, shape (N,), of each run with its worst tie rule: see `_WORST`."""
+        """Return a column of the results, shape (N,), of each run with its worst tie rule: see
+        `_WORST`.
+        """
         columns = [getattr(each, column) for each in self.results.values()]
         stack = np.ma.stack if np.ma.isMaskedArray(columns[0]) else np.stack
         return _WORST[column](stack(columns), axis=0)
@@ -103,9 +127,12 @@ class Comparison:
 
     @property
     def missed(self) -> dict[str, Any]:
-        """Number of misses of each cause (`infoset.sim.miss_cause`), of each run with its worst tie rule."""
+        """Number of misses of each cause (`infoset.sim.miss_cause`), of each run with its worst tie
+        rule.
+        """
         results = [*self.results.values()]
-        worst, runs = np.argmax([each.miss_m for each in results], axis=0), len(results[0])
+        worst = np.argmax([each.miss_m for each in results], axis=0)
+        runs = len(results[0])
         return join(results).take(worst * runs + np.arange(runs)).missed
 
 
@@ -119,16 +146,23 @@ Compared = tuple[str, str, TieRule | None]
 
 
 def compared_scenarios(
-    scenario: Scenario, strategies: Mapping[str, Strategy | None], noises: Mapping[str, NoiseSource | None]
+    scenario: Scenario,
+    strategies: Mapping[str, Strategy | None],
+    noises: Mapping[str, NoiseSource | None],
 ) -> dict[Compared, Scenario]:
-    """Return the scenarios of a comparison; strategies and noises of Python files are not in them."""
+    """Return the scenarios of a comparison; strategies and noises of Python files are not in
+    them.
+    """
     flown: dict[Compared, Scenario] = {}
     for name, own in strategies.items():
         guided = scenario if own is not None else replace(scenario, strategy=name)
         for noise, own_noise in noises.items():
             noisy = guided if own_noise is not None else replace(guided, noise=NoiseKind(noise))
             ties = TieRule if noise == NoiseKind.GAME.value else (None,)
-            flown |= {(name, noise, tie): noisy if tie is None else replace(noisy, tie=tie) for tie in ties}
+            flown |= {
+                (name, noise, tie): noisy if tie is None else replace(noisy, tie=tie)
+                for tie in ties
+            }
     return flown
 
 
@@ -142,7 +176,8 @@ def comparisons(flown: Mapping[Compared, Results]) -> list[Comparison]:
 
 @dataclass(frozen=True)
 class SetCounts:
-    """Numbers of runs: all, with the true state inside the set at every step, with an empty set, and with a failed set.
+    """Numbers of runs: all, with the true state inside the set at every step, with an empty set,
+    and with a failed set.
 
     A set has failed if it became empty or lost the true state.
     """
@@ -153,35 +188,51 @@ class SetCounts:
     failed: int = 0
 
     def __add__(self, other: SetCounts) -> SetCounts:
-        return SetCounts(*(mine + more for mine, more in zip(vars(self).values(), vars(other).values(), strict=True)))
+        return SetCounts(
+            *(
+                mine + more
+                for mine, more in zip(vars(self).values(), vars(other).values(), strict=True)
+            )
+        )
 
     def __str__(self) -> str:
-        kept, emptied = (f"{count} of {some_runs(self.runs)}" for count in (self.truth_kept, self.set_emptied))
+        kept, emptied = (
+            f"{count} of {some_runs(self.runs)}" for count in (self.truth_kept, self.set_emptied)
+        )
         return (
-            f"true state inside the set at every step: {kept} ({percent(self.truth_kept / self.runs)}); "
-            f"set became empty: {emptied} ({percent(self.set_emptied / self.runs)})"
+            f"true state inside the set at every step: {kept} "
+            f"({percent(self.truth_kept / self.runs)}); set became empty: {emptied} "
+            f"({percent(self.set_emptied / self.runs)})"
         )
 
 
 def set_counts(truth_kept: Flags, set_emptied: Flags) -> SetCounts:
     """Return the counts of some runs, from arrays of shape (N,)."""
     failed = ~truth_kept | set_emptied
-    return SetCounts(len(truth_kept), int(truth_kept.sum()), int(set_emptied.sum()), int(failed.sum()))
+    return SetCounts(
+        len(truth_kept), int(truth_kept.sum()), int(set_emptied.sum()), int(failed.sum())
+    )
 
 
 def set_warnings(model: Model, counts: SetCounts) -> list[str]:
-    """Return a warning if sets failed in some runs: the quantiles then describe the failures of the model too."""
+    """Return a warning if sets failed in some runs: the quantiles then describe the failures of the
+    model too.
+    """
     if not counts.failed:
         return []
-    failures = f"in {counts.failed} of {some_runs(counts.runs)} the set lost the true state or became empty"
+    failures = (
+        f"in {counts.failed} of {some_runs(counts.runs)} the set lost the true state or became "
+        "empty"
+    )
     if model is Model.PAPER:
         return [
-            f"warning: model paper: {failures}; the quantiles include these failures of the model; for quantiles "
-            "without them, use --model guaranteed"
+            f"warning: model paper: {failures}; the quantiles include these failures of the model; "
+            "for quantiles without them, use --model guaranteed"
         ]
     return [
-        f"warning: model guaranteed: {failures}, so an assumption of the model does not hold: the noise exceeds the "
-        "bounds of the sensors, or the scenario exceeds those of the model; infoset scenarios check FILE examines it"
+        f"warning: model guaranteed: {failures}, so an assumption of the model does not hold: the "
+        "noise exceeds the bounds of the sensors, or the scenario exceeds those of the model; "
+        "infoset scenarios check FILE examines it"
     ]
 
 
@@ -192,19 +243,28 @@ def scenario_title(scenario: Scenario) -> str:
 
 
 def study_title(scenario: Scenario, strategy: str, seed: int) -> str:
-    """Return what the numbers of a study rest on: scenario, model, strategy and seed, and a line with its settings."""
+    """Return what the numbers of a study rest on: scenario, model, strategy and seed, and a line
+    with its settings.
+    """
     head = f"{scenario_title(scenario)}, strategy {strategy}, seed {seed}"
     return "\n".join(line for line in (head, scenario.description) if line)
 
 
 def game_note(scenario: Scenario, rule: str | None = None) -> str:
-    """Return a line about what a result with game noise is; `rule` is its tie rule, None that of the scenario."""
+    """Return a line about what a result with game noise is; `rule` is its tie rule, None that of
+    the scenario.
+    """
     is_guaranteed = scenario.set_model.is_guaranteed
-    bound = "; the miss of a run is at most its Phi, and other errors can give a greater Phi" if is_guaranteed else ""
+    bound = (
+        "; the miss of a run is at most its Phi, and other errors can give a greater Phi"
+        if is_guaranteed
+        else ""
+    )
     worse = "" if rule else "; infoset compare shows the worst of all tie rules"
     return (
-        f"game noise ({rule or f'tie rule {scenario.tie.value}'}) is one adversary, not the worst case: infoset bound "
-        f"--budget 0 prints a miss, from the worst start, that no strategy can prevent{bound}{worse}"
+        f"game noise ({rule or f'tie rule {scenario.tie.value}'}) is one adversary, not the worst "
+        "case: infoset bound --budget 0 prints a miss, from the worst start, that no strategy can "
+        f"prevent{bound}{worse}"
     )
 
 
@@ -212,25 +272,29 @@ def random_note(scenario: Scenario) -> str:
     """Return a line about what a result with random noise is."""
     constant = scenario.set_model.angle_sensor.has_constant_bias
     return (
-        "random noise (uniform errors within the bounds, independent from one measurement to the next"
-        f"{', with a constant centroid error' if constant else ''}) is one model of many: a decision holds for it only"
+        "random noise (uniform errors within the bounds, independent from one measurement to the "
+        f"next{', with a constant centroid error' if constant else ''}) is one model of many: a "
+        "decision holds for it only"
     )
 
 
 def noise_notes(scenario: Scenario, noises: Iterable[str], rule: str | None = None) -> list[str]:
-    """Return a line for each noise, except random noise and the user's own, about what its results are.
+    """Return a line for each noise, except random noise and the user's own, about what its results
+    are.
 
     `rule` is that of `game_note`.
     """
     sigma = scenario.noise_sigma
     gaussian = (
-        f"the standard deviation is {sigma:.3g} of the bound, where the errors are truncated; this cuts "
-        f"{percent(share_cut(sigma))} of a Gaussian"
+        f"the standard deviation is {sigma:.3g} of the bound, where the errors are truncated; this "
+        f"cuts {percent(share_cut(sigma))} of a Gaussian"
     )
     known = {
         NoiseKind.GAUSSIAN.value: f"gaussian noise: {gaussian}",
-        NoiseKind.CORRELATED.value: f"correlated noise: {gaussian}; the time constant of the correlation is "
-        f"{scenario.correlation_time_s:.4g} s",
+        NoiseKind.CORRELATED.value: (
+            f"correlated noise: {gaussian}; the time constant of the correlation is "
+            f"{scenario.correlation_time_s:.4g} s"
+        ),
         NoiseKind.GAME.value: game_note(scenario, rule),
     }
     return [known[noise] for noise in noises if noise in known]
@@ -247,7 +311,8 @@ def hit_text(hits: HitEstimate | None, scenario: Scenario) -> str:
 
 
 def outlook_text(hits: HitEstimate | None) -> str:
-    """Return what shows a greater probability of a hit than a sample does; an empty text if the sample excludes it.
+    """Return what shows a greater probability of a hit than a sample does; an empty text if the
+    sample excludes it.
 
     The probability is the first of 99 %, 99.9 % and so on that the sample does not show yet.
     """
@@ -258,7 +323,11 @@ def outlook_text(hits: HitEstimate | None) -> str:
     if hits.upper < share:
         return ""
     needed = runs_for_hits(share, misses)
-    allowed = "without a miss" if misses == 0 else f"with at most {misses} miss{'' if misses == 1 else 'es'}"
+    allowed = (
+        "without a miss"
+        if misses == 0
+        else f"with at most {misses} miss{'' if misses == 1 else 'es'}"
+    )
     requirement = HitRequirement(share)
     text = (
         f"for {percent(share)} with {percent(CONFIDENCE)} confidence: at least {needed} runs {allowed}; "
@@ -269,7 +338,9 @@ def outlook_text(hits: HitEstimate | None) -> str:
 
 
 def miss_text(missed: Mapping[str, Any], runs: int, scenario: Scenario) -> str:
-    """Return the numbers of misses by cause (`infoset.sim.miss_cause`) as text, empty without misses."""
+    """Return the numbers of misses by cause (`infoset.sim.miss_cause`) as text, empty without
+    misses.
+    """
     thruster = scenario.thruster
     reasons = {
         MissCause.ENGINE: "by the engine (it corrects {corrected_m}, the starts need up to {needed_m})",
@@ -278,17 +349,29 @@ def miss_text(missed: Mapping[str, Any], runs: int, scenario: Scenario) -> str:
         MissCause.SATURATED: f"saturated (known too late for impulses of {thruster.max_impulse_m_s:g} m/s)",
         MissCause.GUIDANCE: "by the guidance (to compare strategies: infoset compare)",
     }
-    lengths = {name: length_text(value) for name, value in missed.items() if name.endswith("_m") and value is not None}
+    lengths = {
+        name: length_text(value)
+        for name, value in missed.items()
+        if name.endswith("_m") and value is not None
+    }
     parts = [
-        f"{missed[cause.value]} {text.format(**lengths)}" for cause, text in reasons.items() if missed[cause.value]
+        f"{missed[cause.value]} {text.format(**lengths)}"
+        for cause, text in reasons.items()
+        if missed[cause.value]
     ]
     count = sum(missed[cause.value] for cause in MissCause)
     return f"missed {count} of {some_runs(runs)}: {', '.join(parts)}" if parts else ""
 
 
 def redrawn_text(share: float | None) -> str:
-    """Return the share of the normal starts that were drawn again; an empty text for uniform starts."""
-    return "" if share is None else f"normal starts: {percent(share)} were outside the dispersion and drawn again"
+    """Return the share of the normal starts that were drawn again; an empty text for uniform
+    starts.
+    """
+    return (
+        ""
+        if share is None
+        else f"normal starts: {percent(share)} were outside the dispersion and drawn again"
+    )
 
 
 def max_guarantee_m(results: Results) -> float | None:
@@ -299,6 +382,8 @@ def max_guarantee_m(results: Results) -> float | None:
 
 
 def percent(share: float) -> str:
-    """Return a share as a percentage with four digits; only the shares 0 and 1 become 0 % and 100 %."""
+    """Return a share as a percentage with four digits; only the shares 0 and 1 become 0 % and 100
+    %.
+    """
     text = f"{100.0 * share:.4g}"
     return f"{f'{100.0 * share:.12g}' if text == '100' and share < 1.0 else text} %"

@@ -1,4 +1,6 @@
-"""Trajectories: files with the states of a spacecraft and an object, and the scenarios that follow from them."""
+"""Trajectories: files with the states of a spacecraft and an object, and the scenarios that follow
+from them.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,9 @@ from infoset.sim.gravity import on_board_model
 from infoset.sim.scenario import Body, Scenario
 
 _Text = Line(longest=1000)
-"""Names and paths: one line, because they are repeated in messages and in the comments of the scenario."""
+"""Names and paths: one line, because they are repeated in messages and in the comments of the
+scenario.
+"""
 KERNEL_SCALE = "TDB"
 """Time scale of SPICE."""
 
@@ -35,7 +39,8 @@ KERNEL_SCALE = "TDB"
 class CraftTrack:
     """The state of a spacecraft or an object from the attracting body.
 
-    It is two vectors, or the path of an orbit ephemeris message (`oem`), or a body of SPICE kernels (`spice`).
+    It is two vectors, or the path of an orbit ephemeris message (`oem`), or a body of SPICE kernels
+    (`spice`).
     """
 
     position_m: Annotated[tuple[float, ...], NUMBER] | None = None
@@ -46,7 +51,9 @@ class CraftTrack:
     def __post_init__(self) -> None:
         check_fields(self)
         vectors = [vector for vector in (self.position_m, self.velocity_m_s) if vector is not None]
-        if [len(vectors), self.oem, self.spice].count(None) + (not vectors) != 2 or len(vectors) == 1:
+        if [len(vectors), self.oem, self.spice].count(None) + (not vectors) != 2 or len(
+            vectors
+        ) == 1:
             raise ValueError("CraftTrack: must have position and velocity, or oem, or spice")
         if any(len(vector) != 3 for vector in vectors):
             raise ValueError("CraftTrack: position and velocity must have three components")
@@ -54,7 +61,8 @@ class CraftTrack:
 
 @dataclass(frozen=True, kw_only=True)
 class Trajectory:
-    """The states of a spacecraft and an object at an epoch, and the covariance of the relative state.
+    """The states of a spacecraft and an object at an epoch, and the covariance of the relative
+    state.
 
     The components of the covariance are x, y, z and their rates, of the object from the spacecraft.
 
@@ -104,7 +112,8 @@ class Trajectory:
 
 
 class KnownTarget(NamedTuple):
-    """What the files of a trajectory do not contain about the target: its radius, m, and the bound of its acceleration.
+    """What the files of a trajectory do not contain about the target: its radius, m, and the bound
+    of its acceleration.
 
     None is not known.
     """
@@ -114,7 +123,9 @@ class KnownTarget(NamedTuple):
 
 
 class FoundScenario(NamedTuple):
-    """The scenario of a trajectory, its file with comments, and notes and warnings about the trajectory."""
+    """The scenario of a trajectory, its file with comments, and notes and warnings about the
+    trajectory.
+    """
 
     scenario: Scenario
     text: str
@@ -151,20 +162,26 @@ def scenario_of(
     target : KnownTarget or None
         The size of the target, and the bound of its acceleration.
     folders : sequence of Path
-        Folders whose files the trajectory file may name; it may always name those below its own folder.
+        Folders whose files the trajectory file may name; it may always name those below its own
+        folder.
 
     Raises
     ------
     InputError
         If a file is invalid, or the states do not meet.
     """
-    trajectory, source = read_file(Trajectory, file), os.fspath(file)
+    trajectory = read_file(Trajectory, file)
+    source = os.fspath(file)
     if not like.is_spatial:
-        raise InputError(f"--like: {like.name} is a scenario in a plane; take one in space, for example dart-2022")
+        raise InputError(
+            f"--like: {like.name} is a scenario in a plane; take one in space, for example "
+            "dart-2022"
+        )
     target = target or KnownTarget()
     pair = _pair(trajectory, Path(file).parent, folders, source)
     _check_accuracy(pair, source)
-    own, other = pair.spacecraft.state, pair.object.state
+    own = pair.spacecraft.state
+    other = pair.object.state
     with input_errors(source):
         found = find_approach(
             np.concatenate([own, other - own]),
@@ -201,7 +218,9 @@ def scenario_of(
     notes = [*pair.notes, *missing]
     warnings = [*pair.spacecraft.warnings, *pair.object.warnings]
     origins = _origins(trajectory, pair)
-    text = _text(scenario, found, like.name, sigmas, source, [*origins, *pair.notes, *warnings, *missing])
+    text = _text(
+        scenario, found, like.name, sigmas, source, [*origins, *pair.notes, *warnings, *missing]
+    )
     return FoundScenario(scenario, text, notes, warnings)
 
 
@@ -209,11 +228,15 @@ def _missing(target: KnownTarget) -> list[str]:
     """Return a line for each value of the target that is not known."""
     lines = []
     if target.radius_m is None:
-        lines.append("missing: [body], the radius of the target: no run has a hit without it; add --body-radius-m")
+        lines.append(
+            "missing: [body], the radius of the target: no run has a hit without it; add "
+            "--body-radius-m"
+        )
     if target.disturbance_m_s2 is None:
         lines.append(
-            "missing: information_set.disturbance_m_s2, here 0: the guarantee holds only if nothing but the gravity of "
-            "[sun] accelerates the target; add --disturbance, for example 1e-6"
+            "missing: information_set.disturbance_m_s2, here 0: the guarantee holds only if "
+            "nothing but the gravity of [sun] accelerates the target; add --disturbance, for "
+            "example 1e-6"
         )
     return lines
 
@@ -224,15 +247,25 @@ def _origins(trajectory: Trajectory, pair: _Pair) -> list[str]:
     if trajectory.epoch is not None:
         lines.append(f"Epoch: {trajectory.epoch}")
     lines += [f"Spacecraft: {pair.spacecraft.origin}.", f"Object: {pair.object.origin}."]
-    frames = [craft.frame.name for craft in (pair.spacecraft, pair.object) if craft.frame is not None]
+    frames = [
+        craft.frame.name for craft in (pair.spacecraft, pair.object) if craft.frame is not None
+    ]
     axes = f"of {frames[0]}" if frames else "of the states"
     x, y, z = trajectory.pole
-    lines.append(f"Reference plane of T and R: its normal (pole) is [{x:g}, {y:g}, {z:g}] in the axes {axes}.")
+    lines.append(
+        f"Reference plane of T and R: its normal (pole) is [{x:g}, {y:g}, {z:g}] in the axes "
+        f"{axes}."
+    )
     return lines
 
 
 def _text(
-    scenario: Scenario, found: Approach, like: str, sigmas: float, source: str, about_states: Sequence[str]
+    scenario: Scenario,
+    found: Approach,
+    like: str,
+    sigmas: float,
+    source: str,
+    about_states: Sequence[str],
 ) -> str:
     t_km, r_km = (value / 1e3 for value in found.miss_m)
     about = "".join(f"# {on_a_screen(line)}\n" for line in about_states)
@@ -247,9 +280,15 @@ def _text(
 """
     comments = {
         **{f"[{part.name}]": f"as {like}" for part in fields(Scenario)},
-        "[sun]": "the attracting body, its direction from the spacecraft, and the velocity of the spacecraft from it",
+        "[sun]": (
+            "the attracting body, its direction from the spacecraft, and the velocity of the "
+            "spacecraft from it"
+        ),
         "[uncertainty]": f"known on board: {sigmas:g} sigma around the states",
-        "[dispersion]": f"true starts are within {sigmas:g} sigma; those of the covariance beyond are drawn again",
+        "[dispersion]": (
+            f"true starts are within {sigmas:g} sigma; those of the covariance beyond are drawn "
+            "again"
+        ),
         "[covariance]": "of the start, components y, z, x and their rates; lower triangle of the correlations",
         "[camera]": f"as {like}; centroid_error_m depends on the size of the target",
         "[body]": "of --body-radius-m",
@@ -266,7 +305,9 @@ def _pair(trajectory: Trajectory, folder: Path, folders: Sequence[Path], source:
     """Return the states of both craft at the epoch from their sources."""
     crafts = (trajectory.spacecraft, trajectory.object)
     with input_errors(source, kind=InputError):
-        messages = {craft.oem: _oem(craft.oem, folder, folders) for craft in crafts if craft.oem is not None}
+        messages = {
+            craft.oem: _oem(craft.oem, folder, folders) for craft in crafts if craft.oem is not None
+        }
         epoch = _epoch(trajectory, is_needed=bool(messages))
         scale = "" if epoch is None else craft_state.epoch_scale(epoch, list(messages.values()))
 
@@ -317,9 +358,16 @@ def _epoch(trajectory: Trajectory, *, is_needed: bool) -> Epoch | None:
 
 
 def _spice_craft(
-    trajectory: Trajectory, body: str, epoch: Epoch | None, scale: str, folder: Path, folders: Sequence[Path]
+    trajectory: Trajectory,
+    body: str,
+    epoch: Epoch | None,
+    scale: str,
+    folder: Path,
+    folders: Sequence[Path],
 ) -> CraftState:
-    """Return the state of a body of SPICE kernels; other epochs than those of `parse_epoch` are read by SPICE."""
+    """Return the state of a body of SPICE kernels; other epochs than those of `parse_epoch` are
+    read by SPICE.
+    """
     files = kernels.kernel_files(trajectory.kernels, folder, folders)
     with kernels.loaded(files) as spice:
         if epoch is None:
@@ -337,15 +385,26 @@ def _spice_craft(
     )
 
 
-def _covariance(trajectory: Trajectory, one: CraftState, other: CraftState, source: str) -> tuple[Floats, list[str]]:
-    """Return the covariance of the relative state, and a line about it if it is that of OEM files."""
+def _covariance(
+    trajectory: Trajectory, one: CraftState, other: CraftState, source: str
+) -> tuple[Floats, list[str]]:
+    """Return the covariance of the relative state, and a line about it if it is that of OEM
+    files.
+    """
     if trajectory.covariance is not None:
         return trajectory.covariance.matrix, []
-    found = {craft.source: craft.covariance for craft in (one, other) if craft.covariance is not None}
+    found = {
+        craft.source: craft.covariance for craft in (one, other) if craft.covariance is not None
+    }
     if not found:
-        raise InputError(f"{source}: covariance: is missing, and the OEM files have none; write the table [covariance]")
+        raise InputError(
+            f"{source}: covariance: is missing, and the OEM files have none; write the table "
+            "[covariance]"
+        )
     named = " and ".join(
-        f"{craft.source} (axes: {craft.covariance_frame})" for craft in (one, other) if craft.covariance is not None
+        f"{craft.source} (axes: {craft.covariance_frame})"
+        for craft in (one, other)
+        if craft.covariance is not None
     )
     if len(found) == 1:
         note = f"covariance: that of {named}; the other state is taken as exact"
@@ -363,14 +422,17 @@ def _covariance(trajectory: Trajectory, one: CraftState, other: CraftState, sour
 
 
 def _check_accuracy(pair: _Pair, source: str) -> None:
-    """Refuse states that the tables give with greater errors than the covariance claims: both cannot be right."""
+    """Refuse states that the tables give with greater errors than the covariance claims: both
+    cannot be right.
+    """
     errors = pair.spacecraft.error + pair.object.error
     variances = pair.covariance.diagonal()
     claimed = np.sqrt([variances[:3].sum(), variances[3:].sum()])
     if (errors <= claimed).all():
         return
     raise InputError(
-        f"{source}: the interpolation has errors of about {errors[0]:.3g} m and {errors[1]:.3g} m/s, more than the "
-        f"standard deviations of the covariance, {claimed[0]:.3g} m and {claimed[1]:.3g} m/s: give tables with shorter "
-        "steps, or a covariance that contains these errors"
+        f"{source}: the interpolation has errors of about {errors[0]:.3g} m and {errors[1]:.3g} "
+        f"m/s, more than the standard deviations of the covariance, {claimed[0]:.3g} m and "
+        f"{claimed[1]:.3g} m/s: give tables with shorter steps, or a covariance that contains "
+        "these errors"
     )

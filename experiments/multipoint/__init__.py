@@ -1,1 +1,3 @@
-"""Visits to a sequence of moving targets: file, command, tables, figures, page and printed numbers."""
+"""Visits to a sequence of moving targets: file, command, tables, figures, page and printed
+numbers.
+"""

@@ -40,7 +40,13 @@ _TARGET: dict[str, Any] = {
     "label": "target until the visit",
 }
 _POINT: dict[str, Any] = {"linestyle": "none", "zorder": 4}
-_NODE: dict[str, Any] = {"color": "white", "markeredgecolor": INK, "markersize": 5.0, "linestyle": "none", "zorder": 5}
+_NODE: dict[str, Any] = {
+    "color": "white",
+    "markeredgecolor": INK,
+    "markersize": 5.0,
+    "linestyle": "none",
+    "zorder": 5,
+}
 
 
 def draw_all(report: Report) -> Iterator[Figure]:
@@ -54,7 +60,8 @@ def draw_path(report: Report) -> Figure:
     """Draw the path and the motion of the targets, in two planes."""
     states = report.path.state(report.times)[:, :3]
     unit, per_m = length_unit(float(np.abs(states).max()))
-    path, visits = states * per_m, report.path.arrival_states[:, :3] * per_m
+    path = states * per_m
+    visits = report.path.arrival_states[:, :3] * per_m
     planes = ((1, 0), (1, 2)) if report.hill else ((0, 1), (0, 2))
     figure, (panels,) = subplots(105.0, 1, 2)
     for panel, plane in zip(panels, map(list, planes), strict=True):
@@ -65,9 +72,24 @@ def draw_path(report: Report) -> Figure:
             panel.plot(*track.T, **_TARGET)
             panel.plot(*track[0], color=LIMIT, marker=".", label="target at the start", **_POINT)
         panel.plot(*path[:, plane].T, color=TRUTH, zorder=3, label="chaser")
-        panel.plot(*path[0, plane], color=TRUTH, marker="s", markersize=4.5, label="start of the chaser", **_POINT)
+        panel.plot(
+            *path[0, plane],
+            color=TRUTH,
+            marker="s",
+            markersize=4.5,
+            label="start of the chaser",
+            **_POINT,
+        )
         if not report.hill and plane[1] == 1:
-            panel.plot(0.0, 0.0, color=MEASURED, marker="*", markersize=8.0, label=_centre(report), **_POINT)
+            panel.plot(
+                0.0,
+                0.0,
+                color=MEASURED,
+                marker="*",
+                markersize=8.0,
+                label=_centre(report),
+                **_POINT,
+            )
             panel.set_aspect("equal", adjustable="datalim")
         _mark_visits(panel, report, visits[:, plane])
         label_axes(panel, [f"{report.axis_titles[axis]}, {unit}" for axis in plane])
@@ -83,16 +105,29 @@ def _centre(report: Report) -> str:
 
 def _mark_visits(panel: Axes, report: Report, visits: Floats) -> None:
     """Mark the visits, shape (n, 2), with their names."""
-    for name, visit, rendezvous in zip(report.names, visits, report.path.nodes.rendezvous, strict=True):
-        panel.plot(*visit, marker="D" if rendezvous else "o", label="rendezvous" if rendezvous else "flyby", **_NODE)
+    for name, visit, rendezvous in zip(
+        report.names, visits, report.path.nodes.rendezvous, strict=True
+    ):
+        panel.plot(
+            *visit,
+            marker="D" if rendezvous else "o",
+            label="rendezvous" if rendezvous else "flyby",
+            **_NODE,
+        )
         if len(visits) <= _MAX_NAMED:
-            place: dict[str, Any] = {"xytext": (4.0, 4.0), "textcoords": "offset points", "path_effects": HALO}
+            place: dict[str, Any] = {
+                "xytext": (4.0, 4.0),
+                "textcoords": "offset points",
+                "path_effects": HALO,
+            }
             panel.annotate(plain(name), visit, fontsize="small", zorder=6, **place)
 
 
 @style()
 def draw_control(report: Report) -> Figure:
-    """Draw the components and the magnitude of the control against time, with the bound if there is one."""
+    """Draw the components and the magnitude of the control against time, with the bound if there is
+    one.
+    """
     control = report.path.control(report.times) * 1e3
     figure, (above, below) = _over_time(report)
     for title, look, component in zip(report.axis_titles, LINE_LOOKS, control.T, strict=False):
@@ -108,10 +143,13 @@ def draw_control(report: Report) -> Figure:
 
 
 def _over_time(report: Report) -> tuple[Figure, list[Axes]]:
-    """Return a figure of two panels over time, with the visits and the stays marked, and named above the first one."""
+    """Return a figure of two panels over time, with the visits and the stays marked, and named
+    above the first one.
+    """
     unit, per_s = report.time_unit
     figure, grid = subplots(115.0, 2, 1, sharex=True)
-    arrive, leave = report.path.nodes.arrive_s * per_s, report.path.nodes.leave_s * per_s
+    arrive = report.path.nodes.arrive_s * per_s
+    leave = report.path.nodes.leave_s * per_s
     for panel in grid.flat:
         for time in arrive:
             panel.axvline(time, zorder=0, label="visit", **EVENT)
@@ -129,7 +167,10 @@ def _over_time(report: Report) -> tuple[Figure, list[Axes]]:
 def _line(panel: Axes, report: Report, values: Floats, **look: Any) -> None:
     """Draw a line with breaks where the chaser arrives at a target or leaves it."""
     _, per_s = report.time_unit
-    arrive, leave = report.path.nodes.arrive_s[:-1], report.path.nodes.leave_s[:-1]
-    cuts = np.searchsorted(report.times, np.sort(np.concatenate([arrive, leave[leave > arrive]])), side="left")
+    arrive = report.path.nodes.arrive_s[:-1]
+    leave = report.path.nodes.leave_s[:-1]
+    cuts = np.searchsorted(
+        report.times, np.sort(np.concatenate([arrive, leave[leave > arrive]])), side="left"
+    )
     for time, value in zip(np.split(report.times, cuts), np.split(values, cuts), strict=True):
         panel.plot(time * per_s, value, **look)

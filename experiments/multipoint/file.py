@@ -13,7 +13,12 @@ from infoset.arrays import Floats
 from infoset.experiments.common.orbit_checks import check_angle, check_flight, check_rate
 from infoset.limits import NUMBER, Description, Name, NotNegative, Number, Part, Positive
 from infoset.rendezvous.multipoint import KeplerTour, Meet, Target, TimeLimits, Tour
-from infoset.rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
+from infoset.rendezvous.relative_motion import (
+    ClohessyWiltshire,
+    EllipticOrbit,
+    LinearMotion,
+    TschaunerHempel,
+)
 from infoset.rendezvous.two_body import OrbitalElements, coast
 
 Vector = Annotated[tuple[float, float, float], NUMBER]
@@ -21,7 +26,9 @@ Vector = Annotated[tuple[float, float, float], NUMBER]
 
 @dataclass(frozen=True, kw_only=True)
 class BodyTable:
-    """[chaser]: a state at t = 0 in Hill's axes, or at an epoch in inertial ones; there elements may stand for it."""
+    """[chaser]: a state at t = 0 in Hill's axes, or at an epoch in inertial ones; there elements
+    may stand for it.
+    """
 
     position_m: Vector | None = None
     velocity_m_s: Vector | None = None
@@ -59,9 +66,11 @@ class MultipointProblem:
     name, description : str
         Name of the results, and a line about the problem.
     orbit_rate_rad_s, eccentricity, true_anomaly_rad : float
-        Mean motion of the reference orbit, which makes the axes those of Hill; its eccentricity and anomaly at t = 0.
+        Mean motion of the reference orbit, which makes the axes those of Hill; its eccentricity and
+        anomaly at t = 0.
     gravitational_parameter_m3_s2 : float
-        Gravity of the attracting point, in place of `orbit_rate_rad_s`, which makes the axes inertial.
+        Gravity of the attracting point, in place of `orbit_rate_rad_s`, which makes the axes
+        inertial.
     max_control_m_s2 : float or None
         Bound on the control at all times: imposed in Hill's axes, checked in inertial ones.
     optimise_times : bool
@@ -90,13 +99,22 @@ class MultipointProblem:
     def __post_init__(self) -> None:
         if (self.orbit_rate_rad_s is None) is (self.gravitational_parameter_m3_s2 is None):
             raise ValueError(
-                "orbit_rate_rad_s (Hill's axes) or gravitational_parameter_m3_s2 (inertial axes) is needed, not both"
+                "orbit_rate_rad_s (Hill's axes) or gravitational_parameter_m3_s2 (inertial axes) "
+                "is needed, not both"
             )
-        bodies = {"chaser": self.chaser, **{f"target.{i}": target for i, target in enumerate(self.target, start=1)}}
-        rate, mu = self.orbit_rate_rad_s, self.gravitational_parameter_m3_s2
+        bodies = {
+            "chaser": self.chaser,
+            **{f"target.{i}": target for i, target in enumerate(self.target, start=1)},
+        }
+        rate = self.orbit_rate_rad_s
+        mu = self.gravitational_parameter_m3_s2
         if rate is not None:
             check_rate(rate, self.eccentricity)
-            times = [time for time in (*(target.time_s for target in self.target), self.latest_s) if time is not None]
+            times = [
+                time
+                for time in (*(target.time_s for target in self.target), self.latest_s)
+                if time is not None
+            ]
             if times:
                 check_angle("the last of time_s and latest_s", max(times), rate)
         elif self.eccentricity > 0.0:
@@ -108,7 +126,9 @@ class MultipointProblem:
                     after_s = max(self.last_s - body.epoch_s, 0.0)
                     check_flight(key, body.state(mu), mu, before_s, after_s)
             elif body.elements is not None or body.epoch_s != 0.0:
-                raise ValueError(f"{key}: elements and epoch_s belong to inertial axes, not to those of Hill")
+                raise ValueError(
+                    f"{key}: elements and epoch_s belong to inertial axes, not to those of Hill"
+                )
         _ = self.tour  # raises ValueError if a target is wrong
 
     @property
@@ -133,7 +153,9 @@ class MultipointProblem:
         return max(times, default=np.inf)
 
     def limits(self) -> TimeLimits:
-        """Return the limits of the times; ValueError if the last time has neither a limit nor a price."""
+        """Return the limits of the times; ValueError if the last time has neither a limit nor a
+        price.
+        """
         return self.times or TimeLimits()
 
     @cached_property
@@ -141,12 +163,15 @@ class MultipointProblem:
         """The visits that are solved."""
         mu = self.gravitational_parameter_m3_s2
         targets = tuple(Target(each.name, each.meet, each.dwell_s) for each in self.target)
-        states, start = np.array([each.state(mu) for each in self.target]), self.chaser.state(mu)
+        states = np.array([each.state(mu) for each in self.target])
+        start = self.chaser.state(mu)
         if mu is not None:
             epochs_s = np.array([each.epoch_s for each in self.target])
             return KeplerTour(targets, states, epochs_s, mu, coast(start, -self.chaser.epoch_s, mu))
         assert self.orbit_rate_rad_s is not None
         motion: LinearMotion = ClohessyWiltshire(self.orbit_rate_rad_s)
         if self.eccentricity > 0.0:
-            motion = TschaunerHempel(EllipticOrbit(self.orbit_rate_rad_s, self.eccentricity, self.true_anomaly_rad))
+            motion = TschaunerHempel(
+                EllipticOrbit(self.orbit_rate_rad_s, self.eccentricity, self.true_anomaly_rad)
+            )
         return Tour(motion, targets, states, start)

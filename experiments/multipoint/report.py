@@ -19,15 +19,17 @@ from infoset.rendezvous.multipoint import BestOrder, Grid, Path, Tour
 
 _POINTS = 1601
 _ENOUGH_A_REVOLUTION = 20.0
-"""Times of a grid in a revolution: with fewer, its lowest costs may be in other valleys than the minima."""
+"""Times of a grid in a revolution: with fewer, its lowest costs may be in other valleys than the
+minima.
+"""
 
 
 @dataclass(frozen=True)
 class ImposedBound:
     """A bound on the control, m/s^2, that the minimum-energy control without it exceeds.
 
-    `least_m_s2` is the smallest bound with which the visits are possible at the times without the bound; `cost_without`
-    (m^2/s^3) and `peak_without_m_s2` belong to the path without it.
+    `least_m_s2` is the smallest bound with which the visits are possible at the times without the
+    bound; `cost_without` (m^2/s^3) and `peak_without_m_s2` belong to the path without it.
     """
 
     max_m_s2: float
@@ -40,7 +42,8 @@ class ImposedBound:
 class Report:
     """Results of one command; `peak_m_s2` is the largest control. Axes are Hill's or inertial.
 
-    There is no `imposed` bound if the problem has none, or the minimum-energy control without it keeps it.
+    There is no `imposed` bound if the problem has none, or the minimum-energy control without it
+    keeps it.
     """
 
     problem: MultipointProblem
@@ -111,8 +114,8 @@ class Report:
             return notes
 
         note = (
-            f"the times are a local minimum, the lowest one found by {search.followed} descents from the best of "
-            f"{search.starts} starting points"
+            f"the times are a local minimum, the lowest one found by {search.followed} descents "
+            f"from the best of {search.starts} starting points"
         )
         if search.grid is not None:
             notes.append(f"{note} on a grid of {self._grid_text(search.grid)}")
@@ -123,16 +126,16 @@ class Report:
         notes.append(note)
         if self.revolutions > 1.0:
             notes.append(
-                f"over {self.revolutions:.2g} revolutions there are many local minima, and others are often lower: "
-                "compare the costs from different time_s"
+                f"over {self.revolutions:.2g} revolutions there are many local minima, and others "
+                "are often lower: compare the costs from different time_s"
             )
         return notes
 
     def _bound_notes(self, imposed: ImposedBound) -> list[str]:
         notes = [
-            f"the bound of {imposed.max_m_s2:g} m/s^2 is imposed: without it the cost is {imposed.cost_without:.8g} "
-            f"m^2/s^3 and the peak {imposed.peak_without_m_s2:.4g} m/s^2; the smallest possible bound is "
-            f"{imposed.least_m_s2:.6g} m/s^2"
+            f"the bound of {imposed.max_m_s2:g} m/s^2 is imposed: without it the cost is "
+            f"{imposed.cost_without:.8g} m^2/s^3 and the peak {imposed.peak_without_m_s2:.4g} "
+            f"m/s^2; the smallest possible bound is {imposed.least_m_s2:.6g} m/s^2"
         ]
         if self.order_chosen == "best":
             notes.append("the order was chosen without the bound")
@@ -144,20 +147,28 @@ class Report:
         search = self.best.order_search
         if search is not None:
             return (
-                f"all orders were compared on a grid of {self._grid_text(search.grid)}, and the best {search.orders} "
-                "searched again: the order is the best one found"
+                f"all orders were compared on a grid of {self._grid_text(search.grid)}, and the "
+                f"best {search.orders} searched again: the order is the best one found"
             )
         linear = isinstance(self.problem.tour, Tour)
         proved = linear and self.times_chosen == "given" and not self.best.lost
-        return "no order that fits the times costs less" if proved else "the order is the best one found"
+        return (
+            "no order that fits the times costs less"
+            if proved
+            else "the order is the best one found"
+        )
 
     def _grid_text(self, grid: Grid) -> str:
         return f"{grid.times} times, {self.per_revolution(grid):.2g} a revolution"
 
     @property
     def revolutions(self) -> float:
-        """Return the revolutions until the latest time: of the reference orbit, or of a circle through the start."""
-        return self._revolutions_until(self.end_s if self.problem.latest_s is None else self.problem.latest_s)
+        """Return the revolutions until the latest time: of the reference orbit, or of a circle
+        through the start.
+        """
+        return self._revolutions_until(
+            self.end_s if self.problem.latest_s is None else self.problem.latest_s
+        )
 
     def per_revolution(self, grid: Grid) -> float:
         """Return the number of times of a grid in a revolution."""
@@ -186,7 +197,10 @@ def report_json(report: Report) -> dict[str, object]:
         "times_s": path.nodes.arrive_s,
         "time_gradient_m2_s4": path.time_gradient,
         "nodes": [_node_json(report, index) for index in range(len(report.names))],
-        "costate0": {"position_m_s3": path.costate_start[:3], "velocity_m_s2": path.costate_start[3:]},
+        "costate0": {
+            "position_m_s3": path.costate_start[:3],
+            "velocity_m_s2": path.costate_start[3:],
+        },
         "peak_control_m_s2": report.peak_m_s2,
         "imposed_bound": _imposed_json(report.imposed),
         "evaluations": report.best.evaluations,
@@ -229,11 +243,17 @@ def _time_search_json(report: Report) -> dict[str, object] | None:
 
 
 def _grid_json(report: Report, grid: Grid) -> dict[str, object]:
-    return {"times": grid.times, "until_s": grid.until_s, "per_revolution": report.per_revolution(grid)}
+    return {
+        "times": grid.times,
+        "until_s": grid.until_s,
+        "per_revolution": report.per_revolution(grid),
+    }
 
 
 def _node_json(report: Report, index: int) -> dict[str, object]:
-    nodes, jump, state = report.path.nodes, report.path.jumps[index], report.path.arrival_states[index]
+    nodes = report.path.nodes
+    jump = report.path.jumps[index]
+    state = report.path.arrival_states[index]
     rendezvous = bool(nodes.rendezvous[index])
     return {
         "name": report.names[index],
@@ -248,8 +268,11 @@ def _node_json(report: Report, index: int) -> dict[str, object]:
 
 
 def trajectories(report: Report) -> str:
-    """Return the trajectories of the chaser and of the targets, as CSV; only the chaser has a control."""
-    times, none = report.times, np.full((len(report.times), 3), np.nan)
+    """Return the trajectories of the chaser and of the targets, as CSV; only the chaser has a
+    control.
+    """
+    times = report.times
+    none = np.full((len(report.times), 3), np.nan)
     tracks: list[tuple[list[str], list[Floats]]] = [
         (["chaser"], [times, report.path.state(times), report.path.control(times)])
     ]
@@ -261,14 +284,24 @@ def trajectories(report: Report) -> str:
 
 def report_lines(report: Report) -> Iterator[Part]:
     """Yield the cost, the visits and the extent of the search, for the screen."""
-    path, nodes = report.path, report.path.nodes
-    yield f"{report.problem.name}: cost I = {path.cost:.8g} m^2/s^3, peak |u| {report.peak_m_s2:.4g} m/s^2"
+    path = report.path
+    nodes = report.path.nodes
+    yield (
+        f"{report.problem.name}: cost I = {path.cost:.8g} m^2/s^3, peak |u| {report.peak_m_s2:.4g} "
+        "m/s^2"
+    )
     yield f"axes: {report.axes_text}"
     if report.best.objective > path.cost:
         yield f"cost including the price of time = {report.best.objective:.8g} m^2/s^3"
     unit, per_s = report.time_unit
     table = number_table(
-        "target", "meet", f"time\n{unit}", "relative speed\nm/s", "dI/dt\nm^2/s^4", "costate jump\nm/s^3", left=2
+        "target",
+        "meet",
+        f"time\n{unit}",
+        "relative speed\nm/s",
+        "dI/dt\nm^2/s^4",
+        "costate jump\nm/s^3",
+        left=2,
     )
     relative = np.linalg.norm(path.arrival_states[:, 3:] - nodes.arrive[:, 3:], axis=1)
     for index, name in enumerate(report.names):
@@ -287,6 +320,14 @@ def report_lines(report: Report) -> Iterator[Part]:
         return
     text = f"{report.best.evaluations} paths computed"
     if report.order_chosen == "best":
-        text += "" if report.best.order_search is not None else f", {report.best.nodes} partial orders examined"
-        text += f", {len(report.best.lost)} left out because no trajectory was found" if report.best.lost else ""
+        text += (
+            ""
+            if report.best.order_search is not None
+            else f", {report.best.nodes} partial orders examined"
+        )
+        text += (
+            f", {len(report.best.lost)} left out because no trajectory was found"
+            if report.best.lost
+            else ""
+        )
     yield "; ".join([text, *report.notes])

@@ -12,7 +12,13 @@ from infoset.experiments.common.screen import BeginProgress
 from infoset.experiments.multipoint.command import Multipoint
 from infoset.experiments.multipoint.file import MultipointProblem
 from infoset.experiments.multipoint.page import multipoint_page
-from infoset.experiments.multipoint.report import ImposedBound, Report, report_json, report_lines, trajectories
+from infoset.experiments.multipoint.report import (
+    ImposedBound,
+    Report,
+    report_json,
+    report_lines,
+    trajectories,
+)
 from infoset.rendezvous.bounded_control import BoundTooSmallError
 from infoset.rendezvous.multipoint import (
     MAX_TARGETS,
@@ -31,13 +37,28 @@ from infoset.rendezvous.piecewise import max_control
 def solve(problem: MultipointProblem, options: Multipoint, begin: BeginProgress) -> Report:
     """Return the path of minimum energy, with the order and the times of the options."""
     times = options.times or ("best" if problem.optimise_times else "given")
-    count, times_s, bound = len(problem.target), problem.times_s, problem.max_control_m_s2
+    count = len(problem.target)
+    times_s = problem.times_s
+    bound = problem.max_control_m_s2
     if options.order == "best" and count > MAX_TARGETS:
-        raise InputError(f"--order best: takes at most {MAX_TARGETS} targets, and {problem.name} has {count}")
+        raise InputError(
+            f"--order best: takes at most {MAX_TARGETS} targets, and {problem.name} has {count}"
+        )
     if times == "given" and times_s is None:
-        raise InputError(f"{problem.name}: --times given: needs time_s of every target; add it, or use --times best")
-    if times == "given" and problem.latest_s is not None and times_s is not None and times_s.max() > problem.latest_s:
-        raise InputError(f"{problem.name}: times.latest_s: is before the last time_s; make it later, or remove it")
+        raise InputError(
+            f"{problem.name}: --times given: needs time_s of every target; add it, or use --times "
+            "best"
+        )
+    if (
+        times == "given"
+        and problem.latest_s is not None
+        and times_s is not None
+        and times_s.max() > problem.latest_s
+    ):
+        raise InputError(
+            f"{problem.name}: times.latest_s: is before the last time_s; make it later, or remove "
+            "it"
+        )
     best = _best(problem, options.order == "best", times == "best", begin("orders and times"))
     peak = max_control(best.path.control, best.path.breaks())
     if bound is None or peak <= bound:
@@ -46,43 +67,58 @@ def solve(problem: MultipointProblem, options: Multipoint, begin: BeginProgress)
     bounded, least = _within_bound(problem, best, peak, bound, times == "best")
     imposed = ImposedBound(bound, least, best.path.cost, peak)
     return Report(
-        problem, options.order, times, bounded, max_control(bounded.path.control, bounded.path.breaks()), imposed
+        problem,
+        options.order,
+        times,
+        bounded,
+        max_control(bounded.path.control, bounded.path.breaks()),
+        imposed,
     )
 
 
 def _within_bound(
     problem: MultipointProblem, best: BestOrder, peak: float, bound: float, times_are_free: bool
 ) -> tuple[BestOrder, float]:
-    """Return the visits with the bound imposed, and the smallest possible bound at the times of `best`."""
-    tour, path = problem.tour, best.path
+    """Return the visits with the bound imposed, and the smallest possible bound at the times of
+    `best`.
+    """
+    tour = problem.tour
+    path = best.path
     key = f"{problem.name}: max_control_m_s2"
     if not (isinstance(tour, Tour) and isinstance(path, LinearPath)):
         raise InputError(
-            f"{key}: the minimum-energy control reaches {peak:.6g} m/s^2, {peak / bound - 1.0:.2%} over the bound of "
-            f"{bound:g} m/s^2, and under the gravity of one point the bound is checked but not imposed; raise it, or "
-            "give the visits more time"
+            f"{key}: the minimum-energy control reaches {peak:.6g} m/s^2, {peak / bound - 1.0:.2%} "
+            f"over the bound of {bound:g} m/s^2, and under the gravity of one point the bound is "
+            "checked but not imposed; raise it, or give the visits more time"
         )
     least = needed_bound(path)
     guesses = [] if problem.times_s is None else [np.sort(problem.times_s)]
     try:
-        return bound_visits(tour, best, bound, problem.limits() if times_are_free else None, guesses), least
+        return bound_visits(
+            tour, best, bound, problem.limits() if times_are_free else None, guesses
+        ), least
     except BoundTooSmallError:
         where = "at the best times without a bound" if times_are_free else "at these times"
         if bound < least:
             raise InputError(
-                f"{key}: no control of at most {bound:g} m/s^2 makes the visits {where}; at least {least:.6g} m/s^2 is "
-                "needed; raise it, or give the visits more time"
+                f"{key}: no control of at most {bound:g} m/s^2 makes the visits {where}; at least "
+                f"{least:.6g} m/s^2 is needed; raise it, or give the visits more time"
             ) from None
         raise InputError(
-            f"{key}: {bound:g} m/s^2 is too close to the smallest possible bound {where}, {least:.6g} m/s^2; raise it "
-            f"to {1.001 * least:.6g} m/s^2, or give the visits more time"
+            f"{key}: {bound:g} m/s^2 is too close to the smallest possible bound {where}, "
+            f"{least:.6g} m/s^2; raise it to {1.001 * least:.6g} m/s^2, or give the visits more "
+            "time"
         ) from None
 
 
 def _best(
-    problem: MultipointProblem, order_is_free: bool, times_are_free: bool, progress: Callable[[float], None]
+    problem: MultipointProblem,
+    order_is_free: bool,
+    times_are_free: bool,
+    progress: Callable[[float], None],
 ) -> BestOrder:
-    tour, order = problem.tour, tuple(range(len(problem.target)))
+    tour = problem.tour
+    order = tuple(range(len(problem.target)))
     guesses = [] if problem.times_s is None else [np.sort(problem.times_s)]
     if order_is_free and times_are_free:
         return best_order(tour, problem.limits(), guesses, progress=progress)
@@ -90,7 +126,9 @@ def _best(
         return best_order_of_slots(tour, guesses[0], progress=progress)
     if times_are_free:
         timed = best_times(tour, order, problem.limits(), guesses, progress=progress)
-        return BestOrder(order, timed.path, timed.objective, 1, timed.evaluations, time_search=timed.search)
+        return BestOrder(
+            order, timed.path, timed.objective, 1, timed.evaluations, time_search=timed.search
+        )
     assert problem.times_s is not None
     path = tour.fly(order, problem.times_s)
     price_per_s = 0.0 if problem.times is None else problem.times.price_per_s

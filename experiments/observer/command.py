@@ -25,9 +25,9 @@ class Errors(Enum):
 class Observe(FileOptions):
     """Compute the sets of states that agree with measurements.
 
-    The linear system is x+ = A x + B u + c + w with w in a set W, and y = C x + v with v within bounds. The sets are
-    exact up to rounding, and contain the true state if w and v are in their sets. The measurements are in a CSV file or
-    in the problem file; otherwise they are simulated.
+    The linear system is x+ = A x + B u + c + w with w in a set W, and y = C x + v with v within
+    bounds. The sets are exact up to rounding, and contain the true state if w and v are in their
+    sets. The measurements are in a CSV file or in the problem file; otherwise they are simulated.
 
     Without --out, --json, --csv or --html no file is written.
     """
@@ -39,28 +39,42 @@ class Observe(FileOptions):
         typer.Option(
             "--data",
             metavar="FILE.csv",
-            help="Measurements: one row for each step, columns y1, y2, .. and u1, u2, ..; an empty cell of y, or NaN, "
-            "is a missing measurement. The u of a row acts after its measurement.",
+            help=(
+                "Measurements: one row for each step, columns y1, y2, .. and u1, u2, ..; an empty "
+                "cell of y, or NaN, is a missing measurement. The u of a row acts after its "
+                "measurement."
+            ),
         ),
     ] = None
     columns: Annotated[
         str,
         typer.Option(
-            "--columns", metavar="NAME=COLUMN,..", help="Columns of --data with other names, for example y1=range_m."
+            "--columns",
+            metavar="NAME=COLUMN,..",
+            help="Columns of --data with other names, for example y1=range_m.",
         ),
     ] = ""
     errors: Annotated[
         Errors,
         typer.Option(
-            "--errors", help="Errors of a simulation: extremal (at a bound, at random) or uniform (within the bounds)."
+            "--errors",
+            help=(
+                "Errors of a simulation: extremal (at a bound, at random) or uniform (within the "
+                "bounds)."
+            ),
         ),
     ] = Errors.EXTREMAL
     seed: Seed = 0
     smooth: Annotated[
-        bool, typer.Option("--smooth", help="Add what later measurements imply about the state of each step.")
+        bool,
+        typer.Option(
+            "--smooth", help="Add what later measurements imply about the state of each step."
+        ),
     ] = False
     csv: Annotated[
         Path | None,
-        typer.Option("--csv", metavar="FILE", help="Write the bounds of each step as CSV; - prints CSV only."),
+        typer.Option(
+            "--csv", metavar="FILE", help="Write the bounds of each step as CSV; - prints CSV only."
+        ),
     ] = None
     html: Html = None

@@ -53,8 +53,11 @@ def data_of(problem: ObserverProblem, options: Observe) -> Data:
 
 def simulate(problem: ObserverProblem, errors: Errors, seed: int) -> Data:
     """Return measurements of a random motion, with errors at their bounds or within them."""
-    generator, system = np.random.default_rng(seed), problem.system
-    a, b, c = np.array(system.A), np.reshape(system.B, (len(system.A), system.inputs)), np.array(system.C)
+    generator = np.random.default_rng(seed)
+    system = problem.system
+    a = np.array(system.A)
+    b = np.reshape(system.B, (len(system.A), system.inputs))
+    c = np.array(system.C)
     inputs = _padded(problem.inputs, problem.simulation.steps, system.inputs)
     states = [_point(problem.initial.shape, errors, generator)]
     for step, u in enumerate(inputs[:-1], start=1):
@@ -62,7 +65,9 @@ def simulate(problem: ObserverProblem, errors: Errors, seed: int) -> Data:
         states.append(a @ states[-1] + b @ u + (system.c or 0.0) + w)
         need_size(f"{problem.name}: simulation, step {step}", states[-1])
     true = np.array(states)
-    measured = true @ c.T + _signs(errors, (len(true), len(c)), generator) * problem.noise.half_width
+    measured = (
+        true @ c.T + _signs(errors, (len(true), len(c)), generator) * problem.noise.half_width
+    )
     measured[[step for step in problem.simulation.missing if step < len(measured)]] = np.nan
     return Data(measured, inputs, true, f"simulated, {errors.value} errors, seed {seed}")
 
@@ -71,7 +76,8 @@ def need_size(where: str, *values: Floats) -> None:
     """Raise an error if a state is too large; NaN is not."""
     if any((np.abs(numbers) > MAX_STATE).any() for numbers in values):
         raise InputError(
-            f"{where}: a state is larger than {MAX_STATE:g}; the system is unstable: correct A, or use fewer steps"
+            f"{where}: a state is larger than {MAX_STATE:g}; the system is unstable: correct A, or "
+            "use fewer steps"
         )
 
 
@@ -85,7 +91,9 @@ def _signs(errors: Errors, shape: tuple[int, ...], generator: np.random.Generato
 def _point(shape: Set, errors: Errors, generator: np.random.Generator) -> Floats:
     """Return a random point of a set: an extreme one for extremal errors."""
     if isinstance(shape, Zonotope):
-        return np.asarray(shape.centre + _signs(errors, (len(shape.generators),), generator) @ shape.generators)
+        return np.asarray(
+            shape.centre + _signs(errors, (len(shape.generators),), generator) @ shape.generators
+        )
     vertices = polytope_of(shape).vertices
     if errors is Errors.EXTREMAL:
         return np.asarray(vertices[generator.integers(len(vertices))])
@@ -101,12 +109,16 @@ def _padded(inputs: Floats | None, steps: int, size: int) -> Floats:
 
 
 def read_csv(file: Path, problem: ObserverProblem, columns: str) -> Data:
-    """Read measurements and inputs from a CSV file with a row for each step; `columns` renames some of its columns.
+    """Read measurements and inputs from a CSV file with a row for each step; `columns` renames some
+    of its columns.
 
     Raise `InputError` if the file cannot be read, a column is missing, or a cell is not a number.
     """
-    outputs, inputs = len(problem.system.C), problem.system.inputs
-    names = [f"y{number}" for number in range(1, outputs + 1)] + [f"u{number}" for number in range(1, inputs + 1)]
+    outputs = len(problem.system.C)
+    inputs = problem.system.inputs
+    names = [f"y{number}" for number in range(1, outputs + 1)] + [
+        f"u{number}" for number in range(1, inputs + 1)
+    ]
     wanted = _renamed(names, columns)
     content = read_input(file, MAX_CSV_BYTES)
     try:
@@ -115,22 +127,30 @@ def read_csv(file: Path, problem: ObserverProblem, columns: str) -> Data:
         raise InputError(f"--data: {file}: is not a CSV file in UTF-8: {error}") from None
     if any(header.count(name) != 1 for name in wanted):
         raise InputError(
-            f"--data: {file}: the header must have each of {','.join(wanted)} once (see --columns); found the header "
-            f"{shown(','.join(header))}"
+            f"--data: {file}: the header must have each of {','.join(wanted)} once (see "
+            f"--columns); found the header {shown(','.join(header))}"
         )
     if not 1 <= len(table) <= MAX_STEPS:
         raise InputError(f"--data: {file}: has {len(table)} steps; 1 to {MAX_STEPS} are possible")
-    places, rows = [header.index(name) for name in wanted], []
+    places = [header.index(name) for name in wanted]
+    rows = []
     for line, cells in enumerate(table, start=2):
         full = cells or [""]  # a file of one column has empty lines
         try:
-            row = [float(full[place].strip() or "nan") for place in places if len(full) == len(header)]
+            row = [
+                float(full[place].strip() or "nan") for place in places if len(full) == len(header)
+            ]
         except ValueError:
             row = []
-        if not row or any(abs(value) > MAXIMUM for value in row) or any(map(math.isnan, row[outputs:])):
+        if (
+            not row
+            or any(abs(value) > MAXIMUM for value in row)
+            or any(map(math.isnan, row[outputs:]))
+        ):
             raise InputError(
-                f"--data: {file}: line {line}: {','.join(wanted)} must be numbers of at most {MAXIMUM:g} in size, "
-                f"with a decimal point, and only measurements may be empty or NaN; found {shown(','.join(cells))}"
+                f"--data: {file}: line {line}: {','.join(wanted)} must be numbers of at most "
+                f"{MAXIMUM:g} in size, with a decimal point, and only measurements may be empty or "
+                f"NaN; found {shown(','.join(cells))}"
             )
         rows.append(row)
     values = np.array(rows)
@@ -138,10 +158,11 @@ def read_csv(file: Path, problem: ObserverProblem, columns: str) -> Data:
 
 
 def _rows(content: bytes, wanted: list[str]) -> list[list[str]]:
-    """Return the cells of a CSV file by row, the header first; commas, semicolons or tabs separate them.
+    """Return the cells of a CSV file by row, the header first; commas, semicolons or tabs separate
+    them.
 
-    The separator is the first one that gives a header with the wanted columns, or a comma. A byte order mark selects
-    UTF-16, as of spreadsheets; without one the file is UTF-8.
+    The separator is the first one that gives a header with the wanted columns, or a comma. A byte
+    order mark selects UTF-16, as of spreadsheets; without one the file is UTF-8.
     """
     is_utf_16 = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     lines = content.decode("utf-16" if is_utf_16 else "utf-8-sig").rstrip(" \r\n").splitlines()
@@ -149,7 +170,9 @@ def _rows(content: bytes, wanted: list[str]) -> list[list[str]]:
     def header_by(separator: str) -> list[str]:
         return [cell.strip() for cell in next(csv.reader(lines[:1], delimiter=separator), [])]
 
-    separator = next((each for each in SEPARATORS if set(wanted) <= set(header_by(each))), SEPARATORS[0])
+    separator = next(
+        (each for each in SEPARATORS if set(wanted) <= set(header_by(each))), SEPARATORS[0]
+    )
     return [header_by(separator), *csv.reader(lines[1:], delimiter=separator)]
 
 
@@ -159,6 +182,8 @@ def _renamed(names: list[str], columns: str) -> list[str]:
     for part in columns.split(",") if columns else ():
         name, _, column = (text.strip() for text in part.partition("="))
         if name not in wanted or not column:
-            raise InputError(f"--columns: {shown(part)}: must be NAME=COLUMN with a name of {', '.join(names)}")
+            raise InputError(
+                f"--columns: {shown(part)}: must be NAME=COLUMN with a name of {', '.join(names)}"
+            )
         wanted[name] = column
     return list(wanted.values())

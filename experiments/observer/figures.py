@@ -29,14 +29,18 @@ _MAX_OUTLINES = 60
 
 
 def draw_all(report: Report) -> Iterator[Figure | None]:
-    """Draw the figures of a report, one after the other; None for the sets of more than two states."""
+    """Draw the figures of a report, one after the other; None for the sets of more than two
+    states.
+    """
     yield draw_bounds(report)
     yield draw_sets(report) if len(report.problem.names) == 2 else None
 
 
 @style()
 def draw_bounds(report: Report) -> Figure:
-    """Draw the bounds of each state and their distance against time, with the true state of a simulation."""
+    """Draw the bounds of each state and their distance against time, with the true state of a
+    simulation.
+    """
     names = report.problem.names
     figure, grid = subplots(30.0 + 38.0 * len(names), len(names), 2, sharex=True)
     time, title = times(report)
@@ -44,7 +48,9 @@ def draw_bounds(report: Report) -> Figure:
     dashed: dict[str, Any] = {"color": MEASURED, "linewidth": 0.9, "linestyle": (0, (4, 1.5))}
     missing = np.isnan(report.data.measured).all(axis=1)
     for index, (name, (panel, width)) in enumerate(zip(map(plain, names), grid, strict=True)):
-        panel.fill_between(time, lower[:, index], upper[:, index], color=SET_FILL, label="possible states")
+        panel.fill_between(
+            time, lower[:, index], upper[:, index], color=SET_FILL, label="possible states"
+        )
         for ends in (lower, upper):
             panel.plot(time, ends[:, index], color=SET_EDGE, linewidth=0.8)
         width.plot(time, upper[:, index] - lower[:, index], color=SET_EDGE)
@@ -53,14 +59,26 @@ def draw_bounds(report: Report) -> Figure:
             for axes, values in ((panel, first), (panel, last), (width, last - first)):
                 axes.plot(time, values, label="with later measurements", **dashed)
         if report.data.states is not None:
-            panel.plot(time, report.data.states[:, index], color=TRUTH, linewidth=1.1, label="true state")
+            panel.plot(
+                time, report.data.states[:, index], color=TRUTH, linewidth=1.1, label="true state"
+            )
         if missing.any():
-            mark: dict[str, Any] = {"color": INK, "linestyle": "none", "marker": "|", "label": "no measurement"}
+            mark: dict[str, Any] = {
+                "color": INK,
+                "linestyle": "none",
+                "marker": "|",
+                "label": "no measurement",
+            }
             low = np.full(missing.sum(), 0.02)
             panel.plot(time[missing], low, transform=panel.get_xaxis_transform(), **mark)
         if report.contradicted:
             empty = time[[estimate.is_empty for estimate in report.estimates]]
-            hatched: dict[str, Any] = {"facecolor": "none", "edgecolor": IMPULSE, "hatch": "////", "alpha": 0.35}
+            hatched: dict[str, Any] = {
+                "facecolor": "none",
+                "edgecolor": IMPULSE,
+                "hatch": "////",
+                "alpha": 0.35,
+            }
             for axes in (panel, width):
                 axes.axvspan(empty[0], time[-1], linewidth=0.0, **hatched)
                 label = f"no state from step {int(report.inconsistency.step)} on"
@@ -79,18 +97,31 @@ def draw_bounds(report: Report) -> Figure:
 
 @style()
 def draw_sets(report: Report) -> Figure:
-    """Draw the sets of two states, the first ones light and the last ones dark, at most 60 of them."""
+    """Draw the sets of two states, the first ones light and the last ones dark, at most 60 of
+    them.
+    """
     figure, ((panel,),) = subplots(115.0)
     shown = [estimate for estimate in report.estimates if not estimate.is_empty]
     shown = shown[:: -(-len(shown) // _MAX_OUTLINES)] if shown else []
     outlines = [estimate.polygons.polygon() for estimate in shown]
     edges = mpl.colormaps["Greys"](np.linspace(0.3, 0.9, len(outlines)))
-    panel.add_collection(PolyCollection(outlines, facecolors=SET_FILL, edgecolors=edges, linewidths=0.8, alpha=0.55))
+    panel.add_collection(
+        PolyCollection(outlines, facecolors=SET_FILL, edgecolors=edges, linewidths=0.8, alpha=0.55)
+    )
     if outlines:
         panel.update_datalim(np.vstack(outlines))
-        panel.set_title(f"possible states, from step {shown[0].step} (light) to step {shown[-1].step} (dark)")
+        panel.set_title(
+            f"possible states, from step {shown[0].step} (light) to step {shown[-1].step} (dark)"
+        )
     if report.data.states is not None:
-        panel.plot(*report.data.states.T, color=TRUTH, marker=".", markersize=3.0, linewidth=0.7, label="true state")
+        panel.plot(
+            *report.data.states.T,
+            color=TRUTH,
+            marker=".",
+            markersize=3.0,
+            linewidth=0.7,
+            label="true state",
+        )
         panel.legend(loc="best")
     panel.autoscale_view()
     panel.set(xlabel=plain(report.problem.names[0]), ylabel=plain(report.problem.names[1]))

@@ -1,4 +1,6 @@
-"""Problem files of kind `observer`: their tables and keys, and the observer of the system they describe."""
+"""Problem files of kind `observer`: their tables and keys, and the observer of the system they
+describe.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,17 @@ from infoset.experiments.observer.command import MAX_STEPS
 from infoset.geometry.convex_polygons import ConvexPolygons
 from infoset.geometry.polytope import Polytope
 from infoset.geometry.zonotope import Zonotope
-from infoset.limits import NOT_NEGATIVE, NUMBER, WHOLE, Description, Limits, Line, Name, Positive, real_values
+from infoset.limits import (
+    NOT_NEGATIVE,
+    NUMBER,
+    WHOLE,
+    Description,
+    Limits,
+    Line,
+    Name,
+    Positive,
+    real_values,
+)
 from infoset.observer.linear_observer import LinearObserver
 from infoset.observer.sets import Set
 
@@ -25,7 +37,9 @@ Rows = tuple[Row, ...]
 
 @dataclass(frozen=True, kw_only=True)
 class SystemTable:
-    """[system]: x+ = A x + B u + c + w, y = C x + v, every `step_s`; `states` are names for figures."""
+    """[system]: x+ = A x + B u + c + w, y = C x + v, every `step_s`; `states` are names for
+    figures.
+    """
 
     A: Rows
     B: Rows = ()
@@ -42,7 +56,9 @@ class SystemTable:
 
 @dataclass(frozen=True)
 class SetTable:
-    """[initial], [disturbance]: a box, a zonotope with a generator a row (times -1 to 1), or a vertex a row."""
+    """[initial], [disturbance]: a box, a zonotope with a generator a row (times -1 to 1), or a
+    vertex a row.
+    """
 
     lower: Row = ()
     upper: Row = ()
@@ -65,7 +81,9 @@ class SetTable:
                 points = real_values("vertices", self.vertices)
                 try:
                     return (
-                        ConvexPolygons.from_points(points) if points.shape[1] == 2 else Polytope.from_vertices(points)
+                        ConvexPolygons.from_points(points)
+                        if points.shape[1] == 2
+                        else Polytope.from_vertices(points)
                     )
                 except ArithmeticError as error:
                     raise ValueError(f"vertices: {error}") from None
@@ -81,7 +99,9 @@ class NoiseTable:
 
 @dataclass(frozen=True)
 class MeasurementTable:
-    """[measurements]: a row of outputs a step, empty if missing, and a row of inputs, which act after them."""
+    """[measurements]: a row of outputs a step, empty if missing, and a row of inputs, which act
+    after them.
+    """
 
     y: Rows = ()
     u: Rows = ()
@@ -89,7 +109,9 @@ class MeasurementTable:
 
 @dataclass(frozen=True)
 class SimulationTable:
-    """[simulation]: number of measurements that are simulated if there are none, and steps without one."""
+    """[simulation]: number of measurements that are simulated if there are none, and steps without
+    one.
+    """
 
     steps: Annotated[int, Limits(minimum=1, maximum=MAX_STEPS, whole=True)] = 30
     missing: tuple[Annotated[int, WHOLE], ...] = ()
@@ -128,14 +150,18 @@ class ObserverProblem:
     def __post_init__(self) -> None:
         states = self.observer().states  # raises ValueError if a matrix or a set is wrong
         if len(self.names) != states:
-            raise ValueError(f"system.states must be {states} names, one for each state: got {len(self.names)}")
+            raise ValueError(
+                f"system.states must be {states} names, one for each state: got {len(self.names)}"
+            )
         _ = self.measured, self.inputs
 
     @cached_property
     def measured(self) -> Floats | None:
         """Measurements of the file, shape (N, q), NaN if missing; None if there are none."""
         missing = (np.nan,) * len(self.system.C)
-        return _series("measurements.y", [row or missing for row in self.measurements.y], len(missing))
+        return _series(
+            "measurements.y", [row or missing for row in self.measurements.y], len(missing)
+        )
 
     @cached_property
     def inputs(self) -> Floats | None:
@@ -145,12 +171,18 @@ class ObserverProblem:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the states."""
-        return self.system.states or tuple(f"x{number}" for number in range(1, len(self.system.A) + 1))
+        return self.system.states or tuple(
+            f"x{number}" for number in range(1, len(self.system.A) + 1)
+        )
 
     @property
     def disturbance_set(self) -> Set:
         """The set of w."""
-        return Zonotope(np.zeros(len(self.names)), []) if self.disturbance is None else self.disturbance.shape
+        return (
+            Zonotope(np.zeros(len(self.names)), [])
+            if self.disturbance is None
+            else self.disturbance.shape
+        )
 
     def observer(self, runs: int | None = None) -> LinearObserver:
         """Return the observer at its initial set; `runs` as in `LinearObserver`."""

@@ -13,7 +13,9 @@ from infoset.observer.linear_observer import MAX_POLYTOPE_STATES, Estimate
 
 
 def _centre(estimate: Estimate) -> Floats | None:
-    """Return the centre of a largest ball in a set; None if it is empty, or its facets are not known."""
+    """Return the centre of a largest ball in a set; None if it is empty, or its facets are not
+    known.
+    """
     if estimate.is_empty or estimate.states > MAX_POLYTOPE_STATES:
         return None
     return estimate.chebyshev_centre()
@@ -22,11 +24,16 @@ def _centre(estimate: Estimate) -> Floats | None:
 def observer_page(report: Report) -> str:
     """Return the page as HTML."""
     time, title = times(report)
-    problem, data = report.problem, report.data
+    problem = report.problem
+    data = report.data
     about = [problem.description] if problem.description else []
-    about.append(f"{len(report.estimates)} steps; {data.origin}. Step with the arrow keys or the slider.")
+    about.append(
+        f"{len(report.estimates)} steps; {data.origin}. Step with the arrow keys or the slider."
+    )
     if report.contradicted:
-        about.append(f"The measurements contradict the model at step {int(report.inconsistency.step)}.")
+        about.append(
+            f"The measurements contradict the model at step {int(report.inconsistency.step)}."
+        )
     bounds = shown_bounds(report.estimates)
     later = None if report.smoothed is None else shown_bounds(report.smoothed)
     content = {
@@ -49,12 +56,16 @@ def observer_page(report: Report) -> str:
                 "smoothed": []
                 if report.smoothed is None or estimate.states != 2
                 else report.smoothed[index].polygons.polygon(),
-                "measured": [None if np.isnan(value) else value for value in data.measured[index].tolist()],
+                "measured": [
+                    None if np.isnan(value) else value for value in data.measured[index].tolist()
+                ],
                 "inputs": data.inputs[index],
                 "state": None if data.states is None else data.states[index],
             }
             for index, estimate in enumerate(report.estimates)
         ],
     }
-    script = (resources.files("infoset.experiments.observer") / "page.js").read_text(encoding="utf-8")
+    script = (resources.files("infoset.experiments.observer") / "page.js").read_text(
+        encoding="utf-8"
+    )
     return page(f"Observer {problem.name}", [], content, script)

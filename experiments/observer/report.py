@@ -23,7 +23,9 @@ _ROUNDING = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """Results of one command; `smoothed` are the sets that use later measurements too, if they are wanted."""
+    """Results of one command; `smoothed` are the sets that use later measurements too, if they are
+    wanted.
+    """
 
     problem: ObserverProblem
     data: Data
@@ -33,7 +35,9 @@ class Report:
 
     @cached_property
     def excess_widths(self) -> Floats | None:
-        """Difference between the widths of the last set and the exact ones, shape (n,); None if it is not reduced."""
+        """Difference between the widths of the last set and the exact ones, shape (n,); None if it
+        is not reduced.
+        """
         last = self.estimates[-1]
         return last.excess_widths() if last.reduced and not last.is_empty else None
 
@@ -55,7 +59,8 @@ def report_json(report: Report) -> dict[str, object]:
     """Return the results for `infoset.experiments.common.output.to_json`."""
     where = report.inconsistency
     steps: list[dict[str, object]] = [
-        {"k": estimate.step, **_bounds(estimate), "empty": bool(estimate.is_empty)} for estimate in report.estimates
+        {"k": estimate.step, **_bounds(estimate), "empty": bool(estimate.is_empty)}
+        for estimate in report.estimates
     ]
     for index, step in enumerate(steps):
         if report.estimates[index].states == 2:
@@ -70,7 +75,11 @@ def report_json(report: Report) -> dict[str, object]:
         "steps": steps,
         "final": _bounds(report.estimates[-1]),
         "excess_widths": report.excess_widths,
-        "inconsistency": {"k": int(where.step), "output": int(where.output) + 1, "excess": float(where.excess)}
+        "inconsistency": {
+            "k": int(where.step),
+            "output": int(where.output) + 1,
+            "excess": float(where.excess),
+        }
         if report.contradicted
         else None,
     }
@@ -78,20 +87,33 @@ def report_json(report: Report) -> dict[str, object]:
 
 def _bounds(estimate: Estimate) -> dict[str, object]:
     """Return the bounds of the states; null for the empty set."""
-    return {end: None if estimate.is_empty else getattr(estimate, end) for end in ("lower", "upper")}
+    return {
+        end: None if estimate.is_empty else getattr(estimate, end) for end in ("lower", "upper")
+    }
 
 
 def report_csv(report: Report) -> str:
     """Return the bounds of each step as CSV; those of an empty set are empty cells."""
     states = range(1, len(report.problem.names) + 1)
-    sets = {"": report.estimates, **({} if report.smoothed is None else {"smoothed_": report.smoothed})}
-    columns = [f"x{state}_{kind}{end}" for kind in sets for state in states for end in ("lower", "upper")]
-    blocks = [bounds_of(sets[kind]).swapaxes(1, 2).reshape(len(report.estimates), -1) for kind in sets]
+    sets = {
+        "": report.estimates,
+        **({} if report.smoothed is None else {"smoothed_": report.smoothed}),
+    }
+    columns = [
+        f"x{state}_{kind}{end}" for kind in sets for state in states for end in ("lower", "upper")
+    ]
+    blocks = [
+        bounds_of(sets[kind]).swapaxes(1, 2).reshape(len(report.estimates), -1) for kind in sets
+    ]
     if report.data.states is not None:
         columns += [f"x{state}" for state in states]
         blocks.append(report.data.states)
     rows: list[list[Cell]] = [
-        [estimate.step, bool(estimate.is_empty), *(None if np.isnan(value) else value for value in row)]
+        [
+            estimate.step,
+            bool(estimate.is_empty),
+            *(None if np.isnan(value) else value for value in row),
+        ]
         for estimate, row in zip(report.estimates, np.hstack(blocks).tolist(), strict=True)
     ]
     return csv_text(["k", "empty", *columns], rows)
@@ -110,7 +132,9 @@ def bounds_of(estimates: Sequence[Estimate]) -> Floats:
 
 
 def shown_bounds(estimates: Sequence[Estimate]) -> Floats:
-    """Return the same to be read: bounds within the rounding errors of the maximum bounds of a state are zero."""
+    """Return the same to be read: bounds within the rounding errors of the maximum bounds of a
+    state are zero.
+    """
     bounds = bounds_of(estimates)
     bounds[np.abs(bounds) < _ROUNDING * np.abs(np.nan_to_num(bounds)).max(axis=(0, 1))] = 0.0
     return bounds
@@ -119,14 +143,20 @@ def shown_bounds(estimates: Sequence[Estimate]) -> Floats:
 def _bounds_table(names: Sequence[str], estimates: Sequence[Estimate]) -> Table:
     """Return a table of the bounds of the last steps."""
     table = number_table("step", *(f"{name}\n{end}" for name in names for end in ("from", "to")))
-    for estimate, ends in list(zip(estimates, shown_bounds(estimates), strict=True))[-_SHOWN_STEPS:]:
-        table.add_row(str(estimate.step), *("empty" if np.isnan(end) else f"{end:.6g}" for end in ends.T.ravel()))
+    for estimate, ends in list(zip(estimates, shown_bounds(estimates), strict=True))[
+        -_SHOWN_STEPS:
+    ]:
+        table.add_row(
+            str(estimate.step),
+            *("empty" if np.isnan(end) else f"{end:.6g}" for end in ends.T.ravel()),
+        )
     return table
 
 
 def report_lines(report: Report) -> Iterator[Part]:
     """Yield the bounds of the last steps and a contradiction, for the screen."""
-    problem, count = report.problem, len(report.estimates)
+    problem = report.problem
+    count = len(report.estimates)
     missing = int(np.isnan(report.data.measured).any(axis=1).sum())
     gaps = f", {missing} with missing measurements" if missing else ""
     yield f"{problem.name}: {len(problem.names)} states, {count} steps{gaps}; {report.data.origin}"
@@ -149,6 +179,7 @@ def report_lines(report: Report) -> Iterator[Part]:
     if report.contradicted:
         where = report.inconsistency
         yield (
-            f"the measurements contradict the model at step {int(where.step)}: no state is possible; the bound of "
-            f"output {int(where.output) + 1} is exceeded by at least {float(where.excess):.6g}"
+            f"the measurements contradict the model at step {int(where.step)}: no state is "
+            f"possible; the bound of output {int(where.output) + 1} is exceeded by at least "
+            f"{float(where.excess):.6g}"
         )

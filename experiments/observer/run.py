@@ -14,8 +14,10 @@ from infoset.experiments.observer.report import Report, report_csv, report_json,
 
 def solve(problem: ObserverProblem, options: Observe, begin: BeginProgress) -> Report:
     """Return the set of each step."""
-    data, progress = data_of(problem, options), begin("sets")
-    observer, estimates = problem.observer(), []
+    data = data_of(problem, options)
+    progress = begin("sets")
+    observer = problem.observer()
+    estimates = []
     try:
         for k, measurement in enumerate(data.measured):
             if k:

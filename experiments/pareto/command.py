@@ -14,10 +14,11 @@ from infoset.experiments.common.options import Csv, FileOptions, Html, ProblemNa
 class Pareto(FileOptions):
     """Find a Pareto-optimal meeting of several craft.
 
-    Pareto-optimal means that no craft can save energy unless another one uses more. Each craft moves with minimum
-    energy. The excess of a craft is its cost minus the cost of its cheapest meeting. The meeting minimizes the group
-    loss, which is the weighted sum of the excesses. Other choices of the meeting and the coalitions are also evaluated.
-    With max_control_m_s2 in the problem, the controls to the meeting stay within this bound at all times.
+    Pareto-optimal means that no craft can save energy unless another one uses more. Each craft
+    moves with minimum energy. The excess of a craft is its cost minus the cost of its cheapest
+    meeting. The meeting minimizes the group loss, which is the weighted sum of the excesses. Other
+    choices of the meeting and the coalitions are also evaluated. With max_control_m_s2 in the
+    problem, the controls to the meeting stay within this bound at all times.
 
     Without --out, --json, --csv or --html no file is written.
 
@@ -30,7 +31,10 @@ class Pareto(FileOptions):
         str | None,
         typer.Option(
             metavar="NAME=VALUE,..",
-            help="Preferred meeting, for example x_m=0,z_m=50. The nearest Pareto-optimal meeting is also evaluated.",
+            help=(
+                "Preferred meeting, for example x_m=0,z_m=50. The nearest Pareto-optimal meeting "
+                "is also evaluated."
+            ),
         ),
     ] = None
     csv: Csv = None

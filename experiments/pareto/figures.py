@@ -1,4 +1,6 @@
-"""Figures of an encounter: trajectories (the figure of the paper), controls, the Pareto set and front."""
+"""Figures of an encounter: trajectories (the figure of the paper), controls, the Pareto set and
+front.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +34,13 @@ from infoset.experiments.common.hill_axes import AXIS_TITLES, component_titles
 from infoset.experiments.common.units import length_unit
 from infoset.experiments.pareto.report import CHOICES, Report
 from infoset.rendezvous.bounded_control import BoundedFlight
-from infoset.rendezvous.pareto import BoundedEncounter, EncounterSolution, Plan, pareto_set, simplex_weights
+from infoset.rendezvous.pareto import (
+    BoundedEncounter,
+    EncounterSolution,
+    Plan,
+    pareto_set,
+    simplex_weights,
+)
 
 _VIEWS: tuple[tuple[int, ...], ...] = ((1, 0), (0, 1, 2), (1, 2), (0, 2))
 """Axes of the panels: three planes, and space in the second one."""
@@ -40,8 +48,19 @@ _POINTS = 241
 _MARKS = 4
 _SET_POINTS = 1200
 _MARKERS = {"min_group_loss": "*", "min_sum_of_costs": "P", "minimax_excess": "X", "preferred": "h"}
-_MEETING: dict[str, Any] = {"label": "meeting", "marker": "*", "markersize": 9.0, "color": INK, "linestyle": "none"}
-_HOLLOW: dict[str, Any] = {"linestyle": "none", "color": "white", "markeredgecolor": INK, "zorder": 5}
+_MEETING: dict[str, Any] = {
+    "label": "meeting",
+    "marker": "*",
+    "markersize": 9.0,
+    "color": INK,
+    "linestyle": "none",
+}
+_HOLLOW: dict[str, Any] = {
+    "linestyle": "none",
+    "color": "white",
+    "markeredgecolor": INK,
+    "zorder": 5,
+}
 _COST = "m$^2$/s$^3$"
 
 
@@ -62,7 +81,9 @@ def draw_all(report: Report) -> Iterator[Figure]:
 
 
 @style()
-def draw_trajectories(solution: EncounterSolution, bounded: BoundedEncounter | None = None) -> Figure:
+def draw_trajectories(
+    solution: EncounterSolution, bounded: BoundedEncounter | None = None
+) -> Figure:
     """Draw the trajectories to the meeting in space and in three planes.
 
     They are those of minimum group loss without a bound on the control, or the `bounded` ones.
@@ -98,10 +119,14 @@ def draw_trajectories(solution: EncounterSolution, bounded: BoundedEncounter | N
 
 @style()
 def draw_controls(report: Report) -> Figure:
-    """Draw the components and the magnitude of the controls against time, with the bound if there is one."""
+    """Draw the components and the magnitude of the controls against time, with the bound if there
+    is one.
+    """
     figure, grid = subplots(120.0, 2, 2, sharex=True)
     panels = [*grid.flat]
-    for index, (name, flight) in enumerate(zip(_names(report.solution), report.flights, strict=True)):
+    for index, (name, flight) in enumerate(
+        zip(_names(report.solution), report.flights, strict=True)
+    ):
         times = flight.times(_POINTS)
         control = flight.control(times)
         for axes, values in zip(panels, (*control.T, np.linalg.norm(control, axis=1)), strict=True):
@@ -122,9 +147,12 @@ def draw_controls(report: Report) -> Figure:
 
 @style()
 def draw_front(report: Report) -> Figure:
-    """Draw the Pareto set with the chosen meetings, the Pareto front, and costs against the duration."""
+    """Draw the Pareto set with the chosen meetings, the Pareto front, and costs against the
+    duration.
+    """
     figure, (panels,) = subplots(105.0, 1, 3)
-    solution, selections = report.solution, report.selections
+    solution = report.solution
+    selections = report.selections
     points = pareto_set(solution, simplex_weights(len(solution.costs), _SET_POINTS))
     _draw_set(panels[0], solution, points, selections)
     _draw_excesses(panels[1], solution, solution.excess(points), selections)
@@ -134,7 +162,9 @@ def draw_front(report: Report) -> Figure:
     return figure
 
 
-def _draw_set(axes: Axes, solution: EncounterSolution, points: Floats, selections: Mapping[str, Floats]) -> None:
+def _draw_set(
+    axes: Axes, solution: EncounterSolution, points: Floats, selections: Mapping[str, Floats]
+) -> None:
     """Draw the set against the first two free components, or against the only one."""
     free = [component.name.lower() for component in solution.encounter.free]
     labels = [f"{name} of the meeting, {'m' if len(name) == 1 else 'm/s'}" for name in free]
@@ -147,14 +177,19 @@ def _draw_set(axes: Axes, solution: EncounterSolution, points: Floats, selection
     if len(solution.costs) > 2 and not flat and (corners := _hull(solution)) is not None:
         axes.fill(corners[:, 0], corners[:, 1], zorder=1, **SET)
     elif len(solution.costs) > 2 and not flat:
-        axes.plot(*positions.T, linestyle="none", marker=".", markersize=2.0, color=SET_FILL, zorder=1)
+        axes.plot(
+            *positions.T, linestyle="none", marker=".", markersize=2.0, color=SET_FILL, zorder=1
+        )
     else:
         axes.plot(*positions[np.argsort(points[:, 0])].T, color=SET_EDGE, zorder=1)
     for index, cost in enumerate(solution.costs):
-        ideal = _look(index, linestyle="none", markersize=4.5, label=f"ideal meeting of {cost.craft.name}")
+        ideal = _look(
+            index, linestyle="none", markersize=4.5, label=f"ideal meeting of {cost.craft.name}"
+        )
         axes.plot(*position(cost.ideal), **ideal)
     for choice, point in selections.items():
-        marker, label = _MARKERS[choice], CHOICES[choice]
+        marker = _MARKERS[choice]
+        label = CHOICES[choice]
         axes.plot(*position(point), marker=marker, markersize=7.0, label=label, **_HOLLOW)
     label_axes(axes, [labels[0], "" if flat else labels[1]])
     if flat:
@@ -162,7 +197,9 @@ def _draw_set(axes: Axes, solution: EncounterSolution, points: Floats, selection
 
 
 def _hull(solution: EncounterSolution) -> Floats | None:
-    """Return the convex hull of the ideal meetings in the first two free components; None if it has no area."""
+    """Return the convex hull of the ideal meetings in the first two free components; None if it has
+    no area.
+    """
     if not solution.same_matrix:
         return None
     ideals = solution.ideals[:, :2]
@@ -172,8 +209,12 @@ def _hull(solution: EncounterSolution) -> Floats | None:
         return None
 
 
-def _draw_excesses(axes: Axes, solution: EncounterSolution, excess: Floats, selections: Mapping[str, Floats]) -> None:
-    """Draw the front of two or three craft, the third as a colour, or the ranges of the excesses of other numbers."""
+def _draw_excesses(
+    axes: Axes, solution: EncounterSolution, excess: Floats, selections: Mapping[str, Floats]
+) -> None:
+    """Draw the front of two or three craft, the third as a colour, or the ranges of the excesses of
+    other numbers.
+    """
     names = _names(solution)
     chosen = {choice: solution.excess(point) for choice, point in selections.items()}
     if len(names) not in (2, 3):
@@ -187,13 +228,19 @@ def _draw_excesses(axes: Axes, solution: EncounterSolution, excess: Floats, sele
     shown = _widest_pair(excess)
     if len(names) == 3:
         (third,) = {0, 1, 2} - set(shown)
-        shade = axes.scatter(excess[:, shown[0]], excess[:, shown[1]], c=excess[:, third], s=4.0, cmap="cividis")
-        axes.figure.colorbar(shade, ax=axes, location="top", label=f"$e$ of {names[third]}, {_COST}")
+        shade = axes.scatter(
+            excess[:, shown[0]], excess[:, shown[1]], c=excess[:, third], s=4.0, cmap="cividis"
+        )
+        axes.figure.colorbar(
+            shade, ax=axes, location="top", label=f"$e$ of {names[third]}, {_COST}"
+        )
     else:
         axes.plot(excess[:, 0], excess[:, 1], color=SET_EDGE)
     for choice, values in chosen.items():
         axes.plot(*values[list(shown)], marker=_MARKERS[choice], markersize=7.0, **_HOLLOW)
-    label_axes(axes, [f"excess $e$ of {name}, {_COST}" for name in (names[index] for index in shown)])
+    label_axes(
+        axes, [f"excess $e$ of {name}, {_COST}" for name in (names[index] for index in shown)]
+    )
 
 
 def _widest_pair(excess: Floats) -> tuple[int, int]:
@@ -210,6 +257,8 @@ def _draw_sweep(axes: Axes, report: Report) -> None:
         axes.plot(times_s, costs[:, index], **_look(index, marker="none", label=f"$J^2$ of {name}"))
     losses = [solution.group_loss() for solution in report.sweep]
     axes.plot(times_s, losses, color=LIMIT, linewidth=2.0, label="group loss")
-    axes.axvline(report.solution.encounter.meeting_s, label="time of the meeting in (a) and (b)", **EVENT)
+    axes.axvline(
+        report.solution.encounter.meeting_s, label="time of the meeting in (a) and (b)", **EVENT
+    )
     axes.set(yscale="log", xlabel="time of the meeting, s", ylabel=f"$J^2$ and group loss, {_COST}")
     axes.margins(x=0.0)

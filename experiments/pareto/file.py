@@ -1,4 +1,6 @@
-"""Problem files of kind `pareto-encounter`: their tables and keys, and the encounter they describe."""
+"""Problem files of kind `pareto-encounter`: their tables and keys, and the encounter they
+describe.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,9 @@ Vector = Annotated[tuple[float, float, float], NUMBER]
 
 @dataclass(frozen=True)
 class TerminalTable:
-    """[terminal]: the components of the meeting that are not free, in the axes of `ParetoProblem`."""
+    """[terminal]: the components of the meeting that are not free, in the axes of
+    `ParetoProblem`.
+    """
 
     x_m: Number = 0.0
     y_m: Number = 0.0
@@ -46,7 +50,8 @@ class CraftTable:
 
 @dataclass(frozen=True, kw_only=True)
 class ParetoProblem:
-    """A problem file of kind `pareto-encounter`. Axes: x radially outward, y along the motion, z along the normal.
+    """A problem file of kind `pareto-encounter`. Axes: x radially outward, y along the motion, z
+    along the normal.
 
     Parameters
     ----------
@@ -84,7 +89,9 @@ class ParetoProblem:
         check_angle("duration_s", self.duration_s, self.orbit_rate_rad_s)
         for name in self.free:
             if getattr(self.terminal, TERMINAL[name]) != 0.0:
-                raise ValueError(f"terminal.{TERMINAL[name]}: must be left out, because free lists {name}")
+                raise ValueError(
+                    f"terminal.{TERMINAL[name]}: must be left out, because free lists {name}"
+                )
         _ = self.encounter  # raises ValueError if the meeting or a craft is wrong
 
     @cached_property
@@ -92,7 +99,13 @@ class ParetoProblem:
         """The encounter that is solved."""
         motion = ClohessyWiltshire(self.orbit_rate_rad_s)
         craft = tuple(
-            Craft(each.name, np.array(each.position_m + each.velocity_m_s), motion, each.weight, each.start_s)
+            Craft(
+                each.name,
+                np.array(each.position_m + each.velocity_m_s),
+                motion,
+                each.weight,
+                each.start_s,
+            )
             for each in self.craft
         )
         free = tuple(Component[name.upper()] for name in self.free)

@@ -1,6 +1,7 @@
 """Barseghyan and Stepanyan (2008): the encounter of three craft.
 
-Printed numbers, and those compared with them, are in the paper's axes; the problem and its solution are in Hill's.
+Printed numbers, and those compared with them, are in the paper's axes; the problem and its solution
+are in Hill's.
 """
 
 from __future__ import annotations
@@ -37,7 +38,8 @@ def compute(_progress: Progress) -> dict[str, Sequence[float]]:
 
 def results(solution: EncounterSolution, paper: Paper) -> dict[str, Sequence[float]]:
     """Return our numbers of a solution by source."""
-    # The problem frees x (beta) and z (alpha), in this order; (3.1) has alpha^2, alpha, beta^2, beta and 1.
+    # The problem frees x (beta) and z (alpha), in this order; (3.1) has alpha^2, alpha, beta^2,
+    # beta and 1.
     quadratics = []
     for cost in solution.costs:
         slope = -2.0 * cost.matrix @ cost.ideal
@@ -46,7 +48,11 @@ def results(solution: EncounterSolution, paper: Paper) -> dict[str, Sequence[flo
     ideal = [cost.ideal_cost_squared for cost in solution.costs]
     norm = np.sum(quadratics, axis=0)
     norm[-1] -= sum(ideal)
-    positions = [to_paper(solution.plan(craft).state(time_s))[:3] for time_s in _TIMES_S for craft in range(3)]
+    positions = [
+        to_paper(solution.plan(craft).state(time_s))[:3]
+        for time_s in _TIMES_S
+        for craft in range(3)
+    ]
     return {
         "(3.1)": np.ravel(quadratics).tolist(),
         "(3.2)": norm.tolist(),
@@ -60,7 +66,8 @@ def results(solution: EncounterSolution, paper: Paper) -> dict[str, Sequence[flo
 
 
 def _fitted(solution: EncounterSolution, numbers: Sequence[PrintedNumber]) -> list[float]:
-    """Return coefficients fitted over two orbits: in the 30 s of the flight the terms are nearly dependent.
+    """Return coefficients fitted over two orbits: in the 30 s of the flight the terms are nearly
+    dependent.
 
     The name of a number is ``CRAFT, QUANTITY, TERM``.
     """
@@ -72,7 +79,9 @@ def _fitted(solution: EncounterSolution, numbers: Sequence[PrintedNumber]) -> li
     for (craft, quantity), members in groupby(numbers, lambda number: number.name.split(", ")[:2]):
         basis = np.stack([known[number.name.split(", ")[2]] for number in members], axis=1)
         sampled = Plan.control if quantity.startswith("u") else Plan.state
-        values = to_paper(sampled(solution.plan(_CRAFT.index(craft)), times))[:, _COMPONENTS[quantity]]
+        values = to_paper(sampled(solution.plan(_CRAFT.index(craft)), times))[
+            :, _COMPONENTS[quantity]
+        ]
         size = np.abs(basis).max(axis=0)
         found += (np.linalg.lstsq(basis / size, values, rcond=None)[0] / size).tolist()
     return found

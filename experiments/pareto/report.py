@@ -41,8 +41,8 @@ _ZERO = 1e-9
 class ImposedBound:
     """The meeting with a bound on the control that a minimum-energy control without it exceeds.
 
-    `least_m_s2` is the smallest bound with which any meeting is possible, and `peaks_without_m_s2` are the maximum
-    controls to the meeting without the bound.
+    `least_m_s2` is the smallest bound with which any meeting is possible, and `peaks_without_m_s2`
+    are the maximum controls to the meeting without the bound.
     """
 
     encounter: BoundedEncounter
@@ -54,10 +54,11 @@ class ImposedBound:
 class Report:
     """Results of one command.
 
-    `solution`, `selections`, `coalitions` and `sweep` do not depend on a bound on the control; the meeting, its
-    costs and its flights do. `selections` are Pareto-optimal meetings, shape (f,), by the rule of their choice. There
-    are no `coalitions` if there are too many craft, and there is no `imposed` bound if the problem has none, or it
-    changes nothing. `sweep` has other times of the meeting.
+    `solution`, `selections`, `coalitions` and `sweep` do not depend on a bound on the control; the
+    meeting, its costs and its flights do. `selections` are Pareto-optimal meetings, shape (f,), by
+    the rule of their choice. There are no `coalitions` if there are too many craft, and there is no
+    `imposed` bound if the problem has none, or it changes nothing. `sweep` has other times of the
+    meeting.
     """
 
     problem: ParetoProblem
@@ -82,7 +83,11 @@ class Report:
     @cached_property
     def cost_squared(self) -> Floats:
         """J_i^2 of the flights, m^2/s^3, shape (n,)."""
-        return self.solution.cost_squared() if self.imposed is None else self.imposed.encounter.cost_squared
+        return (
+            self.solution.cost_squared()
+            if self.imposed is None
+            else self.imposed.encounter.cost_squared
+        )
 
     @cached_property
     def excess(self) -> Floats:
@@ -110,7 +115,8 @@ class Report:
 
 def report_json(report: Report) -> dict[str, object]:
     """Return the results for `infoset.experiments.common.output.to_json`."""
-    solution, encounter = report.solution, report.problem.encounter
+    solution = report.solution
+    encounter = report.problem.encounter
     return {
         "units": {
             "axes": AXES,
@@ -141,14 +147,22 @@ def report_json(report: Report) -> dict[str, object]:
             "meeting_time_s": [other.encounter.meeting_s for other in report.sweep],
             "group_loss_m2_s3": [other.group_loss() for other in report.sweep],
             "cost_squared_m2_s3": [other.cost_squared() for other in report.sweep],
-            "ideal_cost_squared_m2_s3": [[cost.ideal_cost_squared for cost in other.costs] for other in report.sweep],
+            "ideal_cost_squared_m2_s3": [
+                [cost.ideal_cost_squared for cost in other.costs] for other in report.sweep
+            ],
         },
     }
 
 
 def _named_state(solution: EncounterSolution, point: Floats) -> dict[str, float]:
     """Return the common components of a meeting by name; of an intercept, only the position."""
-    return dict(zip(TERMINAL.values(), solution.meeting_state(point)[: solution.encounter.common], strict=False))
+    return dict(
+        zip(
+            TERMINAL.values(),
+            solution.meeting_state(point)[: solution.encounter.common],
+            strict=False,
+        )
+    )
 
 
 def _craft_json(report: Report, index: int) -> dict[str, object]:
@@ -168,7 +182,8 @@ def _craft_json(report: Report, index: int) -> dict[str, object]:
 
 
 def _imposed_json(report: Report) -> dict[str, object] | None:
-    imposed, solution = report.imposed, report.solution
+    imposed = report.imposed
+    solution = report.solution
     if imposed is None:
         return None
     return {
@@ -212,24 +227,33 @@ def trajectories(report: Report) -> str:
 
 def imposed_text(report: Report, imposed: ImposedBound) -> str:
     """Return what the bound changes, and which results do not depend on it."""
-    peak, bound = max(imposed.peaks_without_m_s2), imposed.encounter.max_m_s2
+    peak = max(imposed.peaks_without_m_s2)
+    bound = imposed.encounter.max_m_s2
     return (
-        f"the bound of {bound:g} m/s^2 is imposed: without it the controls reach {peak:.4g} m/s^2, and the group loss "
-        f"is {float(report.solution.group_loss()):.6g} in place of {report.group_loss:.6g} m^2/s^3; the "
-        f"smallest possible bound is {imposed.least_m_s2:.6g} m/s^2. Ideals, choices, coalitions and other meeting "
-        "times are without the bound"
+        f"the bound of {bound:g} m/s^2 is imposed: without it the controls reach {peak:.4g} m/s^2, "
+        f"and the group loss is {float(report.solution.group_loss()):.6g} in place of "
+        f"{report.group_loss:.6g} m^2/s^3; the smallest possible bound is {imposed.least_m_s2:.6g} "
+        "m/s^2. Ideals, choices, coalitions and other meeting times are without the bound"
     )
 
 
 def report_lines(report: Report) -> Iterator[Part]:
     """Yield the meeting, the costs, the choices and the coalitions, for the screen."""
-    solution, encounter = report.solution, report.problem.encounter
+    solution = report.solution
+    encounter = report.problem.encounter
     names = [cost.craft.name for cost in solution.costs]
-    meeting = ", ".join(f"{key} = {value:.6g}" for key, value in _named_state(solution, report.point).items())
+    meeting = ", ".join(
+        f"{key} = {value:.6g}" for key, value in _named_state(solution, report.point).items()
+    )
     yield f"{report.problem.name}: {encounter.meeting.value} at {encounter.meeting_s:g} s: {meeting}"
     yield f"axes: {AXES}"
     table = number_table(
-        "craft", "ideal J*^2\nm^2/s^3", "J^2\nm^2/s^3", "excess\nm^2/s^3", "impulse\nm/s", "peak |u|\nm/s^2"
+        "craft",
+        "ideal J*^2\nm^2/s^3",
+        "J^2\nm^2/s^3",
+        "excess\nm^2/s^3",
+        "impulse\nm/s",
+        "peak |u|\nm/s^2",
     )
     ideal = [cost.ideal_cost_squared for cost in solution.costs]
     columns = (ideal, report.cost_squared, report.excess, report.impulses_m_s, report.peaks_m_s2)

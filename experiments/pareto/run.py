@@ -13,7 +13,13 @@ from infoset.experiments.common.screen import BeginProgress
 from infoset.experiments.pareto.command import Pareto
 from infoset.experiments.pareto.file import TERMINAL, ParetoProblem
 from infoset.experiments.pareto.page import pareto_page
-from infoset.experiments.pareto.report import ImposedBound, Report, report_json, report_lines, trajectories
+from infoset.experiments.pareto.report import (
+    ImposedBound,
+    Report,
+    report_json,
+    report_lines,
+    trajectories,
+)
 from infoset.limits import MAXIMUM
 from infoset.rendezvous.bounded_control import BoundTooSmallError
 from infoset.rendezvous.pareto import (
@@ -30,13 +36,16 @@ from infoset.rendezvous.pareto import (
 from infoset.rendezvous.pareto.coalitions import MAX_CRAFT
 
 SWEEP = (0.5, 2.0, 31)
-"""Smallest and largest duration of the sweep, relative to the duration of the problem, and their number."""
+"""Smallest and largest duration of the sweep, relative to the duration of the problem, and their
+number.
+"""
 
 
 def solve(problem: ParetoProblem, options: Pareto, begin: BeginProgress) -> Report:
     """Return the meetings, their costs, the coalitions and the costs of other durations."""
     preferred = None if options.prefer is None else _preferred(options.prefer, problem)
-    encounter, progress = problem.encounter, begin("meetings and coalitions")
+    encounter = problem.encounter
+    progress = begin("meetings and coalitions")
     solution = solve_encounter(encounter)
     selections = {
         "min_group_loss": solution.point,
@@ -70,18 +79,23 @@ def _preferred(text: str, problem: ParetoProblem) -> Floats:
     except ValueError:
         values = {}
     # A NaN is not within the limit.
-    if sorted(values) != sorted(keys) or not all(abs(value) <= MAXIMUM for value in values.values()):
+    if sorted(values) != sorted(keys) or not all(
+        abs(value) <= MAXIMUM for value in values.values()
+    ):
         example = ",".join(f"{key}=0" for key in keys)
         raise InputError(
-            f"--prefer: must be a finite number for each free component, found {shown(text)}; for example "
-            f"--prefer {example}"
+            f"--prefer: must be a finite number for each free component, found {shown(text)}; for "
+            f"example --prefer {example}"
         )
     return np.array([values[key] for key in keys])
 
 
 def _imposed(problem: ParetoProblem, solution: EncounterSolution) -> ImposedBound | None:
-    """Return the meeting with the bound; None if there is none, or the minimum-energy controls keep it."""
-    bound, encounter = problem.max_control_m_s2, problem.encounter
+    """Return the meeting with the bound; None if there is none, or the minimum-energy controls keep
+    it.
+    """
+    bound = problem.max_control_m_s2
+    encounter = problem.encounter
     if bound is None:
         return None
     peaks = [peak_control(flight) for flight in solution.plans()]
@@ -92,16 +106,16 @@ def _imposed(problem: ParetoProblem, solution: EncounterSolution) -> ImposedBoun
     if bound < least.value_m_s2:
         names = " and ".join(encounter.craft[index].name for index in least.craft)
         raise InputError(
-            f"{key}: no meeting is possible with controls of at most {bound:g} m/s^2; {names} need at least "
-            f"{least.value_m_s2:.6g} m/s^2, {least.value_m_s2 / bound:.4g} times the bound; raise it, or make "
-            "duration_s longer"
+            f"{key}: no meeting is possible with controls of at most {bound:g} m/s^2; {names} need "
+            f"at least {least.value_m_s2:.6g} m/s^2, {least.value_m_s2 / bound:.4g} times the "
+            "bound; raise it, or make duration_s longer"
         )
     try:
         return ImposedBound(bound_encounter(solution, bound), least.value_m_s2, tuple(peaks))
     except BoundTooSmallError as error:
         raise InputError(
-            f"{key}: {error}; the smallest bound with which a meeting is possible is {least.value_m_s2:.6g} m/s^2; "
-            "raise it, or make duration_s longer"
+            f"{key}: {error}; the smallest bound with which a meeting is possible is "
+            f"{least.value_m_s2:.6g} m/s^2; raise it, or make duration_s longer"
         ) from None
 
 

@@ -1,4 +1,6 @@
-"""Figures of the pursuit-evasion game: orbits, relative motion, thrust, distance against duration, feedback."""
+"""Figures of the pursuit-evasion game: orbits, relative motion, thrust, distance against duration,
+feedback.
+"""
 
 from __future__ import annotations
 
@@ -48,7 +50,8 @@ _ARROWS, _ARROW_LENGTH, _MIN_HEIGHT = 14, 0.17, 0.15
 
 def draw_all(report: Report) -> Iterator[Figure | None]:
     """Draw the figures of a report, one after the other; None is a figure without results."""
-    solution, feedback = report.solution, report.feedback
+    solution = report.solution
+    feedback = report.feedback
     sampled = None if solution.capture is None else history(solution)
     for draw in (draw_orbits, draw_relative, draw_control):
         yield None if sampled is None else draw(sampled)
@@ -62,19 +65,27 @@ def draw_orbits(sampled: History) -> Figure:
     size_m = float(np.abs(sampled.pursuer.position_m).max())
     unit, per_m = length_unit(size_m)
     figure = new_figure(100.0)
-    panels = figure.subplot_mosaic("ab", width_ratios=[1.0, 1.3], per_subplot_kw={"b": {"projection": "3d"}})
+    panels = figure.subplot_mosaic(
+        "ab", width_ratios=[1.0, 1.3], per_subplot_kw={"b": {"projection": "3d"}}
+    )
     flat = panels["a"]
     space: Any = panels["b"]
     # The pursuer's path stays visible where the evader's dashes cover it.
-    for player, look in ((sampled.pursuer, {"linewidth": 2.8, **PURSUER}), (sampled.evader, EVADER)):
+    for player, look in (
+        (sampled.pursuer, {"linewidth": 2.8, **PURSUER}),
+        (sampled.evader, EVADER),
+    ):
         _draw_path(space, flat, player, per_m, look)
     end = sampled.evader.position_m[-1] * per_m
     for axes, point in ((space, end), (flat, end[:2])):
         axes.plot(*point[:, None], label="capture", **_STAR)
-    flat.plot(0.0, 0.0, marker="+", color=LIMIT, markersize=7.0, linestyle="none", label="planet's centre")
+    flat.plot(
+        0.0, 0.0, marker="+", color=LIMIT, markersize=7.0, linestyle="none", label="planet's centre"
+    )
     flat.set_aspect("equal", adjustable="datalim")
     low, high = space.get_zlim()
-    middle, half = 0.5 * (low + high), max(0.5 * (high - low), _MIN_HEIGHT * size_m * per_m)
+    middle = 0.5 * (low + high)
+    half = max(0.5 * (high - low), _MIN_HEIGHT * size_m * per_m)
     titles = [f"{title}, {unit}" for title in INERTIAL_TITLES]
     label_axes(space, titles)
     label_axes(flat, titles[:2])
@@ -93,7 +104,8 @@ def draw_relative(sampled: History) -> Figure:
     offset = sampled.pursuer.position_m - evader.position_m
     relative = np.einsum("nij,nj->ni", orbital_axes(evader.position_m, evader.velocity_m_s), offset)
     length, per_m = length_unit(float(np.abs(relative).max()))
-    offset, relative = offset * per_m, relative * per_m
+    offset = offset * per_m
+    relative = relative * per_m
     figure, (panels,) = subplots(75.0, 1, 3)
     for axes, column in zip(panels, (0, 2), strict=False):
         axes.plot(relative[:, 1], relative[:, column], **PURSUER)
@@ -111,17 +123,25 @@ def draw_relative(sampled: History) -> Figure:
 
 @style()
 def draw_control(sampled: History) -> Figure:
-    """Draw the thrust directions in the orbital frame of each craft, and the switching functions."""
+    """Draw the thrust directions in the orbital frame of each craft, and the switching
+    functions.
+    """
     time, unit = _times(sampled.time_s)
     figure, (panels,) = subplots(75.0, 1, 3)
     for player, look in ((sampled.pursuer, PURSUER), (sampled.evader, EVADER)):
         if player.thrust_direction.any():
             in_plane, out_of_plane = np.degrees(thrust_angles(player)).T
-            for axes, values in zip(panels, (in_plane, out_of_plane, player.switching), strict=True):
+            for axes, values in zip(
+                panels, (in_plane, out_of_plane, player.switching), strict=True
+            ):
                 axes.plot(time, values, **look)
     panels[0].yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1.0, 1.5, 3.0, 4.5, 9.0, 10.0]))
     panels[2].set_ylim(bottom=0.0)
-    labels = ("from along-track to radial, deg", "out of plane, deg", "switching function / first value")
+    labels = (
+        "from along-track to radial, deg",
+        "out of plane, deg",
+        "switching function / first value",
+    )
     for axes, label in zip(panels, labels, strict=True):
         axes.set(xlabel=f"time, {unit}", ylabel=label)
     letters(panels, ["thrust in the plane", "thrust out of plane", "full thrust if positive"])
@@ -131,7 +151,8 @@ def draw_control(sampled: History) -> Figure:
 
 @style()
 def draw_distance(solution: Solution) -> Figure:
-    """Draw the distance that the evader can keep against the duration, and the curvature that certifies it.
+    """Draw the distance that the evader can keep against the duration, and the curvature that
+    certifies it.
 
     Parameters
     ----------
@@ -142,7 +163,9 @@ def draw_distance(solution: Solution) -> Figure:
     time, unit = _times(curve.duration_s)
     radius = solution.game.capture_radius_m / M_PER_KM
     figure, (panels,) = subplots(75.0, 1, 2)
-    for axes, values in zip(panels, (curve.distance_m / M_PER_KM, curve.min_curvature), strict=True):
+    for axes, values in zip(
+        panels, (curve.distance_m / M_PER_KM, curve.min_curvature), strict=True
+    ):
         axes.plot(time, values, marker="o", markersize=2.2, color=TRUTH)
         axes.set_xlabel(f"duration $T$, {unit}")
     panels[0].axhline(radius, label="capture radius", **BOUND)
@@ -159,15 +182,21 @@ def draw_distance(solution: Solution) -> Figure:
 
 @style()
 def draw_feedback(solution: Solution, flights: Sequence[Flight]) -> Figure:
-    """Draw the capture times that the plans predict, and the distance, or the capture times of several simulations."""
+    """Draw the capture times that the plans predict, and the distance, or the capture times of
+    several simulations.
+    """
     figure, (panels,) = subplots(75.0, 1, 2)
     left, right = panels
-    look: dict[str, Any] = {"linewidth": 0.6, "alpha": 0.5} if len(flights) > 1 else {"marker": "o", "markersize": 2.0}
+    look: dict[str, Any] = (
+        {"linewidth": 0.6, "alpha": 0.5} if len(flights) > 1 else {"marker": "o", "markersize": 2.0}
+    )
     unit, per_s = time_unit(float(np.ptp(flights[0].planned_s)))
     for flight in flights[:100]:
         left.plot(flight.planned_s * per_s, flight.predicted_s * per_s, color=TRUTH, **look)
     if solution.capture is not None:
-        left.axhline(solution.capture.time_s * per_s, label="capture if both players are optimal", **BOUND)
+        left.axhline(
+            solution.capture.time_s * per_s, label="capture if both players are optimal", **BOUND
+        )
     left.set(xlabel=f"time of the plan, {unit}", ylabel=f"predicted capture, {unit}")
     if len(flights) == 1:
         (flight,) = flights
@@ -177,19 +206,28 @@ def draw_feedback(solution: Solution, flights: Sequence[Flight]) -> Figure:
         right.set_ylim(bottom=0.0)
         title = f"{flight.ended.value} at {flight.time_s:.1f} s"
     else:
-        times = np.sort([flight.time_s for flight in flights if flight.ended is Ended.CAPTURED]) * per_s
+        times = (
+            np.sort([flight.time_s for flight in flights if flight.ended is Ended.CAPTURED]) * per_s
+        )
         if len(times):
-            right.step(times, np.arange(1, len(times) + 1) / len(flights), where="post", color=TRUTH)
-        right.set(xlabel=f"capture time, {unit}", ylabel="share of simulations captured", ylim=(0.0, 1.02))
+            right.step(
+                times, np.arange(1, len(times) + 1) / len(flights), where="post", color=TRUTH
+            )
+        right.set(
+            xlabel=f"capture time, {unit}", ylabel="share of simulations captured", ylim=(0.0, 1.02)
+        )
         title = f"{len(times)} of {len(flights)} captured"
     letters(panels, ["predictions", title])
     legend_below(figure, 1)
     return figure
 
 
-def _draw_path(space: Any, flat: Axes, player: PlayerHistory, per_m: float, look: dict[str, Any]) -> None:
+def _draw_path(
+    space: Any, flat: Axes, player: PlayerHistory, per_m: float, look: dict[str, Any]
+) -> None:
     """Draw a path with its start and its thrust in both views."""
-    r, colour = player.position_m * per_m, look["color"]
+    r = player.position_m * per_m
+    colour = look["color"]
     for axes, points in ((space, r), (flat, r[:, :2])):
         axes.plot(*points.T, **look)
         axes.plot(*points[0][:, None], color=colour, **_START)
@@ -198,7 +236,13 @@ def _draw_path(space: Any, flat: Axes, player: PlayerHistory, per_m: float, look
     shown = np.linspace(0, len(r) - 1, _ARROWS).astype(int)
     r, u = r[shown], _ARROW_LENGTH * float(np.abs(r[:, :2]).max()) * player.thrust_direction[shown]
     space.quiver(*r.T, *u.T, color=colour, linewidth=0.9, arrow_length_ratio=0.25)
-    arrow: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.005, "headwidth": 4.0}
+    arrow: dict[str, Any] = {
+        "angles": "xy",
+        "scale_units": "xy",
+        "scale": 1.0,
+        "width": 0.005,
+        "headwidth": 4.0,
+    }
     flat.quiver(*r[:, :2].T, *u[:, :2].T, color=colour, **arrow)
     flat.update_datalim(r[:, :2] + u[:, :2])
 

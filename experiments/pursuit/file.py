@@ -47,17 +47,21 @@ class Craft:
             start = self.state.position_m, self.state.velocity_m_s
         else:
             assert self.orbit is not None
-            (x, y, z), (vx, vy, vz) = (vector.tolist() for vector in self.orbit.state(gravitational_parameter_m3_s2))
+            (x, y, z), (vx, vy, vz) = (
+                vector.tolist() for vector in self.orbit.state(gravitational_parameter_m3_s2)
+            )
             start = (x, y, z), (vx, vy, vz)
-        return Player(*start, self.mass_kg, self.dry_mass_kg, self.thrust_N, self.specific_impulse_s)
+        return Player(
+            *start, self.mass_kg, self.dry_mass_kg, self.thrust_N, self.specific_impulse_s
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
 class PursuitProblem:
     """A pursuer that minimizes the time of capture, and an evader that maximizes it.
 
-    A capture is a distance of `capture_radius_m`, zero for the same point. Games up to `longest_s` are considered; None
-    is the default of `Game`.
+    A capture is a distance of `capture_radius_m`, zero for the same point. Games up to `longest_s`
+    are considered; None is the default of `Game`.
     """
 
     kind: ClassVar[str] = "pursuit-evasion"
@@ -77,6 +81,8 @@ class PursuitProblem:
     @cached_property
     def game(self) -> Game:
         """The game that is solved."""
-        pursuer, evader = (craft.player(self.gravity.parameter_m3_s2) for craft in (self.pursuer, self.evader))
+        pursuer, evader = (
+            craft.player(self.gravity.parameter_m3_s2) for craft in (self.pursuer, self.evader)
+        )
         longest_s = math.inf if self.longest_s is None else self.longest_s
         return Game(self.gravity, pursuer, evader, self.capture_radius_m, longest_s)

@@ -26,7 +26,9 @@ Masked = np.ma.MaskedArray[tuple[int, ...], np.dtype[np.float64]]
 
 MAX_POINTS = 100_000
 RATIOS = ("phase_deg", "thrust_ratio")
-"""Parameters besides the keys of a file: lead of the evader in true longitude, its thrust by the pursuer's."""
+"""Parameters besides the keys of a file: lead of the evader in true longitude, its thrust by the
+pursuer's.
+"""
 NO_GAME = "no-game"
 """Verdict of parameters that define no game, for example equal positions."""
 
@@ -41,7 +43,9 @@ class Axis:
 
 @dataclass(frozen=True)
 class MapReport:
-    """Results of one command, shape (rows, columns); times and closing speeds are masked without a capture."""
+    """Results of one command, shape (rows, columns); times and closing speeds are masked without a
+    capture.
+    """
 
     problem: PursuitProblem
     x: Axis
@@ -54,28 +58,44 @@ class MapReport:
     def summary(self) -> str:
         """The number of points of each verdict."""
         counts = Counter(self.verdict.ravel().tolist()).most_common()
-        return f"{self.verdict.size} points: {', '.join(f'{count} {verdict}' for verdict, count in counts)}"
+        return (
+            f"{self.verdict.size} points: "
+            f"{', '.join(f'{count} {verdict}' for verdict, count in counts)}"
+        )
 
 
 def solve_map(problem: PursuitProblem, options: PursuitMap, begin: BeginProgress) -> MapReport:
     """Return the solutions of the games of the grid."""
-    x, y = read_axis("--x", options.columns), read_axis("--y", options.rows)
+    x = read_axis("--x", options.columns)
+    y = read_axis("--y", options.rows)
     if x.parameter == y.parameter:
         raise InputError(f"--y: {y.parameter} is also the parameter of --x; choose another")
-    if "phase_deg" in (x.parameter, y.parameter) and None in (problem.pursuer.orbit, problem.evader.orbit):
-        raise InputError("phase_deg: both players must have the table orbit; vary other keys instead")
+    if "phase_deg" in (x.parameter, y.parameter) and None in (
+        problem.pursuer.orbit,
+        problem.evader.orbit,
+    ):
+        raise InputError(
+            "phase_deg: both players must have the table orbit; vary other keys instead"
+        )
     if len(x.values) * len(y.values) > MAX_POINTS:
         raise InputError(f"--x and --y: there are more than {MAX_POINTS} points; choose fewer")
-    progress, rows = begin("map"), []
+    progress = begin("map")
+    rows = []
     for row in y.values.tolist():
         values = [{x.parameter: column, y.parameter: row} for column in x.values.tolist()]
         rows.append([_solved(problem, each, options.certify) for each in values])
         progress(len(rows) / len(y.values))
-    verdicts, times, speeds = (np.array([[point[i] for point in points] for points in rows]) for i in range(3))
-    return MapReport(problem, x, y, verdicts, np.ma.masked_invalid(times), np.ma.masked_invalid(speeds))
+    verdicts, times, speeds = (
+        np.array([[point[i] for point in points] for points in rows]) for i in range(3)
+    )
+    return MapReport(
+        problem, x, y, verdicts, np.ma.masked_invalid(times), np.ma.masked_invalid(speeds)
+    )
 
 
-def _solved(problem: PursuitProblem, values: Mapping[str, float], change_branch: bool) -> tuple[str, float, float]:
+def _solved(
+    problem: PursuitProblem, values: Mapping[str, float], change_branch: bool
+) -> tuple[str, float, float]:
     """Return the verdict of a point, the time of capture and the closing speed."""
     try:
         game = game_at(problem, values)
@@ -94,7 +114,8 @@ def game_at(problem: PursuitProblem, values: Mapping[str, float]) -> Game:
     """
     keys = {key: value for key, value in values.items() if key not in RATIOS}
     problem = changed(problem, keys, problem.name) if keys else problem
-    pursuer, evader = problem.pursuer, problem.evader
+    pursuer = problem.pursuer
+    evader = problem.evader
     if "phase_deg" in values:
         assert pursuer.orbit is not None
         assert evader.orbit is not None
@@ -111,21 +132,29 @@ def _true_longitude_rad(orbit: OrbitalElements) -> float:
 
 
 def read_axis(option: str, text: str) -> Axis:
-    """Read KEY=FROM:TO:N; raise `InputError` if it has another form, an unknown parameter, or a value out of range."""
+    """Read KEY=FROM:TO:N; raise `InputError` if it has another form, an unknown parameter, or a
+    value out of range.
+    """
     key, _, span = text.partition("=")
     if key not in RATIOS and numeric_key(PursuitProblem, key) is None:
         guess = similar_key(key, [*RATIOS, *keys_of(PursuitProblem)])
-        hint = f"did you mean {guess}?" if guess else f"choose {', '.join(RATIOS)} or a key of the file"
+        hint = (
+            f"did you mean {guess}?"
+            if guess
+            else f"choose {', '.join(RATIOS)} or a key of the file"
+        )
         raise InputError(f"{option}: there is no parameter {shown(key)}; {hint}")
     try:
         low_text, high_text, count_text = span.split(":")
-        low, high, count = float(low_text), float(high_text), int(count_text)
+        low = float(low_text)
+        high = float(high_text)
+        count = int(count_text)
     except ValueError:
         low, high, count = 0.0, 0.0, 0
     if not (-1e15 <= low < high <= 1e15 and 2 <= count <= MAX_POINTS):
         raise InputError(
-            f"{option}: must be KEY=FROM:TO:N with FROM less than TO and at least 2 values, found {shown(text)}; for "
-            f"example {option} thrust_ratio=0:0.8:17"
+            f"{option}: must be KEY=FROM:TO:N with FROM less than TO and at least 2 values, found "
+            f"{shown(text)}; for example {option} thrust_ratio=0:0.8:17"
         )
     return Axis(key, np.linspace(low, high, count))
 
@@ -146,7 +175,13 @@ def report_csv(report: MapReport) -> str:
     """Return a line for each point as CSV."""
     grid = np.meshgrid(report.x.values, report.y.values)
     parts = (*grid, report.capture_s, report.closing_speed_m_s / M_PER_KM, report.verdict)
-    columns = [report.x.parameter, report.y.parameter, "capture_time_s", "closing_speed_km_s", "verdict"]
+    columns = [
+        report.x.parameter,
+        report.y.parameter,
+        "capture_time_s",
+        "closing_speed_km_s",
+        "verdict",
+    ]
     return csv_text(columns, [*zip(*(part.ravel().tolist() for part in parts), strict=True)])
 
 

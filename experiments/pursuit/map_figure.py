@@ -35,23 +35,39 @@ def draw_all(report: MapReport) -> Iterator[Figure]:
 @style()
 def draw_map(report: MapReport) -> Figure:
     """Draw the capture times in hours with contours."""
-    x, y, hours = report.x.values, report.y.values, report.capture_s / S_PER_HOUR
+    x = report.x.values
+    y = report.y.values
+    hours = report.capture_s / S_PER_HOUR
     figure, ((axes,),) = subplots(105.0, width_mm=140.0)
     if hours.count():
         mesh = axes.pcolormesh(x, y, hours, cmap="Blues", shading="nearest", rasterized=True)
         figure.colorbar(mesh, ax=axes, label="capture time, h")
         if hours.count() > 3 and float(np.ptp(hours.compressed())) > 0.0:
             # No contour lines in cells with a corner that has no capture time.
-            lines = axes.contour(x, y, hours, levels=_LEVELS, colors=INK, linewidths=0.7, corner_mask=False)
+            lines = axes.contour(
+                x, y, hours, levels=_LEVELS, colors=INK, linewidths=0.7, corner_mask=False
+            )
             for label in axes.clabel(lines, fontsize="small", fmt="%g"):
-                label.set(rotation=0.0, path_effects=HALO)  # upright, so that a 6 is not read as a 9
+                label.set(
+                    rotation=0.0, path_effects=HALO
+                )  # upright, so that a 6 is not read as a 9
     for verdict, colour in _COLOURS.items():
         if (here := report.verdict == verdict).any():
-            axes.pcolormesh(x, y, np.ma.array(here, mask=~here), cmap=ListedColormap([colour]), shading="nearest")
+            axes.pcolormesh(
+                x,
+                y,
+                np.ma.array(here, mask=~here),
+                cmap=ListedColormap([colour]),
+                shading="nearest",
+            )
             axes.fill([], [], facecolor=colour, edgecolor=INK, linewidth=0.4, label=verdict)
-    # The cells of the outer points end at the range of the parameters, which values outside it may not have.
+    # The cells of the outer points end at the range of the parameters, which values outside it may
+    # not have.
     axes.set(
-        xlim=x[[0, -1]], ylim=y[[0, -1]], xlabel=axis_name(report.x.parameter), ylabel=axis_name(report.y.parameter)
+        xlim=x[[0, -1]],
+        ylim=y[[0, -1]],
+        xlabel=axis_name(report.x.parameter),
+        ylabel=axis_name(report.y.parameter),
     )
     axes.set_title(report.summary, fontsize="small")
     axes.grid(visible=False)
@@ -60,7 +76,9 @@ def draw_map(report: MapReport) -> Figure:
 
 
 def axis_name(parameter: str) -> str:
-    """Return the axis label of a parameter: `evader orbit: inclination, deg` for `evader.orbit.inclination_deg`."""
+    """Return the axis label of a parameter: `evader orbit: inclination, deg` for
+    `evader.orbit.inclination_deg`.
+    """
     owner, _, key = parameter.rpartition(".")
     words = _RATIOS.get(key) or ", ".join(filter(None, split_unit(key)))
     return f"{owner.replace('.', ' ')}: {words}" if owner else words

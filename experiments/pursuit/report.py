@@ -51,7 +51,9 @@ class Report:
 
 def report_json(report: Report) -> dict[str, object]:
     """Return the results for `to_json`; keys are the names of the solution's fields."""
-    solution, capture, certificate = report.solution, report.solution.capture, report.certificate
+    solution = report.solution
+    capture = report.solution.capture
+    certificate = report.certificate
     return {
         "axes": INERTIAL_AXES,
         "units": solution.units,
@@ -59,7 +61,8 @@ def report_json(report: Report) -> dict[str, object]:
         "branch_changes": solution.branch_changes,
         "looked_at_s": solution.looked_at_s,
         "exhausted": solution.exhausted,
-        "capture": capture and {key: value for key, value in vars(capture).items() if key != "extremal"},
+        "capture": capture
+        and {key: value for key, value in vars(capture).items() if key != "extremal"},
         "certificate": certificate
         and {
             "saddle_point": certificate.claims_saddle_point,
@@ -68,7 +71,8 @@ def report_json(report: Report) -> dict[str, object]:
             **vars(certificate),
         },
         "distance_curve": solution.curve,
-        "feedback": report.feedback and {**vars(report.feedback), "flights": _flights_json(report.feedback.flights)},
+        "feedback": report.feedback
+        and {**vars(report.feedback), "flights": _flights_json(report.feedback.flights)},
     }
 
 
@@ -85,7 +89,9 @@ def _flights_json(flights: Sequence[Flight]) -> list[dict[str, object]]:
 
 
 def trajectories(report: Report) -> str:
-    """Return both trajectories as CSV, no line without a capture; without thrust the direction of thrust is zero."""
+    """Return both trajectories as CSV, no line without a capture; without thrust the direction of
+    thrust is zero.
+    """
     columns = ["mass_kg", *(f"thrust_direction_{axis}" for axis in "xyz")]
     if report.solution.capture is None:
         return trajectories_csv(["player"], [], columns)
@@ -98,9 +104,15 @@ def trajectories(report: Report) -> str:
 
 
 def thrust_angles(player: PlayerHistory) -> Floats:
-    """Return the angles of the thrust in the craft's orbital frame, in and out of plane, rad, shape (n, 2)."""
-    u = np.einsum("nij,nj->ni", orbital_axes(player.position_m, player.velocity_m_s), player.thrust_direction)
-    return np.stack([np.unwrap(np.arctan2(u[:, 0], u[:, 1])), np.arcsin(np.clip(u[:, 2], -1.0, 1.0))], axis=1)
+    """Return the angles of the thrust in the craft's orbital frame, in and out of plane, rad, shape
+    (n, 2).
+    """
+    u = np.einsum(
+        "nij,nj->ni", orbital_axes(player.position_m, player.velocity_m_s), player.thrust_direction
+    )
+    return np.stack(
+        [np.unwrap(np.arctan2(u[:, 0], u[:, 1])), np.arcsin(np.clip(u[:, 2], -1.0, 1.0))], axis=1
+    )
 
 
 def report_lines(report: Report) -> Iterator[Part]:
@@ -117,51 +129,92 @@ def report_lines(report: Report) -> Iterator[Part]:
 
 
 def _capture_lines(capture: Capture, solution: Solution) -> Iterator[Part]:
-    """Yield vectors as columns of their components, which a narrow screen does not break, and the scalars as lines."""
-    pursuer, evader = capture.pursuer, capture.evader
+    """Yield vectors as columns of their components, which a narrow screen does not break, and the
+    scalars as lines.
+    """
+    pursuer = capture.pursuer
+    evader = capture.evader
     table = number_table(
-        "", "capture at\nkm", "direction\nto evader", "velocity of\npursuer, km/s", "velocity of\nevader, km/s"
+        "",
+        "capture at\nkm",
+        "direction\nto evader",
+        "velocity of\npursuer, km/s",
+        "velocity of\nevader, km/s",
     )
     for i, axis in enumerate("xyz"):
         velocities = (f"{player.velocity_m_s[i] / M_PER_KM:.9f}" for player in (pursuer, evader))
-        table.add_row(axis, f"{capture.position_m[i] / M_PER_KM:.6f}", f"{capture.direction[i]:.9f}", *velocities)
+        table.add_row(
+            axis,
+            f"{capture.position_m[i] / M_PER_KM:.6f}",
+            f"{capture.direction[i]:.9f}",
+            *velocities,
+        )
     yield table
-    yield f"propellant spent, kg: pursuer {pursuer.propellant_kg:.8f}, evader {evader.propellant_kg:.8f}"
+    yield (
+        f"propellant spent, kg: pursuer {pursuer.propellant_kg:.8f}, evader "
+        f"{evader.propellant_kg:.8f}"
+    )
     yield f"closing speed {capture.closing_speed_m_s / M_PER_KM:.10f} km/s"
     yield (
-        f"curvatures of the distance over the direction: {' and '.join(f'{value:.4g}' for value in capture.curvature)} "
-        f"times {solution.units.length_m / M_PER_KM:.6g} km (positive at a saddle point)"
+        "curvatures of the distance over the direction: "
+        f"{' and '.join(f'{value:.4g}' for value in capture.curvature)} times "
+        f"{solution.units.length_m / M_PER_KM:.6g} km (positive at a saddle point)"
     )
     yield f"changes to a branch that keeps the evader farther away: {solution.branch_changes}"
 
 
 def _verdict(solution: Solution) -> str:
-    until = f"{solution.looked_at_s:.1f} s" if solution.looked_at_s >= 1.0 else f"{solution.looked_at_s:.3g} s"
+    until = (
+        f"{solution.looked_at_s:.1f} s"
+        if solution.looked_at_s >= 1.0
+        else f"{solution.looked_at_s:.3g} s"
+    )
     if solution.capture is not None and solution.verdict is Verdict.CAPTURED:
-        return f"captured at {solution.capture.time_s:.6f} s ({solution.capture.time_s / S_PER_HOUR:.4f} h)"
+        return (
+            f"captured at {solution.capture.time_s:.6f} s "
+            f"({solution.capture.time_s / S_PER_HOUR:.4f} h)"
+        )
     if solution.verdict is Verdict.PROPELLANT_EXHAUSTED:
-        return f"propellant-exhausted: the {solution.exhausted} has no propellant after {until}; no capture before"
+        return (
+            f"propellant-exhausted: the {solution.exhausted} has no propellant after {until}; no "
+            "capture before"
+        )
     if solution.verdict is Verdict.ESCAPES:
-        why = f"the {solution.exhausted} has no propellant" if solution.exhausted else "the end of the time searched"
+        why = (
+            f"the {solution.exhausted} has no propellant"
+            if solution.exhausted
+            else "the end of the time searched"
+        )
         return f"escapes: no capture until {why}, {until}"
     if solution.looked_at_s == 0.0:
-        return "branch-not-certified: no game could be followed, not even a short one; check the units of the values"
-    return f"branch-not-certified: the extremals are a saddle up to a duration of {until}; no claim for longer ones"
+        return (
+            "branch-not-certified: no game could be followed, not even a short one; check the "
+            "units of the values"
+        )
+    return (
+        f"branch-not-certified: the extremals are a saddle up to a duration of {until}; no claim "
+        "for longer ones"
+    )
 
 
 def _certificate_lines(certificate: Certificate) -> Iterator[str]:
     yield (
-        f"residual {certificate.residual:.1e}, Hamiltonian constant to {certificate.hamiltonian_drift:.1e}, "
-        f"difference of a second integrator {certificate.integrator_gap_m:.2g} m"
+        f"residual {certificate.residual:.1e}, Hamiltonian constant to "
+        f"{certificate.hamiltonian_drift:.1e}, difference of a second integrator "
+        f"{certificate.integrator_gap_m:.2g} m"
     )
     yield (
-        f"no earlier capture: {'confirmed' if certificate.no_earlier_capture else 'not confirmed'}; smallest distance "
+        "no earlier capture: "
+        f"{'confirmed' if certificate.no_earlier_capture else 'not confirmed'}; smallest distance "
         f"from the planet's centre {certificate.min_distance_m / M_PER_KM:.1f} km"
     )
     if certificate.pursuer_alone_s is not None:
         yield f"earliest capture if only the pursuer deviates: {certificate.pursuer_alone_s:.3f} s"
     answers = [
-        f"{deviation.name} {'not known' if deviation.capture_s is None else f'{deviation.capture_s:.1f} s'}"
+        (
+            f"{deviation.name} "
+            f"{'not known' if deviation.capture_s is None else f'{deviation.capture_s:.1f} s'}"
+        )
         for deviation in certificate.evader_deviations
     ]
     if answers:
@@ -180,20 +233,23 @@ def saddle_point(certificate: Certificate | None) -> str:
         return f"saddle point: not claimed: {'; '.join(reasons)}"
     if certificate.undecided:
         why = (
-            "no farthest extremal was found for one craft or both" if certificate.directions_tried else "add --certify"
+            "no farthest extremal was found for one craft or both"
+            if certificate.directions_tried
+            else "add --certify"
         )
         return f"saddle point: no check failed; {'; '.join(certificate.undecided)} ({why})"
     return "saddle point: all checks hold"
 
 
 def _feedback_lines(feedback: Feedback) -> Iterator[str]:
-    flights, captured = feedback.flights, [each for each in feedback.flights if each.ended is Ended.CAPTURED]
+    flights = feedback.flights
+    captured = [each for each in feedback.flights if each.ended is Ended.CAPTURED]
     heading = f"feedback, a plan every {feedback.replan_s:g} s, evader {feedback.policy}: "
     if len(flights) == 1:
         (flight,) = flights
         yield (
-            f"{heading}{flight.ended.value} at {flight.time_s:.1f} s, distance {flight.distance_m:.4g} m; "
-            f"last predicted capture {flight.predicted_s[-1]:.1f} s"
+            f"{heading}{flight.ended.value} at {flight.time_s:.1f} s, distance "
+            f"{flight.distance_m:.4g} m; last predicted capture {flight.predicted_s[-1]:.1f} s"
         )
         return
     yield f"{heading}{len(captured)} of {len(flights)} captured"
@@ -203,4 +259,7 @@ def _feedback_lines(feedback: Feedback) -> Iterator[str]:
 
 
 def _distribution(values: Sequence[float]) -> str:
-    return f"smallest {number(min(values))}, median {number(float(np.median(values)))}, largest {number(max(values))}"
+    return (
+        f"smallest {number(min(values))}, median {number(float(np.median(values)))}, largest "
+        f"{number(max(values))}"
+    )

@@ -11,7 +11,13 @@ from infoset.experiments.common.screen import BeginProgress, say
 from infoset.experiments.pursuit.command import Pursuit
 from infoset.experiments.pursuit.file import PursuitProblem
 from infoset.experiments.pursuit.page import pursuit_page
-from infoset.experiments.pursuit.report import Feedback, Report, report_json, report_lines, trajectories
+from infoset.experiments.pursuit.report import (
+    Feedback,
+    Report,
+    report_json,
+    report_lines,
+    trajectories,
+)
 from infoset.rendezvous.pursuit_evasion import (
     Observation,
     Policy,
@@ -33,23 +39,33 @@ REPLAN_S, MIN_PLANS, MAX_PLANS = 600.0, 50, 2000
 def solve_pursuit(problem: PursuitProblem, options: Pursuit, begin: BeginProgress) -> Report:
     """Return the solution of the game with its certificate, and the simulations with feedback."""
     changed = (options.delay_s, options.position_noise_m, options.velocity_noise_m_s)
-    if options.feedback is None and (options.runs > 1 or any(changed) or options.replan_s is not None):
+    if options.feedback is None and (
+        options.runs > 1 or any(changed) or options.replan_s is not None
+    ):
         raise InputError(
             "--runs, --replan-s, --delay-s and the noise options need a policy of the evader; "
             "add one, for example --feedback random"
         )
     if options.feedback is not None:
-        choice("--feedback", options.feedback, [OPTIMAL, RANDOM, *(policy.value for policy in Policy)])
+        choice(
+            "--feedback", options.feedback, [OPTIMAL, RANDOM, *(policy.value for policy in Policy)]
+        )
     progress = begin("solve")
     solution = solve(problem.game, all_directions=options.certify)
     progress(0.5)
-    certificate = None if solution.capture is None else certify(solution, all_directions=options.certify)
+    certificate = (
+        None if solution.capture is None else certify(solution, all_directions=options.certify)
+    )
     progress(1.0)
-    feedback = None if options.feedback is None else _fly(solution, options, options.feedback, begin)
+    feedback = (
+        None if options.feedback is None else _fly(solution, options, options.feedback, begin)
+    )
     return Report(problem, solution, certificate, feedback)
 
 
-def _fly(solution: Solution, options: Pursuit, policy: str, begin: BeginProgress) -> Feedback | None:
+def _fly(
+    solution: Solution, options: Pursuit, policy: str, begin: BeginProgress
+) -> Feedback | None:
     if solution.capture is None:
         say("no feedback: there is no capture, and so no plan to start from", options.quiet)
         return None
@@ -62,7 +78,8 @@ def _fly(solution: Solution, options: Pursuit, policy: str, begin: BeginProgress
             return RandomSteering(options.seed, run, replan_s)
         return None if policy == OPTIMAL else Policy(policy).direction
 
-    flights, progress = [], begin("feedback")
+    flights = []
+    progress = begin("feedback")
     for run in range(options.runs):
         flights.append(
             fly(
@@ -86,6 +103,12 @@ COMMAND = ProblemCommand(
     lines=report_lines,
     to_html=pursuit_page,
     figures="infoset.experiments.pursuit.figures",
-    figure_names=("figure-orbits", "figure-relative", "figure-control", "figure-distance", "figure-feedback"),
+    figure_names=(
+        "figure-orbits",
+        "figure-relative",
+        "figure-control",
+        "figure-distance",
+        "figure-feedback",
+    ),
 )
 run = COMMAND.run

@@ -12,13 +12,16 @@ from infoset.experiments.common.options import Csv, FileOptions, Html, ProblemNa
 
 @dataclass(frozen=True)
 class Reach(FileOptions):
-    """Compute reachable sets and optimal controls of a rendezvous, or of a linear system of your own.
+    """Compute reachable sets and optimal controls of a rendezvous, or of a linear system of your
+    own.
 
-    The problem has constraints. The results are the minimum terminal norm, the forward sets, the tube of all optimal
-    trajectories, and the set of all optimal controls. Selected optimal controls are simulated, those of a rendezvous
-    on the linear and on the nonlinear model. Without --out, --json, --csv or --html no file is written.
+    The problem has constraints. The results are the minimum terminal norm, the forward sets, the
+    tube of all optimal trajectories, and the set of all optimal controls. Selected optimal controls
+    are simulated, those of a rendezvous on the linear and on the nonlinear model. Without --out,
+    --json, --csv or --html no file is written.
 
-    Axes: x radially outward, y along the motion, z along the orbit's normal (Hill's), at the passive craft.
+    Axes: x radially outward, y along the motion, z along the orbit's normal (Hill's), at the
+    passive craft.
     """
 
     problem: ProblemName = "rendezvous-2021"
@@ -27,17 +30,21 @@ class Reach(FileOptions):
         str,
         typer.Option(
             metavar="A,B,C",
-            help="Optimal controls to simulate: energy, l1, norms (minimum sum of squares, of absolute values, of "
-            "Euclidean norms), peak (minimum peak), chebyshev, analytic (centres of the set), vertices, samples:N "
-            "(N random ones).",
+            help=(
+                "Optimal controls to simulate: energy, l1, norms (minimum sum of squares, of "
+                "absolute values, of Euclidean norms), peak (minimum peak), chebyshev, analytic "
+                "(centres of the set), vertices, samples:N (N random ones)."
+            ),
         ),
     ] = "energy,l1,norms,peak,chebyshev,analytic"
     replan: Annotated[
         bool,
         typer.Option(
             "--replan",
-            help="Also simulate in closed loop on the nonlinear model, with a new plan every period; if the problem "
-            "has navigation errors, also 10 times with them.",
+            help=(
+                "Also simulate in closed loop on the nonlinear model, with a new plan every "
+                "period; if the problem has navigation errors, also 10 times with them."
+            ),
         ),
     ] = False
     seed: Seed = 0

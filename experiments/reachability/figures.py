@@ -1,4 +1,6 @@
-"""Figures of a rendezvous: the tube in space (figures 1 and 2 of the paper) and in planes, and the controls."""
+"""Figures of a rendezvous: the tube in space (figures 1 and 2 of the paper) and in planes, and the
+controls.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,9 @@ _TOLERANCE, _TOLERANCE_IN_SPACE = 2e-3, 1e-2
 """Relative error of the drawn sets."""
 _MAX_TIMES, _MAX_TIMES_IN_SPACE = 6, 4
 _COLOUR_RANGE = (0.1, 0.95)
-"""Part of the colour map for the times of the sets, from yellow to violet: it differs in hue and in brightness."""
+"""Part of the colour map for the times of the sets, from yellow to violet: it differs in hue and in
+brightness.
+"""
 _NAMES = {
     "energy": "minimum energy",
     "l1": "minimum L1",
@@ -44,7 +48,12 @@ _NAMES = {
     "chebyshev": "Chebyshev centre",
     "analytic": "analytic centre",
 }
-_START: dict[str, Any] = {"marker": "o", "markerfacecolor": "none", "markersize": 7.5, "label": "start"}
+_START: dict[str, Any] = {
+    "marker": "o",
+    "markerfacecolor": "none",
+    "markersize": 7.5,
+    "label": "start",
+}
 _END: dict[str, Any] = {"marker": "*", "markersize": 9.0, "label": "terminal state of minimum norm"}
 _AXES = (*AXIS_TITLES, *component_titles("v"))
 _PLANES = ((1, 0), (1, 2), (4, 3), (4, 5))
@@ -59,14 +68,28 @@ def _shown(report: Report) -> list[tuple[dict[str, Any], Member, Floats]]:
 def _legend(figure: Figure, report: Report) -> None:
     """Draw the legend, with the names of the members that are not drawn."""
     drawn = [member.name for _, member, _ in _shown(report)]
-    hidden = [_NAMES.get(member.name, member.name) for member in report.members if member.name not in drawn]
-    names = ", ".join(hidden) if len(hidden) <= len(_NAMES) else f"{len(hidden)} of {len(report.members)}"
-    note = f"not drawn, as equal to others or beyond the first {len(LINE_LOOKS)}: {names}" if hidden else None
+    hidden = [
+        _NAMES.get(member.name, member.name)
+        for member in report.members
+        if member.name not in drawn
+    ]
+    names = (
+        ", ".join(hidden)
+        if len(hidden) <= len(_NAMES)
+        else f"{len(hidden)} of {len(report.members)}"
+    )
+    note = (
+        f"not drawn, as equal to others or beyond the first {len(LINE_LOOKS)}: {names}"
+        if hidden
+        else None
+    )
     legend_below(figure, 3, title=note)
 
 
 def shown_times(periods: int, most: int = _MAX_TIMES) -> list[int]:
-    """Return the times at which sets are drawn: all of a few, or evenly spaced ones, and never the last."""
+    """Return the times at which sets are drawn: all of a few, or evenly spaced ones, and never the
+    last.
+    """
     if periods <= most + 1:
         return list(range(1, periods))
     return sorted({round(t) for t in np.linspace(1, periods - 1, most)})
@@ -74,7 +97,12 @@ def shown_times(periods: int, most: int = _MAX_TIMES) -> list[int]:
 
 def draw_all(report: Report) -> Iterator[Figure]:
     """Draw the figures of a report, one after the other."""
-    for draw in (partial(draw_space, first=0), partial(draw_space, first=3), draw_planes, draw_controls):
+    for draw in (
+        partial(draw_space, first=0),
+        partial(draw_space, first=3),
+        draw_planes,
+        draw_controls,
+    ):
         yield draw(report)
 
 
@@ -83,7 +111,9 @@ def draw_space(report: Report, first: int) -> Figure:
     """Draw three of the six states in space: positions (0) or velocities (3)."""
     figure = new_figure(145.0)
     axes: Any = figure.add_subplot(projection="3d", computed_zorder=False)
-    _draw_motion(axes, report, list(range(first, first + 3)), _MAX_TIMES_IN_SPACE, _TOLERANCE_IN_SPACE)
+    _draw_motion(
+        axes, report, list(range(first, first + 3)), _MAX_TIMES_IN_SPACE, _TOLERANCE_IN_SPACE
+    )
     axes.view_init(elev=22.0, azim=-58.0)
     axes.set_box_aspect((1.0, 1.0, 0.85), zoom=1.1)
     _legend(figure, report)
@@ -101,17 +131,28 @@ def draw_planes(report: Report) -> Figure:
     return figure
 
 
-def _draw_motion(axes: Axes, report: Report, states: list[int], max_times: int, tolerance: float) -> None:
-    """Draw two or three states of the six: the tube, light at first and dark at last, and the members."""
+def _draw_motion(
+    axes: Axes, report: Report, states: list[int], max_times: int, tolerance: float
+) -> None:
+    """Draw two or three states of the six: the tube, light at first and dark at last, and the
+    members.
+    """
     unit, per_m = report.length_unit
     factors = np.array([per_m if state < 3 else 1.0 for state in states])
     times = shown_times(report.solution.problem.periods, max_times)
-    for t, colour in zip(times, mpl.colormaps["viridis_r"](np.linspace(*_COLOUR_RANGE, len(times))), strict=True):
+    for t, colour in zip(
+        times, mpl.colormaps["viridis_r"](np.linspace(*_COLOUR_RANGE, len(times))), strict=True
+    ):
         points = report.solution.sets.projection(SetKind.TUBE, t, states, tolerance) * factors
         _draw_set(axes, points, colour, f"tube at t = {t}")
     for look, member, path in _shown(report):
         name = _NAMES.get(member.name, member.name)
-        axes.plot(*(path[:, states] * factors).T, zorder=5, label=f"{name}, nonlinear", **look | {"marker": "none"})
+        axes.plot(
+            *(path[:, states] * factors).T,
+            zorder=5,
+            label=f"{name}, nonlinear",
+            **look | {"marker": "none"},
+        )
         marks = {**look, "linestyle": "none", "markersize": 3.5, "zorder": 6}
         axes.plot(*(member.linear[:, states] * factors).T, label=f"{name}, linear", **marks)
     for t, mark in ((0, _START), (-1, _END)):
@@ -121,39 +162,65 @@ def _draw_motion(axes: Axes, report: Report, states: list[int], max_times: int, 
 
 
 def _draw_set(axes: Any, points: Floats, colour: Any, label: str) -> None:
-    """Draw the convex hull of points in a plane or in space; one without area or volume, as its points on a line."""
+    """Draw the convex hull of points in a plane or in space; one without area or volume, as its
+    points on a line.
+    """
     try:
         hull = ConvexHull(points / np.ptp(points, axis=0).max())
     except QhullError:
         axes.plot(*points.T, color=colour, label=label)
         return
     if points.shape[1] == 2:
-        axes.fill(*points[hull.vertices].T, facecolor=colour, edgecolor=colour, alpha=0.25, label=label)
+        axes.fill(
+            *points[hull.vertices].T, facecolor=colour, edgecolor=colour, alpha=0.25, label=label
+        )
     else:
         look: dict[str, Any] = {"facecolors": colour, "alpha": 0.25, "shade": True}
         axes.add_collection3d(Poly3DCollection(points[hull.simplices], **look))
-        # In the legend a mark of its own: that of the collection has the colour of its first, shaded facet.
-        axes.plot([], [], [], marker="s", markersize=8.0, linestyle="none", color=colour, alpha=0.6, label=label)
+        # In the legend a mark of its own: that of the collection has the colour of its first,
+        # shaded facet.
+        axes.plot(
+            [],
+            [],
+            [],
+            marker="s",
+            markersize=8.0,
+            linestyle="none",
+            color=colour,
+            alpha=0.6,
+            label=label,
+        )
 
 
 @style()
 def draw_controls(report: Report) -> Figure:
-    """Draw the components of the controls over the periods, and the ranges of all optimal controls."""
+    """Draw the components of the controls over the periods, and the ranges of all optimal
+    controls.
+    """
     figure, (row,) = subplots(78.0, 1, 3)
-    periods, bounds = report.solution.problem.periods, report.solution.problem.control_bounds
+    periods = report.solution.problem.periods
+    bounds = report.solution.problem.control_bounds
     for j, axes in enumerate(row):
         low, high = report.ranges[:, j].T
         bars = {**SET, "width": 1.0, "label": "all optimal controls"}
         axes.bar(np.arange(periods) + 0.5, high - low, bottom=low, **bars)
         for look, member, _ in _shown(report):
-            line: dict[str, Any] = {"color": look["color"], "linestyle": look["linestyle"], "linewidth": 1.3}
+            line: dict[str, Any] = {
+                "color": look["color"],
+                "linestyle": look["linestyle"],
+                "linewidth": 1.3,
+            }
             name = _NAMES.get(member.name, member.name)
-            axes.stairs(member.controls[:, j], np.arange(periods + 1), baseline=None, label=name, **line)
+            axes.stairs(
+                member.controls[:, j], np.arange(periods + 1), baseline=None, label=name, **line
+            )
         if max(float(np.abs(report.ranges[:, j]).max()), 1e-9) > 0.7 * bounds[j]:
             for sign in (-1.0, 1.0):
                 axes.axhline(sign * bounds[j], label="bound", **BOUND)
         axes.set_xlabel(f"time, periods of {report.rendezvous.period_s:g} s")
-        axes.set_ylabel(f"{component_titles('u')[j]} / ({report.rendezvous.acceleration_m_s2:g} m/s²)")
+        axes.set_ylabel(
+            f"{component_titles('u')[j]} / ({report.rendezvous.acceleration_m_s2:g} m/s²)"
+        )
         axes.set_xlim(0, periods)
         axes.use_sticky_edges = False
         axes.margins(y=0.08)

@@ -59,7 +59,9 @@ class Orbit:
 
 @dataclass(frozen=True, kw_only=True)
 class Start:
-    """The active craft at t = 0: x radially outward, y along the motion, z along the orbit's normal."""
+    """The active craft at t = 0: x radially outward, y along the motion, z along the orbit's
+    normal.
+    """
 
     position_m: Vector
     velocity_m_s: Vector
@@ -67,7 +69,9 @@ class Start:
 
 @dataclass(frozen=True, kw_only=True)
 class Bounds:
-    """Bounds of position and velocity at t = 0..T, and of the control, in units of `acceleration_m_s2`."""
+    """Bounds of position and velocity at t = 0..T, and of the control, in units of
+    `acceleration_m_s2`.
+    """
 
     position_m: Bound
     velocity_m_s: Bound
@@ -76,7 +80,8 @@ class Bounds:
 
 @dataclass(frozen=True, kw_only=True)
 class Cone:
-    """An approach cone, replaced by a pyramid inside it, which holds from the period `from_period` on.
+    """An approach cone, replaced by a pyramid inside it, which holds from the period `from_period`
+    on.
 
     The axis may have any length; the half-angle is that between axis and cone.
     """
@@ -98,14 +103,18 @@ class Cone:
         across = np.linalg.svd(along[None, :])[2][1:]
         turns = 2.0 * np.pi * np.arange(self.faces) / self.faces
         slope = np.tan(self.half_angle_rad) * np.cos(np.pi / self.faces)
-        rows = np.outer(np.cos(turns), across[0]) + np.outer(np.sin(turns), across[1]) - slope * along
+        rows = (
+            np.outer(np.cos(turns), across[0]) + np.outer(np.sin(turns), across[1]) - slope * along
+        )
         normals = rows / np.linalg.norm(rows, axis=1)[:, None]
         return normals, normals @ np.array(self.apex_m)
 
 
 @dataclass(frozen=True, kw_only=True)
 class KeepIn:
-    """Half-spaces for the position, normals . position <= offsets, from the period `from_period` on."""
+    """Half-spaces for the position, normals . position <= offsets, from the period `from_period`
+    on.
+    """
 
     normals: Annotated[tuple[Vector, ...], Field(min_length=1, max_length=50)]
     offsets_m: tuple[float, ...]
@@ -113,7 +122,9 @@ class KeepIn:
 
     def __post_init__(self) -> None:
         if len(self.offsets_m) != len(self.normals):
-            raise ValueError(f"offsets_m: must have {len(self.normals)} numbers, one for each normal")
+            raise ValueError(
+                f"offsets_m: must have {len(self.normals)} numbers, one for each normal"
+            )
         if not all(map(any, self.normals)):
             raise ValueError("normals: must have no row of zeros")
 
@@ -165,17 +176,22 @@ class Rendezvous:
     navigation: Navigation | None = None
 
     def __post_init__(self) -> None:
-        check_angle("period_s, in all periods,", self.periods * self.period_s, self.ellipse.mean_motion_rad_s)
+        check_angle(
+            "period_s, in all periods,",
+            self.periods * self.period_s,
+            self.ellipse.mean_motion_rad_s,
+        )
         if self.disturbance is not None and self.checks_between_periods:
             raise ValueError("checks_between_periods: must be 0 with a disturbance")
         change_m_s = max(self.bounds.control) * self.acceleration_m_s2 * self.period_s
         reach = max(
-            change_m_s / min(self.bounds.velocity_m_s), change_m_s * self.period_s / min(self.bounds.position_m)
+            change_m_s / min(self.bounds.velocity_m_s),
+            change_m_s * self.period_s / min(self.bounds.position_m),
         )
         if reach > _MAX_REACH:
             raise ValueError(
-                f"acceleration_m_s2: full thrust over a period changes a state by {reach:.3g} times its bound; "
-                f"rounding decides the result beyond {_MAX_REACH:g}"
+                f"acceleration_m_s2: full thrust over a period changes a state by {reach:.3g} "
+                f"times its bound; rounding decides the result beyond {_MAX_REACH:g}"
             )
         _ = self.problem  # raises ValueError if it is none
 
@@ -184,7 +200,10 @@ class Rendezvous:
         """The orbit of the passive craft."""
         orbit = self.orbit
         return EllipticOrbit.of_size(
-            orbit.semi_major_axis_m, orbit.eccentricity, orbit.gravitational_parameter_m3_s2, orbit.true_anomaly_rad
+            orbit.semi_major_axis_m,
+            orbit.eccentricity,
+            orbit.gravitational_parameter_m3_s2,
+            orbit.true_anomaly_rad,
         )
 
     @cached_property
@@ -217,18 +236,30 @@ class Rendezvous:
         """Effect of unit components of the unknown acceleration on the state, shape (T, 6, 3)."""
         if self.disturbance is None:
             return None
-        return np.asarray(self.problem.control / self.acceleration_m_s2 * self.disturbance.acceleration_m_s2)
+        return np.asarray(
+            self.problem.control / self.acceleration_m_s2 * self.disturbance.acceleration_m_s2
+        )
 
     @property
     def navigation_error(self) -> Floats | None:
         """Largest error of each component of an estimate, shape (6,)."""
         navigation = self.navigation
-        return None if navigation is None else np.array(navigation.position_error_m + navigation.velocity_error_m_s)
+        return (
+            None
+            if navigation is None
+            else np.array(navigation.position_error_m + navigation.velocity_error_m_s)
+        )
 
     def _problem(self, periods: int) -> ReachabilityProblem:
-        between = self._between(periods, self.checks_between_periods) if self.checks_between_periods else None
+        between = (
+            self._between(periods, self.checks_between_periods)
+            if self.checks_between_periods
+            else None
+        )
         with np.errstate(over="ignore", invalid="ignore"):
-            transition, control = discretised(self.motion, periods, self.period_s, self.acceleration_m_s2)
+            transition, control = discretised(
+                self.motion, periods, self.period_s, self.acceleration_m_s2
+            )
         return ReachabilityProblem(
             transition,
             control,
@@ -243,13 +274,22 @@ class Rendezvous:
 
     def _between(self, periods: int, instants: int) -> Floats:
         with np.errstate(over="ignore", invalid="ignore"):
-            return between_periods(self.motion, periods, self.period_s, self.acceleration_m_s2, instants)
+            return between_periods(
+                self.motion, periods, self.period_s, self.acceleration_m_s2, instants
+            )
 
     def _half_spaces(self, periods: int) -> tuple[Floats, Floats, tuple[str, ...]]:
         """Return cone and half-spaces as constraints on states: normals, offsets and names."""
-        regions: list[tuple[str, Cone | KeepIn]] = [("face {} of the cone", self.cone)] if self.cone else []
-        regions += [(f"half-space {{}} of keep_in #{number}", box) for number, box in enumerate(self.keep_in, start=1)]
-        normals, offsets, names = np.zeros((0, 6)), np.zeros((periods + 1, 0)), list[str]()
+        regions: list[tuple[str, Cone | KeepIn]] = (
+            [("face {} of the cone", self.cone)] if self.cone else []
+        )
+        regions += [
+            (f"half-space {{}} of keep_in #{number}", box)
+            for number, box in enumerate(self.keep_in, start=1)
+        ]
+        normals = np.zeros((0, 6))
+        offsets = np.zeros((periods + 1, 0))
+        names = list[str]()
         times = np.arange(periods + 1)[:, None]
         for name, region in regions:
             rows, offsets_m = region.half_spaces

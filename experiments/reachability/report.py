@@ -15,7 +15,14 @@ from infoset.experiments.common.problem_command import trajectories_csv
 from infoset.experiments.common.screen import Part, number, number_table
 from infoset.experiments.common.units import Unit, length_unit
 from infoset.experiments.reachability.file import Rendezvous
-from infoset.rendezvous.reachability import FeedbackPlan, Flight, SetKind, Solution, ThrustShape, effort
+from infoset.rendezvous.reachability import (
+    FeedbackPlan,
+    Flight,
+    SetKind,
+    Solution,
+    ThrustShape,
+    effort,
+)
 
 POINTS = 24
 """Points of a displayed trajectory per period."""
@@ -26,10 +33,11 @@ _MAX_SHOWN, _ALIKE = 5, 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Member:
-    """An optimal control, and the states, shape (T + 1, 6), of the linear and of the nonlinear model.
+    """An optimal control, and the states, shape (T + 1, 6), of the linear and of the nonlinear
+    model.
 
-    `between` is the largest violation of a constraint between the periods by the linear model, as a fraction of the
-    bound; at most 0 if there is none.
+    `between` is the largest violation of a constraint between the periods by the linear model, as a
+    fraction of the bound; at most 0 if there is none.
     """
 
     name: str
@@ -48,8 +56,9 @@ class Member:
 class Robustness:
     """Plans under the unknown acceleration.
 
-    `fixed_miss` is the minimum terminal norm without disturbance, by controls that keep the constraints without
-    feedback, and `plan` the plan with feedback. If there is none, `conflict` and `refusal` are the reasons.
+    `fixed_miss` is the minimum terminal norm without disturbance, by controls that keep the
+    constraints without feedback, and `plan` the plan with feedback. If there is none, `conflict`
+    and `refusal` are the reasons.
     """
 
     fixed_miss: float | None
@@ -62,9 +71,10 @@ class Robustness:
 class Report:
     """Results of one command.
 
-    `min_periods` is the minimum number of periods, up to `searched_periods`, in which the terminal norm is zero.
-    `forward` and `tube`, shape (T + 1, 6, 2), are bounds of the sets, `ranges`, shape (T, 3, 2), those of the optimal
-    controls. `flight` is the simulation in closed loop, `noisy` are those with navigation errors.
+    `min_periods` is the minimum number of periods, up to `searched_periods`, in which the terminal
+    norm is zero. `forward` and `tube`, shape (T + 1, 6, 2), are bounds of the sets, `ranges`, shape
+    (T, 3, 2), those of the optimal controls. `flight` is the simulation in closed loop, `noisy` are
+    those with navigation errors.
     """
 
     rendezvous: Rendezvous
@@ -86,7 +96,9 @@ class Report:
 
     @cached_property
     def shown(self) -> tuple[tuple[Member, Floats], ...]:
-        """Return the first few different members, each with its nonlinear trajectory, shape (points, 6)."""
+        """Return the first few different members, each with its nonlinear trajectory, shape
+        (points, 6).
+        """
         chosen: list[Member] = []
         for member in self.members:
             if all(np.abs(member.controls - other.controls).max() > _ALIKE for other in chosen):
@@ -96,13 +108,16 @@ class Report:
     def _trajectory(self, member: Member) -> Floats:
         rendezvous = self.rendezvous
         push = rendezvous.acceleration_m_s2 * member.controls[None]
-        return np.asarray(rendezvous.truth.fly(rendezvous.problem.initial, push, rendezvous.period_s, POINTS)[0])
+        return np.asarray(
+            rendezvous.truth.fly(rendezvous.problem.initial, push, rendezvous.period_s, POINTS)[0]
+        )
 
 
 def delta_v(rendezvous: Rendezvous, controls: Floats) -> dict[str, float]:
     """Return the Delta-v of controls, shape (T, 3), in m/s: the sum, and that along each axis.
 
-    The sum is over the axes, each of which has an engine; for thrust in a ball, with one engine, it is over the norms.
+    The sum is over the axes, each of which has an engine; for thrust in a ball, with one engine, it
+    is over the norms.
     """
     pushes = rendezvous.acceleration_m_s2 * rendezvous.period_s * controls
     axes = np.abs(pushes).sum(axis=0)
@@ -112,7 +127,9 @@ def delta_v(rendezvous: Rendezvous, controls: Floats) -> dict[str, float]:
 
 
 def trajectories(report: Report) -> str:
-    """Return the trajectories of the selected controls on both models, as CSV; a control is held over its period."""
+    """Return the trajectories of the selected controls on both models, as CSV; a control is held
+    over its period.
+    """
     rendezvous = report.rendezvous
     times_s = rendezvous.period_s * np.arange(rendezvous.problem.periods + 1)
     tracks = []
@@ -126,8 +143,11 @@ def trajectories(report: Report) -> str:
 
 
 def report_json(report: Report) -> dict[str, object]:
-    """Return the results for `infoset.experiments.common.output.to_json`; key ``units`` has the units of the states."""
-    solution, rendezvous = report.solution, report.rendezvous
+    """Return the results for `infoset.experiments.common.output.to_json`; key ``units`` has the
+    units of the states.
+    """
+    solution = report.solution
+    rendezvous = report.rendezvous
     return {
         "units": {
             "period_s": rendezvous.period_s,
@@ -154,7 +174,9 @@ def solution_json(
     def set_json(kind: SetKind, time: int, bounds: Floats) -> dict[str, object]:
         counts = solution.sets.counts(kind, time)
         keys = ("vertices", "facets", "dimension")
-        return {"min": bounds[:, 0], "max": bounds[:, 1]} | {key: counts and getattr(counts, key) for key in keys}
+        return {"min": bounds[:, 0], "max": bounds[:, 1]} | {
+            key: counts and getattr(counts, key) for key in keys
+        }
 
     return {
         "route": solution.route,
@@ -163,7 +185,13 @@ def solution_json(
         "optimal_dimension": solution.optimal.dimension,
         "min_periods": min_periods,
         "sets": [
-            {"period": t, **{kind.value: set_json(kind, t, of[t]) for kind, of in zip(SetKind, sets, strict=True)}}
+            {
+                "period": t,
+                **{
+                    kind.value: set_json(kind, t, of[t])
+                    for kind, of in zip(SetKind, sets, strict=True)
+                },
+            }
             for t in range(1, solution.problem.periods + 1)
         ],
         "control_ranges": ranges,
@@ -180,45 +208,74 @@ def _member_json(rendezvous: Rendezvous, member: Member) -> dict[str, object]:
 
 
 def _flight_json(rendezvous: Rendezvous, flight: Flight) -> dict[str, object]:
-    return {**vars(flight), "miss": flight.miss, "delta_v_m_s": delta_v(rendezvous, flight.controls)}
+    return {
+        **vars(flight),
+        "miss": flight.miss,
+        "delta_v_m_s": delta_v(rendezvous, flight.controls),
+    }
 
 
 def _robust_json(robustness: Robustness) -> dict[str, object]:
     plan = robustness.plan
-    shown = plan and {key: getattr(plan, key) for key in ("worst_miss", "nominal", "lower", "upper")}
+    shown = plan and {
+        key: getattr(plan, key) for key in ("worst_miss", "nominal", "lower", "upper")
+    }
     return {**vars(robustness), "plan": shown}
 
 
 def report_lines(report: Report) -> Iterator[Part]:
-    """Yield the minimum norm, the tube, the selected controls and the simulations in closed loop, for the screen."""
-    rendezvous, solution, minimum = report.rendezvous, report.solution, report.min_periods
+    """Yield the minimum norm, the tube, the selected controls and the simulations in closed loop,
+    for the screen.
+    """
+    rendezvous = report.rendezvous
+    solution = report.solution
+    minimum = report.min_periods
     reached = f"norm 0 not reached in {report.searched_periods} periods"
     if minimum is not None:
         reached = f"norm 0 needs at least {minimum} period{'s' if minimum > 1 else ''}"
     yield f"{rendezvous.name}: minimum terminal norm {solution.optimal.miss:.9g} {NORM}; {reached}"
     yield from solution_lines(solution)
     yield f"axes: {AXES}"
-    yield f"units: {NORM} is the norm of a state in m and m/s; u is in units of {rendezvous.acceleration_m_s2:g} m/s^2"
+    yield (
+        f"units: {NORM} is the norm of a state in m and m/s; u is in units of "
+        f"{rendezvous.acceleration_m_s2:g} m/s^2"
+    )
     table = number_table("period", *(f"{axis} of the tube\nm" for axis in "xyz"))
     for t in range(1, solution.problem.periods + 1):
-        table.add_row(str(t), *(f"{low:.1f} .. {high:.1f}" for low, high in report.tube[t, :3] + 0.0))
+        table.add_row(
+            str(t), *(f"{low:.1f} .. {high:.1f}" for low, high in report.tube[t, :3] + 0.0)
+        )
     yield from ("", table)
     if report.members:
         yield from ("", _members_table(report))
     if report.flight is not None:
         used = delta_v(rendezvous, report.flight.controls)["sum"]
-        yield f"\nreplanned every period: nonlinear miss {number(report.flight.miss)} {NORM}, Delta-v {used:.4f} m/s"
+        yield (
+            "\n"
+            f"replanned every period: nonlinear miss {number(report.flight.miss)} {NORM}, Delta-v "
+            f"{used:.4f} m/s"
+        )
     if report.noisy:
         misses = [flight.miss for flight in report.noisy]
         relaxed = max(float(flight.relaxations.max()) for flight in report.noisy)
         yield (
-            f"with navigation errors, {len(misses)} simulations: median {number(float(np.median(misses)))}, "
-            f"largest {number(max(misses))} {NORM}; constraints relaxed by at most {relaxed:.2%}"
+            f"with navigation errors, {len(misses)} simulations: median "
+            f"{number(float(np.median(misses)))}, largest {number(max(misses))} {NORM}; "
+            f"constraints relaxed by at most {relaxed:.2%}"
         )
     if report.robustness is not None:
-        conflict, plan = report.robustness.conflict, report.robustness.plan
-        yield f"\nwith disturbances, without feedback: {conflict or 'controls that keep the constraints exist'}"
-        bound = report.robustness.refusal if plan is None else f"terminal norm at most {number(plan.worst_miss)} {NORM}"
+        conflict = report.robustness.conflict
+        plan = report.robustness.plan
+        yield (
+            "\n"
+            "with disturbances, without feedback: "
+            f"{conflict or 'controls that keep the constraints exist'}"
+        )
+        bound = (
+            report.robustness.refusal
+            if plan is None
+            else f"terminal norm at most {number(plan.worst_miss)} {NORM}"
+        )
         yield f"with disturbances, with feedback: {bound}"
 
 
@@ -231,10 +288,21 @@ def solution_lines(solution: Solution) -> Iterator[str]:
 
 def _members_table(report: Report) -> Table:
     table = number_table(
-        "control", "energy\nu^2", "peak\nu", "Delta-v\nm/s", f"nonlinear miss\n{NORM}", "violation between\nperiods"
+        "control",
+        "energy\nu^2",
+        "peak\nu",
+        "Delta-v\nm/s",
+        f"nonlinear miss\n{NORM}",
+        "violation between\nperiods",
     )
     for member in report.members:
-        spent, used = effort(member.controls), delta_v(report.rendezvous, member.controls)["sum"]
-        costs = (f"{spent.energy:.6f}", f"{spent.peak:.6f}", f"{used:.4f}", f"{member.nonlinear_miss:.4g}")
+        spent = effort(member.controls)
+        used = delta_v(report.rendezvous, member.controls)["sum"]
+        costs = (
+            f"{spent.energy:.6f}",
+            f"{spent.peak:.6f}",
+            f"{used:.4f}",
+            f"{member.nonlinear_miss:.4g}",
+        )
         table.add_row(member.name, *costs, f"{max(member.between, 0.0):.2%}")
     return table

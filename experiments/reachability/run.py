@@ -17,7 +17,14 @@ from infoset.experiments.common.screen import BeginProgress
 from infoset.experiments.reachability.command import Reach
 from infoset.experiments.reachability.file import Rendezvous
 from infoset.experiments.reachability.page import reachability_page
-from infoset.experiments.reachability.report import Member, Report, Robustness, report_json, report_lines, trajectories
+from infoset.experiments.reachability.report import (
+    Member,
+    Report,
+    Robustness,
+    report_json,
+    report_lines,
+    trajectories,
+)
 from infoset.experiments.reachability.selection import select_controls, selection
 from infoset.experiments.reachability.system import COMMAND as SYSTEM_COMMAND
 from infoset.experiments.reachability.system_file import ReachableSystem
@@ -40,7 +47,9 @@ NOISY_FLIGHTS = 10
 
 
 def solve_rendezvous(rendezvous: Rendezvous, options: Reach, begin: BeginProgress) -> Report:
-    """Return the sets, the selected optimal controls with their trajectories, and the simulations in closed loop."""
+    """Return the sets, the selected optimal controls with their trajectories, and the simulations
+    in closed loop.
+    """
     selection(options.select)  # a mistake is found before anything is computed
     progress = begin(rendezvous.name)
     solution = solve(rendezvous.problem)
@@ -54,7 +63,8 @@ def solve_rendezvous(rendezvous: Rendezvous, options: Reach, begin: BeginProgres
     controls = select_controls(solution, options)
     members = fly_members(rendezvous, [*controls], np.array([*controls.values()]))
     progress(0.7)
-    flight, noisy = None, []
+    flight = None
+    noisy = []
     if options.replan:
         flight = _fly(rendezvous, None)
         for run in range(NOISY_FLIGHTS if rendezvous.navigation_error is not None else 0):
@@ -80,9 +90,14 @@ def solve_rendezvous(rendezvous: Rendezvous, options: Reach, begin: BeginProgres
 
 
 def fly_members(
-    rendezvous: Rendezvous, names: Sequence[str], controls: Floats, truth: NonlinearMotion | None = None
+    rendezvous: Rendezvous,
+    names: Sequence[str],
+    controls: Floats,
+    truth: NonlinearMotion | None = None,
 ) -> tuple[Member, ...]:
-    """Simulate controls, shape (k, T, 3), on the linear and on the nonlinear model; `truth` replaces the latter."""
+    """Simulate controls, shape (k, T, 3), on the linear and on the nonlinear model; `truth`
+    replaces the latter.
+    """
     problem = rendezvous.problem
     linear = problem.run(controls)
     pushes = rendezvous.acceleration_m_s2 * controls
@@ -98,7 +113,9 @@ def _fly(rendezvous: Rendezvous, generator: np.random.Generator | None) -> Fligh
     def truth(period: int, state: Floats, control: Floats) -> Floats:
         start_s = rendezvous.period_s * period
         push = rendezvous.acceleration_m_s2 * control
-        return np.asarray(rendezvous.truth.paths(start_s, state, push, [start_s + rendezvous.period_s])[0, 0])
+        return np.asarray(
+            rendezvous.truth.paths(start_s, state, push, [start_s + rendezvous.period_s])[0, 0]
+        )
 
     def observe(_period: int, state: Floats) -> Floats:
         assert generator is not None
@@ -108,7 +125,9 @@ def _fly(rendezvous: Rendezvous, generator: np.random.Generator | None) -> Fligh
     try:
         return replan(rendezvous.problem, truth, None if generator is None else observe)
     except ArithmeticError as error:
-        raise InputError(f"--replan: {error}; omit --replan, or reduce its navigation errors, if any") from None
+        raise InputError(
+            f"--replan: {error}; omit --replan, or reduce its navigation errors, if any"
+        ) from None
 
 
 def _robustness(rendezvous: Rendezvous, disturbance: Floats) -> Robustness:

@@ -30,14 +30,17 @@ SINGLE = {
     "chebyshev": chebyshev_centre,
     "analytic": analytic_centre,
 }
-"""Selections of one control each: minimum sum of squares, of absolute values, of Euclidean norms, and so on."""
+"""Selections of one control each: minimum sum of squares, of absolute values, of Euclidean norms,
+and so on.
+"""
 VERTICES, SAMPLES = "vertices", "samples"
 MAX_SAMPLES = 1000
 
 
 def selection(text: str) -> tuple[list[str], int]:
     """Return the names of the selection, and the number of samples."""
-    names, count = [], 0
+    names = []
+    count = 0
     for part in text.split(","):
         name, _, digits = part.strip().partition(":")
         name = choice("--select", name, [*SINGLE, VERTICES, SAMPLES])
@@ -45,7 +48,9 @@ def selection(text: str) -> tuple[list[str], int]:
             with input_errors(f"--select {SAMPLES}"):
                 count = int(digits)
             if not 1 <= count <= MAX_SAMPLES:
-                raise InputError(f"--select {SAMPLES}: must be between 1 and {MAX_SAMPLES}, found {count}")
+                raise InputError(
+                    f"--select {SAMPLES}: must be between 1 and {MAX_SAMPLES}, found {count}"
+                )
         names.append(name)
     return names, count
 
@@ -61,9 +66,15 @@ def select_controls(solution: Solution, options: Reach) -> dict[str, Floats]:
             try:
                 several = vertices(solution.optimal)
             except (TooManyVerticesError, ThinSetError) as error:
-                raise InputError(f"--select vertices: {error}; choose for example --select samples:20") from None
-            controls |= {f"vertex {number}": control for number, control in enumerate(several, start=1)}
+                raise InputError(
+                    f"--select vertices: {error}; choose for example --select samples:20"
+                ) from None
+            controls |= {
+                f"vertex {number}": control for number, control in enumerate(several, start=1)
+            }
         else:
             several = samples(solution.optimal, count, np.random.default_rng(options.seed))
-            controls |= {f"sample {number}": control for number, control in enumerate(several, start=1)}
+            controls |= {
+                f"sample {number}": control for number, control in enumerate(several, start=1)
+            }
     return controls

@@ -24,7 +24,9 @@ _ZERO = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """Results of one command: sets, shape (T + 1, n, 2), controls, (T, m), and their states, (T + 1, n), by name."""
+    """Results of one command: sets, shape (T + 1, n, 2), controls, (T, m), and their states, (T +
+    1, n), by name.
+    """
 
     system: ReachableSystem
     solution: Solution
@@ -39,26 +41,35 @@ class Report:
 def solve_system(system: ReachableSystem, options: Reach, begin: BeginProgress) -> Report:
     """Return the sets and the selected optimal controls with their motions."""
     if options.replan or options.html is not None:
-        raise InputError("--replan and --html: are for problems of kind reachable-rendezvous; omit them here")
+        raise InputError(
+            "--replan and --html: are for problems of kind reachable-rendezvous; omit them here"
+        )
     selection(options.select)  # a mistake is found before anything is computed
     progress = begin(system.name)
-    problem, path = system.problem, system.path
+    problem = system.problem
+    path = system.path
     solution = solve(problem)
     progress(0.5)
     controls = select_controls(solution, options)
-    forward, tube = (solution.sets.bounds(kind) + path[..., None] for kind in (SetKind.FORWARD, SetKind.TUBE))
+    forward, tube = (
+        solution.sets.bounds(kind) + path[..., None] for kind in (SetKind.FORWARD, SetKind.TUBE)
+    )
     states = {name: problem.run(control) + path for name, control in controls.items()}
     still = not np.ptp(path, axis=0).any()  # otherwise another number of periods has another target
     least = min_periods(problem) if still else None
     progress(1.0)
-    return Report(system, solution, least, forward, tube, solution.optimal.ranges(), controls, states)
+    return Report(
+        system, solution, least, forward, tube, solution.optimal.ranges(), controls, states
+    )
 
 
 def report_json(report: Report) -> dict[str, object]:
     """Return the results for `infoset.experiments.common.output.to_json`."""
     return {
         "states": report.system.names,
-        **solution_json(report.solution, report.min_periods, (report.forward, report.tube), report.ranges),
+        **solution_json(
+            report.solution, report.min_periods, (report.forward, report.tube), report.ranges
+        ),
         "controls": [
             {"name": name, "controls": control, "states": report.states[name]}
             for name, control in report.controls.items()
@@ -68,8 +79,14 @@ def report_json(report: Report) -> dict[str, object]:
 
 def motions_csv(report: Report) -> str:
     """Return the motions under the selected controls as CSV; a control acts after its row."""
-    n, m = len(report.system.names), len(report.system.bounds.controls)
-    columns = ["control", "period", *(f"x{i + 1}" for i in range(n)), *(f"u{j + 1}" for j in range(m))]
+    n = len(report.system.names)
+    m = len(report.system.bounds.controls)
+    columns = [
+        "control",
+        "period",
+        *(f"x{i + 1}" for i in range(n)),
+        *(f"u{j + 1}" for j in range(m)),
+    ]
     rows: list[list[Cell]] = [
         [name, t, *states[t].tolist(), *(control[t].tolist() if t < len(control) else [None] * m)]
         for name, control in report.controls.items()
@@ -81,13 +98,20 @@ def motions_csv(report: Report) -> str:
 
 def report_lines(report: Report) -> Iterator[Part]:
     """Yield the minimum norm, the tube and the selected controls, for the screen."""
-    solution, minimum = report.solution, report.min_periods
-    least = "" if minimum is None else f"; to reach it takes at least {minimum} period{'s' if minimum > 1 else ''}"
+    solution = report.solution
+    minimum = report.min_periods
+    least = (
+        ""
+        if minimum is None
+        else f"; to reach it takes at least {minimum} period{'s' if minimum > 1 else ''}"
+    )
     yield f"{report.system.name}: minimum distance from the target {solution.optimal.miss:.9g}{least}"
     yield from solution_lines(solution)
     table = number_table("period", *(f"{name}\nof the tube" for name in report.system.names))
     for t, row in enumerate(report.tube):
-        shown = np.where(np.abs(row) < _ZERO * np.array(report.system.bounds.states)[:, None], 0.0, row)
+        shown = np.where(
+            np.abs(row) < _ZERO * np.array(report.system.bounds.states)[:, None], 0.0, row
+        )
         table.add_row(str(t), *(f"{low:.6g} .. {high:.6g}" for low, high in shown))
     yield from ("", table)
     members = number_table("control", "energy\nu^2", "sum of |u|", "peak\n|u|")

@@ -35,7 +35,9 @@ class BoundTable:
 
 @dataclass(frozen=True, kw_only=True)
 class ReachableSystem:
-    """A linear system that is to reach a `target` in T `periods`, from an `initial` state; the default target is 0."""
+    """A linear system that is to reach a `target` in T `periods`, from an `initial` state; the
+    default target is 0.
+    """
 
     kind: ClassVar[str] = "reachable-system"
 
@@ -49,7 +51,8 @@ class ReachableSystem:
     bounds: BoundTable
 
     def __post_init__(self) -> None:
-        n, m = len(self.system.A), len(self.bounds.controls)
+        n = len(self.system.A)
+        m = len(self.bounds.controls)
         for name, value, size in (
             ("system.A", self.system.A, (n, n)),
             ("system.B", self.system.B, (n, m)),
@@ -60,7 +63,9 @@ class ReachableSystem:
         ):
             if real_values(name, value).shape != size:
                 wanted = " x ".join(map(str, size))
-                raise ValueError(f"{name}: must have {wanted} values, for {n} states and {m} controls")
+                raise ValueError(
+                    f"{name}: must have {wanted} values, for {n} states and {m} controls"
+                )
         if len(self.names) != n:
             raise ValueError(f"system.states: must be {n} names, one for each state")
         _ = self.problem  # raises ValueError if it is none
@@ -68,24 +73,32 @@ class ReachableSystem:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the states."""
-        return self.system.states or tuple(f"x{number}" for number in range(1, len(self.system.A) + 1))
+        return self.system.states or tuple(
+            f"x{number}" for number in range(1, len(self.system.A) + 1)
+        )
 
     @cached_property
     def path(self) -> Floats:
-        """A motion without control that ends at the target, shape (T + 1, n); states are relative to it."""
+        """A motion without control that ends at the target, shape (T + 1, n); states are relative
+        to it.
+        """
         n = len(self.names)
-        a, c = np.array(self.system.A), np.array(self.system.c or [0.0] * n)
+        a = np.array(self.system.A)
+        c = np.array(self.system.c or [0.0] * n)
         states = [np.array(self.target or [0.0] * n)]
         for _ in range(self.periods):
             states.append(np.linalg.lstsq(a, states[-1] - c, rcond=None)[0])
-            if np.abs(a @ states[-1] + c - states[-2]).max() > 1e-9 * max(1.0, np.abs(states[-2]).max()):
+            if np.abs(a @ states[-1] + c - states[-2]).max() > 1e-9 * max(
+                1.0, np.abs(states[-2]).max()
+            ):
                 raise ValueError("target: A is singular, and no motion without control ends there")
         return np.array(states[::-1])
 
     @property
     def problem(self) -> ReachabilityProblem:
         """The problem that is solved, in states relative to `path`."""
-        n, bounds = len(self.names), np.array(self.bounds.states)
+        n = len(self.names)
+        bounds = np.array(self.bounds.states)
         moving = bool(self.path.any())
         return ReachabilityProblem(
             np.array([self.system.A] * self.periods),

@@ -1,1 +1,3 @@
-"""The sections of an information set: their storage, the two passes of a step, replay and the guaranteed miss."""
+"""The sections of an information set: their storage, the two passes of a step, replay and the
+guaranteed miss.
+"""

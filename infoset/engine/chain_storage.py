@@ -1,7 +1,9 @@
-"""Storage of the sections of a batch: records of chains and their rings, and the room that a section needs.
+"""Storage of the sections of a batch: records of chains and their rings, and the room that a
+section needs.
 
-A batch of sections is stored in two arrays, `records` and `rings`; kernels take the address of the records of both
-chains, and the rings. Each ring has the size that its own section needs, so that a step accesses compact memory.
+A batch of sections is stored in two arrays, `records` and `rings`; kernels take the address of the
+records of both chains, and the rings. Each ring has the size that its own section needs, so that a
+step accesses compact memory.
 """
 
 from __future__ import annotations
@@ -13,7 +15,16 @@ from numpy.typing import NDArray
 
 from infoset._compile import ZERO, allocation_free, inlined, pasted, record_of
 from infoset.arrays import Floats
-from infoset.engine.chains import CAPACITY, MAX_ADDED, Chain, SectionView, count_of, number_vertices, read, write
+from infoset.engine.chains import (
+    CAPACITY,
+    MAX_ADDED,
+    Chain,
+    SectionView,
+    count_of,
+    number_vertices,
+    read,
+    write,
+)
 
 ROOM_AT_START = 64
 """Initial room of a chain, in vertices, a power of two."""
@@ -47,7 +58,8 @@ class Chains(NamedTuple):
 def empty_sections(number: int, room: int = CAPACITY) -> Chains:
     """Return empty chains with room for `room` vertices each, a power of two.
 
-    The rings are allocated at their maximum size; the operating system provides memory when it is written.
+    The rings are allocated at their maximum size; the operating system provides memory when it is
+    written.
     """
     records = np.zeros(2 * number, dtype=record_of(Chain))
     records["ring"] = FIRST_RING + (2 * room + LINE) * np.arange(2 * number)
@@ -82,7 +94,9 @@ def working_room() -> Floats:
 def view_of(chains: Chains, n: int, label: float) -> SectionView:
     """Return the view of a section by its number."""
     records = chains.records
-    return SectionView(records[np.uint64(2 * n)], records[np.uint64(2 * n + 1)], chains.rings, label)
+    return SectionView(
+        records[np.uint64(2 * n)], records[np.uint64(2 * n + 1)], chains.rings, label
+    )
 
 
 @inlined
@@ -101,13 +115,17 @@ def room_for(vertices: int, room: int) -> int:
 
 @inlined
 def floats_of(room: int) -> int:
-    """Floats of a ring. One cache line more than its vertices: rings must not all start in the same cache lines."""
+    """Floats of a ring. One cache line more than its vertices: rings must not all start in the same
+    cache lines.
+    """
     return 2 * room + LINE
 
 
 @allocation_free
 def widen_rings(section: SectionView, room: int) -> None:
-    """Move both chains of a section to new rings of `room` vertices, a power of two, at the end of those in use."""
+    """Move both chains of a section to new rings of `room` vertices, a power of two, at the end of
+    those in use.
+    """
     rings = section.rings
     for chain in (section.right, section.left):
         first = int(rings[TAKEN])
@@ -139,8 +157,11 @@ def copy_chain(chain: Chain, rings: Floats, to: Chain, to_rings: Floats) -> None
 
 @allocation_free
 def copy_section(chains: Chains, n: int, to_chains: Chains, to_n: int) -> None:
-    """Copy section `n` to section `to_n` of other chains, whose rings must have enough unused room."""
-    section, to = view_of(chains, n, 0.0), view_of(to_chains, to_n, 0.0)
+    """Copy section `n` to section `to_n` of other chains, whose rings must have enough unused
+    room.
+    """
+    section = view_of(chains, n, 0.0)
+    to = view_of(to_chains, to_n, 0.0)
     number_vertices(to.right, ZERO)
     number_vertices(to.left, ZERO)
     wanted = room_for(min(count_of(section) + ROOM_AHEAD, CAPACITY), room_of(to))

@@ -1,22 +1,27 @@
 """Compiled operations on a section: a convex polygon, stored as two chains of vertices.
 
-The coordinates are (V, m) with m = z + V tau, where tau is the time to go: m is the predicted miss, which is constant
-in free motion, and z = m - tau V. The height of a vertex is z, and a level is a line of constant z. Cuts and
-disturbances act relative to the levels: a cut removes the highest or the lowest part, and a disturbance moves the two
-sides apart along the level. Therefore the boundary is stored as a RIGHT chain from the lowest vertex to the highest and
-a LEFT chain from the highest vertex to the lowest:
+The coordinates are (V, m) with m = z + V tau, where tau is the time to go: m is the predicted miss,
+which is constant in free motion, and z = m - tau V. The height of a vertex is z, and a level is a
+line of constant z. Cuts and disturbances act relative to the levels: a cut removes the highest or
+the lowest part, and a disturbance moves the two sides apart along the level. Therefore the boundary
+is stored as a RIGHT chain from the lowest vertex to the highest and a LEFT chain from the highest
+vertex to the lowest:
 
-* a disturbance moves each chain as a whole, an impulse moves both: only the origins of the chains change;
+* a disturbance moves each chain as a whole, an impulse moves both: only the origins of the chains
+  change;
 * a cut removes vertices from the ends of the chains and inserts the intersections with its line;
-* as tau decreases, the levels turn in a constant direction, and the last vertices of each chain pass to the other one;
-* the maximum predicted miss is at the peak of the right chain, the minimum at the peak of the left one. A peak changes
-  only when a cut removes it.
+* as tau decreases, the levels turn in a constant direction, and the last vertices of each chain
+  pass to the other one;
+* the maximum predicted miss is at the peak of the right chain, the minimum at the peak of the left
+  one. A peak changes only when a cut removes it.
 
-A vertex is inserted once, changes chains once or twice and is removed once, so the cost of a step is constant.
+A vertex is inserted once, changes chains once or twice and is removed once, so the cost of a step
+is constant.
 
-The left chain has the structure of the right one rotated by 180 degrees: the sign of its side times the height
-increases along each chain. Each chain is a ring buffer. Edges along the level join its ends to those of the other
-chain; their length is zero where the chains meet. `chain_storage` contains the arrays of a batch of sections.
+The left chain has the structure of the right one rotated by 180 degrees: the sign of its side times
+the height increases along each chain. Each chain is a ring buffer. Edges along the level join its
+ends to those of the other chain; their length is zero where the chains meet. `chain_storage`
+contains the arrays of a batch of sections.
 """
 
 from __future__ import annotations
@@ -32,8 +37,8 @@ from infoset.geometry import polygon, polygon_reduction
 from infoset.geometry.double_words import two_product, two_sum
 
 EPSILON = float(np.finfo(np.float64).eps)
-"""One ulp of 1. A coordinate of a vertex has an error of about one ulp of its terms, V tau and m; where two of them are
-compared, 4 ulp allow for both, and for the two origins."""
+"""One ulp of 1. A coordinate of a vertex has an error of about one ulp of its terms, V tau and m;
+where two of them are compared, 4 ulp allow for both, and for the two origins."""
 CAPACITY = 256
 """Maximum number of vertices of a section, a power of two."""
 MAX_ADDED = 4
@@ -41,7 +46,8 @@ MAX_ADDED = 4
 REDUCED = 160
 """Number of vertices to which a section of CAPACITY vertices is reduced."""
 ZERO, ONE, TWO = constants(3)
-FORWARD, BACKWARD = ONE, -ONE
+FORWARD = ONE
+BACKWARD = -ONE
 """Directions along a chain."""
 
 
@@ -51,15 +57,16 @@ class Chain(Protocol):
     Parameters
     ----------
     v, v_rest, m, m_rest : float
-        Origin, m/s and m. Each coordinate is a sum of two floats, since it changes at every step and rounding errors
-        must not accumulate.
+        Origin, m/s and m. Each coordinate is a sum of two floats, since it changes at every step
+        and rounding errors must not accumulate.
     reach : float
-        Bound of |V| over the section's history, m/s, to which rounding errors are relative; in the right chain only.
+        Bound of |V| over the section's history, m/s, to which rounding errors are relative; in the
+        right chain only.
     begin, end, peak : int
         Number of the first vertex, one past that of the last, and that of the peak.
     ring, mask : int
-        Offset of the ring in `rings`, and the ring's size minus one. The size is a power of two, and a vertex is stored
-        at its number modulo the size.
+        Offset of the ring in `rings`, and the ring's size minus one. The size is a power of two,
+        and a vertex is stored at its number modulo the size.
     """
 
     v: float
@@ -75,7 +82,9 @@ class Chain(Protocol):
 
 
 class SectionView(NamedTuple):
-    """A section, as kernels take it: the addresses of its chains, the rings with their vertices, and its label, m."""
+    """A section, as kernels take it: the addresses of its chains, the rings with their vertices,
+    and its label, m.
+    """
 
     right: Chain
     left: Chain
@@ -109,7 +118,9 @@ def write(chain: Chain, rings: Floats, i: int, v: float, m: float) -> None:
 
 @inlined
 def number_vertices(chain: Chain, count: int) -> None:
-    """Note that a chain consists of `count` vertices, numbered from zero, and that its peak is not known."""
+    """Note that a chain consists of `count` vertices, numbered from zero, and that its peak is not
+    known.
+    """
     chain.begin = 0
     chain.end = count
     chain.peak = 0
@@ -118,7 +129,8 @@ def number_vertices(chain: Chain, count: int) -> None:
 @inlined
 def count_of(section: SectionView) -> int:
     """Number of vertices of both chains."""
-    right, left = section.right, section.left
+    right = section.right
+    left = section.left
     return (right.end - right.begin) + (left.end - left.begin)
 
 
@@ -144,7 +156,9 @@ def vertex(chain: Chain, rings: Floats, i: int) -> tuple[float, float]:
 
 @inlined
 def move(chain: Chain, v: float, m: float) -> None:
-    """Add to the origin of a chain; the second float of each coordinate takes the rounding error."""
+    """Add to the origin of a chain; the second float of each coordinate takes the rounding
+    error.
+    """
     chain.v, v_rest = two_sum(chain.v, v)
     chain.m, m_rest = two_sum(chain.m, m)
     chain.v_rest += v_rest
@@ -191,24 +205,29 @@ def hand_over(
 ) -> None:
     """Move the vertices of a chain after its highest one to the front of the other chain.
 
-    `sign` is 1 if the giver is the right chain, else -1. `between` has V, m and height of the giver's origin relative
-    to the taker's, `same` the rounding errors of a difference of V, and of the difference of the origins' heights.
+    `sign` is 1 if the giver is the right chain, else -1. `between` has V, m and height of the
+    giver's origin relative to the taker's, `same` the rounding errors of a difference of V, and of
+    the difference of the origins' heights.
 
-    A decreasing time to go raises the right side, so only vertices whose predecessor is on the outer side are moved.
-    Without a turn of the level, heights along it are equal to within rounding, and no vertex may be moved. Where both
-    chains end in the same vertex, their copies differ only by rounding: moving it again would add a vertex at every
-    second step.
+    A decreasing time to go raises the right side, so only vertices whose predecessor is on the
+    outer side are moved. Without a turn of the level, heights along it are equal to within
+    rounding, and no vertex may be moved. Where both chains end in the same vertex, their copies
+    differ only by rounding: moving it again would add a vertex at every second step.
     """
-    first, back, front = giver.begin, giver.end - 1, taker.begin
+    first = giver.begin
+    back = giver.end - 1
+    front = taker.begin
     v, m = read(giver, rings, back)
     rise = sign * (m - tau * v)
-    same_v, same_rise = same[0], same[1] + 4.0 * EPSILON * abs(m)
+    same_v = same[0]
+    same_rise = same[1] + 4.0 * EPSILON * abs(m)
     front_v, front_m = read(taker, rings, front)
     front_rise = sign * (front_m - tau * front_v)
     while True:
         if rise + sign * between[2] > front_rise + same_rise:
             front -= 1
-            front_v, front_m = v + between[0], m + between[1]
+            front_v = v + between[0]
+            front_m = m + between[1]
             write(taker, rings, front, front_v, front_m)
             front_rise = sign * (front_m - tau * front_v)
         if back == first:
@@ -221,14 +240,18 @@ def hand_over(
         if before_rise < rise and abs(v - before_v) > same_v:
             break
         back -= 1
-        v, m, rise = before_v, before_m, before_rise
+        v = before_v
+        m = before_m
+        rise = before_rise
     giver.end = back + 1
     taker.begin = front
 
 
 @inlined
 def turn(section: SectionView, tau: float) -> None:
-    """Decrease the time to go to `tau`: the level turns, and the chains get new highest and lowest ends."""
+    """Decrease the time to go to `tau`: the level turns, and the chains get new highest and lowest
+    ends.
+    """
     right, left, rings, _ = section
     same_v = 4.0 * EPSILON * right.reach
     same_m = 2.0 * EPSILON * (abs(right.m) + abs(left.m))
@@ -251,7 +274,9 @@ def spread(section: SectionView, tau: float, half_v: float) -> None:
 
 @inlined
 def shift(section: SectionView, tau: float, v: float) -> None:
-    """Move a section by `v` along the level of `tau`: z is unchanged, the predicted miss changes by v tau."""
+    """Move a section by `v` along the level of `tau`: z is unchanged, the predicted miss changes by
+    v tau.
+    """
     m, rest = two_product(v, tau)
     for chain in (section.right, section.left):
         move(chain, v, m)
@@ -263,7 +288,8 @@ def shift(section: SectionView, tau: float, v: float) -> None:
 def heights(section: SectionView, tau: float) -> tuple[float, float]:
     """Minimum and maximum z of a section at time to go `tau`."""
     right, left, rings, _ = section
-    right_origin, left_origin = origin_height(right, tau), origin_height(left, tau)
+    right_origin = origin_height(right, tau)
+    left_origin = origin_height(left, tau)
     minimum = min(
         right_origin + height_in(right, rings, right.begin, tau),
         left_origin + height_in(left, rings, left.end - 1, tau),
@@ -277,13 +303,16 @@ def heights(section: SectionView, tau: float) -> tuple[float, float]:
 
 @inlined
 def cut_end(chain: Chain, rings: Floats, way: int, up: float, tau: float, level: float) -> int:
-    """Remove the part of a chain above a level, and add a vertex at the intersection; return its number, the new end.
+    """Remove the part of a chain above a level, and add a vertex at the intersection; return its
+    number, the new end.
 
-    `way` is the direction from the end that is cut: FORWARD from the first vertex, BACKWARD from the last one. With
-    `up` = 1 greater z is removed, with -1 lesser z. `level` is `up` times the height of the level relative to the
-    chain's origin, m.
+    `way` is the direction from the end that is cut: FORWARD from the first vertex, BACKWARD from
+    the last one. With `up` = 1 greater z is removed, with -1 lesser z. `level` is `up` times the
+    height of the level relative to the chain's origin, m.
     """
-    end, other_end = (chain.begin, chain.end - 1) if way == FORWARD else (chain.end - 1, chain.begin)
+    end, other_end = (
+        (chain.begin, chain.end - 1) if way == FORWARD else (chain.end - 1, chain.begin)
+    )
     v, m = read(chain, rings, end)
     height = up * (m - tau * v)
     if height <= level:
@@ -298,7 +327,8 @@ def cut_end(chain: Chain, rings: Floats, way: int, up: float, tau: float, level:
             else:
                 v += (level - height) / (inner_height - height) * (inner_v - v)
             break
-        v, height = inner_v, inner_height
+        v = inner_v
+        height = inner_height
         end += way
     write(chain, rings, end, v, up * level + tau * v)
     return end
@@ -306,18 +336,21 @@ def cut_end(chain: Chain, rings: Floats, way: int, up: float, tau: float, level:
 
 @inlined
 def cut(section: SectionView, tau: float, lower: float, upper: float) -> tuple[bool, float]:
-    """Intersect a section at time to go `tau` with the band lower <= z <= upper, the heights of the levels, m.
+    """Intersect a section at time to go `tau` with the band lower <= z <= upper, the heights of the
+    levels, m.
 
-    Return whether it lives, and the smaller overlap of section and band at the two borders, m: minus their distance if
-    they do not intersect. If the intersection is empty, the section is unchanged. A band with `lower` above `upper` is
-    empty: that of a label behind x = 0, or beyond the range at which the error bound is zero.
+    Return whether it lives, and the smaller overlap of section and band at the two borders, m:
+    minus their distance if they do not intersect. If the intersection is empty, the section is
+    unchanged. A band with `lower` above `upper` is empty: that of a label behind x = 0, or beyond
+    the range at which the error bound is zero.
     """
     right, left, rings, _ = section
     minimum, maximum = heights(section, tau)
     overlap = min(maximum - lower, upper - minimum)
     if overlap < 0.0 or lower > upper:
         return False, min(overlap, upper - lower)
-    right_height, left_height = origin_height(right, tau), origin_height(left, tau)
+    right_height = origin_height(right, tau)
+    left_height = origin_height(left, tau)
     if maximum > upper:
         right.end = cut_end(right, rings, BACKWARD, 1.0, tau, upper - right_height) + 1
         left.begin = cut_end(left, rings, FORWARD, 1.0, tau, upper - left_height)
@@ -329,13 +362,16 @@ def cut(section: SectionView, tau: float, lower: float, upper: float) -> tuple[b
 
 @inlined
 def find_peak(chain: Chain, rings: Floats, sign: float, magnitude: float) -> int:
-    """Return the number of the vertex with the maximum (right chain) or minimum (left chain) predicted miss; store it.
+    """Return the number of the vertex with the maximum (right chain) or minimum (left chain)
+    predicted miss; store it.
 
-    `sign` is 1 for the right chain, -1 for the left one. `magnitude` is that of the terms of the predicted misses, to
-    which their rounding error is relative, m. The search starts at the previous peak and ends where the miss decreases
-    by more than rounding, so that vertices that nearly coincide do not stop it.
+    `sign` is 1 for the right chain, -1 for the left one. `magnitude` is that of the terms of the
+    predicted misses, to which their rounding error is relative, m. The search starts at the
+    previous peak and ends where the miss decreases by more than rounding, so that vertices that
+    nearly coincide do not stop it.
     """
-    first, last = chain.begin, chain.end - 1
+    first = chain.begin
+    last = chain.end - 1
     peak = min(max(chain.peak, first), last)
     miss = sign * read(chain, rings, peak)[1]
     # 16 ulp, as for a cut: more than the errors of two misses.
@@ -346,7 +382,8 @@ def find_peak(chain: Chain, rings: Floats, sign: float, magnitude: float) -> int
         while first <= i <= last:
             here = sign * read(chain, rings, i)[1]
             if here > miss:
-                peak, miss = i, here
+                peak = i
+                miss = here
             elif here < miss - rounding:
                 break
             i += way
@@ -356,7 +393,9 @@ def find_peak(chain: Chain, rings: Floats, sign: float, magnitude: float) -> int
 
 @inlined
 def first_near_peak(chain: Chain, rings: Floats, sign: float, tolerance: float) -> int:
-    """First vertex before the peak whose predicted miss equals that of the peak to within a tolerance."""
+    """First vertex before the peak whose predicted miss equals that of the peak to within a
+    tolerance.
+    """
     i = chain.peak
     level = sign * read(chain, rings, i)[1] - tolerance
     while i > chain.begin and sign * read(chain, rings, i - 1)[1] >= level:
@@ -366,7 +405,9 @@ def first_near_peak(chain: Chain, rings: Floats, sign: float, tolerance: float) 
 
 @inlined
 def max_and_min_miss(section: SectionView, tau: float) -> tuple[float, float]:
-    """Return the maximum and the minimum predicted miss of a section; store their vertices as peaks."""
+    """Return the maximum and the minimum predicted miss of a section; store their vertices as
+    peaks.
+    """
     right, left, rings, _ = section
     # A miss is z + V tau; both terms may be far greater than the sum.
     reach = tau * right.reach
@@ -379,10 +420,12 @@ def max_and_min_miss(section: SectionView, tau: float) -> tuple[float, float]:
 def extreme_points(
     section: SectionView, tau: float, relative: float, slack: float
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return points with the extremes of the predicted miss; `max_and_min_miss` must have stored the peaks.
+    """Return points with the extremes of the predicted miss; `max_and_min_miss` must have stored
+    the peaks.
 
-    They are V and m of the lowest point with the maximum miss, and of the highest point with the minimum. `relative`
-    and `slack` are tolerances for equal misses, relative to the interval and to the magnitudes of the terms.
+    They are V and m of the lowest point with the maximum miss, and of the highest point with the
+    minimum. `relative` and `slack` are tolerances for equal misses, relative to the interval and to
+    the magnitudes of the terms.
     """
     right, left, rings, _ = section
     upper_v, upper = vertex(right, rings, right.peak)
@@ -395,23 +438,29 @@ def extreme_points(
 
 
 @inlined
-def vertex_from(chain: Chain, rings: Floats, i: int, tau: float, v: float, z: float) -> tuple[float, float]:
+def vertex_from(
+    chain: Chain, rings: Floats, i: int, tau: float, v: float, z: float
+) -> tuple[float, float]:
     """Vertex of a chain relative to a state, in the plane of V x/e and z, m."""
-    offset_v, offset_z = tau * (chain.v - v + chain.v_rest), origin_height(chain, tau) - z
+    offset_v = tau * (chain.v - v + chain.v_rest)
+    offset_z = origin_height(chain, tau) - z
     chain_v, chain_m = read(chain, rings, i)
     return tau * chain_v + offset_v, (chain_m - tau * chain_v) + offset_z
 
 
 @allocation_free
 def margin_in(section: SectionView, tau: float, v: float, z: float) -> float:
-    """Signed distance of a state to the boundary of a section in the plane of V x/e and z, m; positive inside."""
+    """Signed distance of a state to the boundary of a section in the plane of V x/e and z, m;
+    positive inside.
+    """
     right, left, rings, _ = section
     last_v, last_m = vertex(left, rings, left.end - 1)
     rounded = (tau * (last_v - v), (last_m - tau * last_v) - z)
     end = vertex_from(left, rings, left.end - 1, tau, v, z)
     last = vertex_from(right, rings, right.begin, tau, v, z)
-    # The edge between the chains: a start rounded to absolute coordinates may be beyond the state in a section that is
-    # thinner than this rounding. It is used for the distance only, which keeps the last digit of published margins.
+    # The edge between the chains: a start rounded to absolute coordinates may be beyond the state
+    # in a section that is thinner than this rounding. It is used for the distance only, which keeps
+    # the last digit of published margins.
     nearest, _ = polygon.pass_edge(np.inf, FALSE, rounded, last, 0.0, 0.0)
     _, inside = polygon.pass_edge(np.inf, FALSE, end, last, 0.0, 0.0)
     for chain in (right, left):
@@ -426,7 +475,8 @@ def margin_in(section: SectionView, tau: float, v: float, z: float) -> float:
 def outline(section: SectionView, tau: float, out: Floats) -> int:
     """Write the vertices (V, z), counter-clockwise; return their number, at most CAPACITY.
 
-    A point in which the chains meet is stored in both, equal to within rounding. It is written once.
+    A point in which the chains meet is stored in both, equal to within rounding. It is written
+    once.
     """
     right, left, rings, _ = section
     made = ZERO
@@ -458,12 +508,14 @@ def is_crowded(section: SectionView) -> bool:
 def reduce_outward(section: SectionView, tau: float, points: Floats) -> None:
     """Enlarge a section by removing edges of the longer chain until it has `REDUCED` vertices.
 
-    An edge is removed by extending its neighbours to their intersection; the edge that adds the minimum area is removed
-    first. Vertices that are not convex because of rounding are removed before. If no edge can be removed, three sides
-    of a box around the chain replace it. `points`, shape (3 CAPACITY + 4, 2), is a working array.
+    An edge is removed by extending its neighbours to their intersection; the edge that adds the
+    minimum area is removed first. Vertices that are not convex because of rounding are removed
+    before. If no edge can be removed, three sides of a box around the chain replace it. `points`,
+    shape (3 CAPACITY + 4, 2), is a working array.
     """
     right, left, rings, _ = section
-    in_right, in_left = right.end - right.begin, left.end - left.begin
+    in_right = right.end - right.begin
+    in_left = left.end - left.begin
     longer, sign = (right, 1.0) if in_right > in_left else (left, -1.0)
     count = ZERO
     for i in range(longer.begin, longer.end):
@@ -482,11 +534,14 @@ def reduce_outward(section: SectionView, tau: float, points: Floats) -> None:
 
 
 @allocation_free
-def cut_misses(section: SectionView, tau: float, lower: float, upper: float, points: Floats) -> tuple[bool, float]:
-    """Intersect a section with the band of predicted misses lower <= m <= upper; returns are those of `cut`.
+def cut_misses(
+    section: SectionView, tau: float, lower: float, upper: float, points: Floats
+) -> tuple[bool, float]:
+    """Intersect a section with the band of predicted misses lower <= m <= upper; returns are those
+    of `cut`.
 
-    This band is not parallel to the level, so that it may cut any edge: the chains are computed anew. O(vertices).
-    `points` is a working array of CAPACITY + 2 vertices.
+    This band is not parallel to the level, so that it may cut any edge: the chains are computed
+    anew. O(vertices). `points` is a working array of CAPACITY + 2 vertices.
     """
     right, left, rings, _ = section
     count = ZERO
@@ -499,8 +554,11 @@ def cut_misses(section: SectionView, tau: float, lower: float, upper: float, poi
         return False, overlap
     bottom, top = polygon.extremes(points, count, -tau, 1.0)
     thickness = polygon.height(points, top, -tau, 1.0) - polygon.height(points, bottom, -tau, 1.0)
-    if thickness <= 16.0 * EPSILON * (abs(points[top, 1]) + abs(points[bottom, 1]) + tau * right.reach):
-        # All heights are equal to within the slack of a cut: the vertices of extreme V are the ends of both chains.
+    if thickness <= 16.0 * EPSILON * (
+        abs(points[top, 1]) + abs(points[bottom, 1]) + tau * right.reach
+    ):
+        # All heights are equal to within the slack of a cut: the vertices of extreme V are the ends
+        # of both chains.
         bottom, top = polygon.extremes(points, count, -1.0, 0.0)
     write_chain(right, rings, points, count, bottom, top)
     write_chain(left, rings, points, count, top, bottom)
@@ -508,7 +566,9 @@ def cut_misses(section: SectionView, tau: float, lower: float, upper: float, poi
 
 
 @allocation_free
-def write_chain(chain: Chain, rings: Floats, points: Floats, count: int, first: int, last: int) -> None:
+def write_chain(
+    chain: Chain, rings: Floats, points: Floats, count: int, first: int, last: int
+) -> None:
     """Write the vertices of a polygon from one to another, counter-clockwise, as a chain."""
     length = (last - first) % count + 1
     for i in range(length):

@@ -9,8 +9,9 @@ from infoset.arrays import Floats
 from infoset.engine.replays import Records
 
 CERTAIN = 1e-13
-"""Labels count as dead if their overlap is certainly less than minus this number times the label: the rounding error of
-an overlap is a few ulp of the terms of a height, which are less than the label."""
+"""Labels count as dead if their overlap is certainly less than minus this number times the label:
+the rounding error of an overlap is a few ulp of the terms of a height, which are less than the
+label."""
 
 
 @allocation_free
@@ -20,25 +21,33 @@ def line_at(x: float, x0: float, y0: float, x1: float, y1: float) -> float:
 
 
 @allocation_free
-def bound_between(labels: Floats, values: Floats, first: int, p: float, q: float, slope: float) -> float:
-    """Upper bound on [p, q] of a concave function with given values, plus a line through zero at its middle, by (12).
+def bound_between(
+    labels: Floats, values: Floats, first: int, p: float, q: float, slope: float
+) -> float:
+    """Upper bound on [p, q] of a concave function with given values, plus a line through zero at
+    its middle, by (12).
 
-    `values` are those of the function at increasing `labels`, of which `first` are at most p and the others at least q.
-    Outside of two of its points, a concave function lies below the line through them. The bound is infinite if neither
-    side has two points.
+    `values` are those of the function at increasing `labels`, of which `first` are at most p and
+    the others at least q. Outside of two of its points, a concave function lies below the line
+    through them. The bound is infinite if neither side has two points.
     """
-    has_left, has_right = first >= 2, labels.size - first >= 2
+    has_left = first >= 2
+    has_right = labels.size - first >= 2
     left_p = left_q = right_p = right_q = np.inf
     if has_left:
-        a, b = first - 2, first - 1
+        a = first - 2
+        b = first - 1
         left_p = line_at(p, labels[a], values[a], labels[b], values[b])
         left_q = line_at(q, labels[a], values[a], labels[b], values[b])
     if has_right:
-        a, b = first, first + 1
+        a = first
+        b = first + 1
         right_p = line_at(p, labels[a], values[a], labels[b], values[b])
         right_q = line_at(q, labels[a], values[a], labels[b], values[b])
     middle = 0.5 * (p + q)
-    best = max(min(left_p, right_p) + slope * (p - middle), min(left_q, right_q) + slope * (q - middle))
+    best = max(
+        min(left_p, right_p) + slope * (p - middle), min(left_q, right_q) + slope * (q - middle)
+    )
     if has_left and has_right and (left_p < right_p) != (left_q < right_q):
         share = (right_p - left_p) / ((right_p - left_p) - (right_q - left_q))
         x = p + share * (q - p)
@@ -48,26 +57,36 @@ def bound_between(labels: Floats, values: Floats, first: int, p: float, q: float
 
 @allocation_free
 def is_dead_between(dead: Records, latest: Floats) -> bool:
-    """Return whether all labels from the first to the last of some dead labels, in increasing order, are dead.
+    """Return whether all labels from the first to the last of some dead labels, in increasing
+    order, are dead.
 
-    The overlap at the latest event at which one of them became empty is a concave function of the label. `latest`,
-    shape (2, len(dead)), is a working array.
+    The overlap at the latest event at which one of them became empty is a concave function of the
+    label. `latest`, shape (2, len(dead)), is a working array.
     """
     last_event = dead[0].died
     for i in range(1, len(dead)):
         last_event = max(last_event, dead[i].died)
-    known, values = latest[0], latest[1]
+    known = latest[0]
+    values = latest[1]
     count = ZERO
     for i in range(len(dead)):
         if dead[i].died == last_event and (count == 0 or dead[i].label > known[count - 1]):
             known[count], values[count] = dead[i].label, dead[i].overlap
             count += 1
-    minimum, maximum, last = dead[0].label, dead[len(dead) - 1].label, known[count - 1]
+    minimum = dead[0].label
+    maximum = dead[len(dead) - 1].label
+    last = known[count - 1]
     rounding = -CERTAIN * maximum
-    known, values = known[:count], values[:count]
-    if minimum < known[0] and bound_between(known, values, ZERO, minimum, known[0], 0.0) >= rounding:
+    known = known[:count]
+    values = values[:count]
+    if (
+        minimum < known[0]
+        and bound_between(known, values, ZERO, minimum, known[0], 0.0) >= rounding
+    ):
         return False
     for i in range(count - 1):
         if bound_between(known, values, i + 1, known[i], known[i + 1], 0.0) >= rounding:
             return False
-    return bool(last == maximum or bound_between(known, values, count, last, maximum, 0.0) < rounding)
+    return bool(
+        last == maximum or bound_between(known, values, count, last, maximum, 0.0) < rounding
+    )

@@ -1,9 +1,10 @@
 """The guaranteed miss Phi: an upper bound of the true miss over all labels, computed on board.
 
-Labels leave the set step by step as their range passes below the threshold. Phi is the maximum of (10) in
-docs/guarantee.md over all of them: a search by branch and bound. The labels that leave in one step are divided into
-pieces, and Lemma 7 bounds each piece. The piece with the maximum bound is divided further until an exact section
-reaches nearly as much; the other pieces need no more than their first bounds.
+Labels leave the set step by step as their range passes below the threshold. Phi is the maximum of
+(10) in docs/guarantee.md over all of them: a search by branch and bound. The labels that leave in
+one step are divided into pieces, and Lemma 7 bounds each piece. The piece with the maximum bound is
+divided further until an exact section reaches nearly as much; the other pieces need no more than
+their first bounds.
 """
 
 from __future__ import annotations
@@ -19,7 +20,15 @@ from infoset.arrays import Flags, Floats, Integers
 from infoset.engine import chains
 from infoset.engine.concave_bounds import bound_between
 from infoset.engine.history import IMPULSE, PREDICTION, EventLog, History
-from infoset.engine.location import FIRST, LABEL_RESOLUTION, LAST, MIDDLE, Living, locate_end, search_bracket
+from infoset.engine.location import (
+    FIRST,
+    LABEL_RESOLUTION,
+    LAST,
+    MIDDLE,
+    Living,
+    locate_end,
+    search_bracket,
+)
 from infoset.engine.replays import (
     LOWER,
     PROBE,
@@ -44,19 +53,29 @@ LABELS = 3
 MAX_LABELS = LABELS + 2
 PIECES = LABELS + 1
 NEAREST_OUTSIDE = 0.005
-"""Minimum distance of a label below the others, in their spacing: a nearer one amplifies rounding."""
+"""Minimum distance of a label below the others, in their spacing: a nearer one amplifies
+rounding.
+"""
 TIGHT = 1.001
 """A piece is divided if its bound exceeds the maximum miss of an exact section by this factor."""
 MAX_DIVIDED = 400
 """Maximum number of pieces that are divided. If more are needed, Phi is a greater bound."""
 GROUPS = 3000
-"""Labels that leave within this part of a flight are bounded together, if they need several steps."""
+"""Labels that leave within this part of a flight are bounded together, if they need several
+steps.
+"""
 SLACK = 1e-9
 """Relative enlargement of a bound; the rounding errors of supports and lines are far smaller."""
 ROUNDING = 4.0 * chains.EPSILON
-"""Rounding error of a miss, relative to the maximum label: of x at the closest approach, also if z is exactly zero."""
-PIECE = np.dtype([("near", np.float64), ("far", np.float64), ("step", np.int64), ("bound", np.float64)])
-"""A piece: its labels, m, the number of the step in `Leaving`, and the bound of its miss by (12), m."""
+"""Rounding error of a miss, relative to the maximum label: of x at the closest approach, also if z
+is exactly zero.
+"""
+PIECE = np.dtype(
+    [("near", np.float64), ("far", np.float64), ("step", np.int64), ("bound", np.float64)]
+)
+"""A piece: its labels, m, the number of the step in `Leaving`, and the bound of its miss by (12),
+m.
+"""
 
 
 class Leaving(NamedTuple):
@@ -101,7 +120,9 @@ class Outlines(NamedTuple):
 
 
 class Replayed(NamedTuple):
-    """Number of the labels replayed for a window, and how many of them are below and above its living ones."""
+    """Number of the labels replayed for a window, and how many of them are below and above its
+    living ones.
+    """
 
     number: int
     inner: int
@@ -129,20 +150,27 @@ def write_outline(outlines: Outlines, i: int, label: float, row: int, past: Past
 
 
 @allocation_free
-def later_impulses(near: float, far: float, side: float, past: Past, law: SectionLaw) -> tuple[float, float]:
-    """Return a lower bound of the sum of side kappa_j x_j/e in (10) over the impulses after a history.
+def later_impulses(
+    near: float, far: float, side: float, past: Past, law: SectionLaw
+) -> tuple[float, float]:
+    """Return a lower bound of the sum of side kappa_j x_j/e in (10) over the impulses after a
+    history.
 
-    It is a linear function of the labels from `near` to `far`: its value at the middle, m, and its slope. The events
-    that follow the history are in the workspace. An impulse at which only a part of the labels has arrived is bounded
-    by its extremes.
+    It is a linear function of the labels from `near` to `far`: its value at the middle, m, and its
+    slope. The events that follow the history are in the workspace. An impulse at which only a part
+    of the labels has arrived is bounded by its extremes.
     """
-    e, elapsed, values, applies = law.closing_speed, past.log.elapsed, past.room.values, past.room.applies
+    e = law.closing_speed
+    elapsed = past.log.elapsed
+    values = past.room.values
+    applies = past.room.applies
     middle, slope = 0.0, 0.0
     for event in range(past.log.number, applies.shape[0]):
         if past.log.kinds[event] == PREDICTION:
             elapsed += 1
         elif past.log.kinds[event] == IMPULSE and applies[event]:
-            x_near, x_far = range_of(near, elapsed, law), range_of(far, elapsed, law)
+            x_near = range_of(near, elapsed, law)
+            x_far = range_of(far, elapsed, law)
             if x_far <= 0.0:
                 break
             impulse = values[law.channel, event]
@@ -157,16 +185,29 @@ def later_impulses(near: float, far: float, side: float, past: Past, law: Sectio
 
 @allocation_free
 def miss_at(outlines: Outlines, i: int, past: Past) -> float:
-    """Return the maximum miss (10) of the section of one label, without the error of the speed, m."""
-    label, miss = outlines.labels[i], 0.0
+    """Return the maximum miss (10) of the section of one label, without the error of the speed,
+    m.
+    """
+    label = outlines.labels[i]
+    miss = 0.0
     middle = middle_label(label, past)
     for channel in range(past.laws.shape[0]):
         law = law_of(past.laws, channel)
-        points, count = outlines.points[channel, i], outlines.counts[channel, i]
-        tau, room = time_to_go(middle, past.log.elapsed, law), past.room.drifts[channel, 1]
+        points = outlines.points[channel, i]
+        count = outlines.counts[channel, i]
+        tau = time_to_go(middle, past.log.elapsed, law)
+        room = past.room.drifts[channel, 1]
         turn = past.room.drifts[channel, 0] * ((label - middle) / law.closing_speed)
-        upper = support(points, count, tau, 1.0) - turn - later_impulses(label, label, 1.0, past, law)[0]
-        lower = support(points, count, -tau, -1.0) + turn - later_impulses(label, label, -1.0, past, law)[0]
+        upper = (
+            support(points, count, tau, 1.0)
+            - turn
+            - later_impulses(label, label, 1.0, past, law)[0]
+        )
+        lower = (
+            support(points, count, -tau, -1.0)
+            + turn
+            - later_impulses(label, label, -1.0, past, law)[0]
+        )
         drift = 0.5 * law.disturbance * time_to_go(label, past.log.elapsed, law) ** 2
         miss = math.hypot(miss, max(upper, lower) + room + drift)
     return miss
@@ -174,18 +215,22 @@ def miss_at(outlines: Outlines, i: int, past: Past) -> float:
 
 @allocation_free
 def max_exact_miss(replayed: Replayed, reached: float, past: Past, outlines: Outlines) -> float:
-    """Return the maximum miss of the exact sections of replayed labels, m; with rates, that of one of them.
+    """Return the maximum miss of the exact sections of replayed labels, m; with rates, that of one
+    of them.
 
-    With rates, the sections of a window contain those of its labels. They need not be exact if they reach less than
-    `reached`.
+    With rates, the sections of a window contain those of its labels. They need not be exact if they
+    reach less than `reached`.
     """
-    worst, miss = ZERO, 0.0
+    worst = ZERO
+    miss = 0.0
     for i in range(replayed.inner, replayed.number - replayed.outer):
         miss_here = miss_at(outlines, i, past)
         if miss_here > miss:
-            worst, miss = i, miss_here
+            worst = i
+            miss = miss_here
     if past.errors is not None and miss > reached:
-        label, alone = outlines.labels[worst], with_window(past, np.inf, -np.inf)
+        label = outlines.labels[worst]
+        alone = with_window(past, np.inf, -np.inf)
         if run(label, alone)[0] != ALIVE:
             return 0.0
         write_outline(outlines, ZERO, label, PROBE, alone)
@@ -195,13 +240,19 @@ def max_exact_miss(replayed: Replayed, reached: float, past: Past, outlines: Out
 
 @allocation_free
 def living_part(known: float, past: Past) -> Living:
-    """Return the living labels of the window of a history, which form an interval, and leave the sections at its ends.
+    """Return the living labels of the window of a history, which form an interval, and leave the
+    sections at its ends.
 
-    With rates, the bands are those that are convex on the window. `known` is a label of the window that lives; any
-    other number if none is known.
+    With rates, the bands are those that are convex on the window. `known` is a label of the window
+    that lives; any other number if none is known.
     """
-    near, far, limits = past.nearest, past.farthest, past.room.known
-    below, lower, upper, above = near, near, far, far
+    near = past.nearest
+    far = past.farthest
+    limits = past.room.known
+    below = near
+    lower = near
+    upper = far
+    above = far
     lower_lives = probe(limits, FIRST, near, past)
     if lower_lives:
         keep_section(past, LOWER)
@@ -212,12 +263,14 @@ def living_part(known: float, past: Past) -> Living:
     if not lower_lives and not upper_lives:
         living = known if near <= known <= far else 0.5 * (near + far)
         if past.errors is not None:
-            # A label that lives by itself may be dead with the bands of the window, and others may live.
+            # A label that lives by itself may be dead with the bands of the window, and others may
+            # live.
             if not (probe(limits, MIDDLE, living, past) or search_bracket(past)):
                 return Living(False, below, lower, upper, above)
             living = limits[1].label
         elif living != known:
-            # The living labels of the set form an interval. None of it is known here, and both limits are dead.
+            # The living labels of the set form an interval. None of it is known here, and both
+            # limits are dead.
             return Living(False, below, lower, upper, above)
     resolution = LABEL_RESOLUTION * far
     if not lower_lives:
@@ -229,19 +282,22 @@ def living_part(known: float, past: Past) -> Living:
 
 @allocation_free
 def replay_labels(living: Living, past: Past, outlines: Outlines) -> Replayed:
-    """Write the sections of equally spaced living labels, and of one more on each side without rates.
+    """Write the sections of equally spaced living labels, and of one more on each side without
+    rates.
 
-    The sections at the ends are in the workspace. A single label is replayed if the interval is as short as the
-    resolution.
+    The sections at the ends are in the workspace. A single label is replayed if the interval is as
+    short as the resolution.
     """
-    spacing, law = (living.upper - living.lower) / (LABELS - 1), law_of(past.laws, ZERO)
+    spacing = (living.upper - living.lower) / (LABELS - 1)
+    law = law_of(past.laws, ZERO)
     travelled = living.lower - range_of(living.lower, past.log.elapsed, law)
     number = inner = outer = ZERO
     if spacing <= LABEL_RESOLUTION * living.upper:
         write_outline(outlines, ZERO, living.lower, LOWER, past)
         return Replayed(ZERO + 1, inner, outer)
     for k in range(-1, LABELS + 1):
-        label, row = living.lower + k * spacing, PROBE
+        label = living.lower + k * spacing
+        row = PROBE
         if k < 0 and label <= travelled:
             # No section exists behind x = 0. A much shorter distance would amplify rounding errors.
             label = travelled + 0.5 * (living.lower - travelled)
@@ -250,13 +306,16 @@ def replay_labels(living: Living, past: Past, outlines: Outlines) -> Replayed:
         if k == 0:
             row = LOWER
         elif k == LABELS - 1:
-            label, row = living.upper, UPPER
+            label = living.upper
+            row = UPPER
         elif k < 0 or k == LABELS:
-            # Labels live outside if the limit does. The bands of rates are convex only on the window.
+            # Labels live outside if the limit does. The bands of rates are convex only on the
+            # window.
             limit_lives = living.below == living.lower if k < 0 else living.above == living.upper
             if past.errors is not None or not limit_lives or run(label, past)[0] != ALIVE:
                 continue
-            inner, outer = inner + (k < 0), outer + (k > 0)
+            inner = inner + (k < 0)
+            outer = outer + (k > 0)
         elif run(label, past)[0] != ALIVE:
             continue
         write_outline(outlines, number, label, row, past)
@@ -268,54 +327,77 @@ def replay_labels(living: Living, past: Past, outlines: Outlines) -> Replayed:
 def bound_pieces(
     living: Living, replayed: Replayed, past: Past, outlines: Outlines, pieces: Records, count: int
 ) -> int:
-    """Add the pieces between replayed labels, with their bounds, to `count` pieces; return the new count.
+    """Add the pieces between replayed labels, with their bounds, to `count` pieces; return the new
+    count.
 
-    The first piece ends at the first living label, and the last one begins at the last living label.
+    The first piece ends at the first living label, and the last one begins at the last living
+    label.
     """
     number, inner, outer = replayed
     if number < 3:
-        # The living labels are equal to within the resolution: one outline and a small margin bound them all.
+        # The living labels are equal to within the resolution: one outline and a small margin bound
+        # them all.
         piece = pieces[count]
         piece.near, piece.far = living.below, living.above
-        piece.bound = miss_at(outlines, ZERO, past) + margin_of(outlines, living.above - living.below, past)
+        piece.bound = miss_at(outlines, ZERO, past) + margin_of(
+            outlines, living.above - living.below, past
+        )
         return count + 1
     for first in range(inner, number - outer + 1):
         near = living.below if first == inner else outlines.labels[first - 1]
         far = living.above if first == number - outer else outlines.labels[first]
         if near < far:
             piece = pieces[count]
-            piece.near, piece.far = near, far
+            piece.near = near
+            piece.far = far
             piece.bound = bound_piece(near, far, number, first, past, outlines)
             count += 1
     return count
 
 
 @allocation_free
-def bound_piece(near: float, far: float, number: int, first: int, past: Past, outlines: Outlines) -> float:
-    """Return the bound (12) of the miss over all labels from `near` to `far`, without the error of the speed, m.
+def bound_piece(
+    near: float, far: float, number: int, first: int, past: Past, outlines: Outlines
+) -> float:
+    """Return the bound (12) of the miss over all labels from `near` to `far`, without the error of
+    the speed, m.
 
-    The support of the sections in a fixed direction is a concave function of the label, but the direction of z + V x/e
-    turns with the label. With the middle c of the piece, z + V x/e = (z + V x_c/e) + V (x - x_c)/e: the first term has
-    a fixed direction, and the V of the second lies within its extrapolated bounds V_c +- rho. With rates the direction
-    of (13) is that of the middle of the window. Of the `number` replayed labels, `first` are below the piece.
+    The support of the sections in a fixed direction is a concave function of the label, but the
+    direction of z + V x/e turns with the label. With the middle c of the piece, z + V x/e = (z + V
+    x_c/e) + V (x - x_c)/e: the first term has a fixed direction, and the V of the second lies
+    within its extrapolated bounds V_c +- rho. With rates the direction of (13) is that of the
+    middle of the window. Of the `number` replayed labels, `first` are below the piece.
     """
-    labels, supports, total = outlines.labels[:number], outlines.supports[:, :number], 0.0
+    labels = outlines.labels[:number]
+    supports = outlines.supports[:, :number]
+    total = 0.0
     centre = 0.5 * (near + far)
     middle = centre if past.errors is None else middle_label(centre, past)
     for channel in range(past.laws.shape[0]):
-        law, drifts = law_of(past.laws, channel), past.room.drifts[channel]
-        e, tau = law.closing_speed, time_to_go(middle, past.log.elapsed, law)
+        law = law_of(past.laws, channel)
+        drifts = past.room.drifts[channel]
+        e = law.closing_speed
+        tau = time_to_go(middle, past.log.elapsed, law)
         for k in range(max(first - 2, 0), min(first + 2, number)):
-            points, count = outlines.points[channel, k], outlines.counts[channel, k]
-            supports[0, k], supports[1, k] = support(points, count, 1.0, 0.0), support(points, count, -1.0, 0.0)
-            supports[2, k], supports[3, k] = support(points, count, tau, 1.0), support(points, count, -tau, -1.0)
+            points = outlines.points[channel, k]
+            count = outlines.counts[channel, k]
+            supports[0, k], supports[1, k] = (
+                support(points, count, 1.0, 0.0),
+                support(points, count, -1.0, 0.0),
+            )
+            supports[2, k], supports[3, k] = (
+                support(points, count, tau, 1.0),
+                support(points, count, -tau, -1.0),
+            )
         if past.errors is None:
             v_max = bound_between(labels, supports[0], first, near, far, 0.0)
             v_min = -bound_between(labels, supports[1], first, near, far, 0.0)
-            slope, offset = 0.5 * (v_max + v_min) / e, 0.0
+            slope = 0.5 * (v_max + v_min) / e
+            offset = 0.0
             room = 0.5 * (v_max - v_min) * ((far - near) / (2.0 * e))
         else:
-            slope, room = -drifts[0] / e, drifts[1]
+            slope = -drifts[0] / e
+            room = drifts[1]
             offset = slope * (centre - middle)
         moved, turn = later_impulses(near, far, 1.0, past, law)
         upper = bound_between(labels, supports[2], first, near, far, slope - turn) + offset - moved
@@ -328,11 +410,15 @@ def bound_piece(near: float, far: float, number: int, first: int, past: Past, ou
 
 @allocation_free
 def margin_of(outlines: Outlines, width: float, past: Past) -> float:
-    """Return the margin of a bound from one label, m, for `width` metres of labels: their relative change of range."""
-    label, margin = outlines.labels[0], 0.0
+    """Return the margin of a bound from one label, m, for `width` metres of labels: their relative
+    change of range.
+    """
+    label = outlines.labels[0]
+    margin = 0.0
     for channel in range(past.laws.shape[0]):
         law = law_of(past.laws, channel)
-        points, count = outlines.points[channel, 0], outlines.counts[channel, 0]
+        points = outlines.points[channel, 0]
+        count = outlines.counts[channel, 0]
         tau = time_to_go(label, past.log.elapsed, law)
         size = abs(support(points, count, tau, 1.0)) + abs(support(points, count, -tau, -1.0))
         margin += size * (SLACK + width / max(tau * law.closing_speed, 1.0))
@@ -340,30 +426,47 @@ def margin_of(outlines: Outlines, width: float, past: Past) -> float:
 
 
 @entry
-def bound_all(leaving: Leaving, past: Past, outlines: Outlines, pieces: Records, phi: Floats) -> None:
-    """Write Phi of each engagement without the error of the speed, m; minus infinity where no label has left.
+def bound_all(
+    leaving: Leaving, past: Past, outlines: Outlines, pieces: Records, phi: Floats
+) -> None:
+    """Write Phi of each engagement without the error of the speed, m; minus infinity where no label
+    has left.
 
-    All labels that leave in a step are one piece at first, whose bound is infinite. `pieces` has room for all of them.
+    All labels that leave in a step are one piece at first, whose bound is infinite. `pieces` has
+    room for all of them.
     """
     log = past.log
     for b in range(phi.shape[0]):
         select(past, b)
-        count, divided, reached, phi[b] = ZERO, ZERO, -np.inf, -np.inf
+        count = ZERO
+        divided = ZERO
+        reached = -np.inf
+        phi[b] = -np.inf
         for w in range(leaving.events.shape[0]):
             if leaving.near[w, b] <= leaving.far[w, b]:
                 piece = pieces[count]
-                piece.near, piece.far, piece.step, piece.bound = leaving.near[w, b], leaving.far[w, b], w, np.inf
+                piece.near, piece.far, piece.step, piece.bound = (
+                    leaving.near[w, b],
+                    leaving.far[w, b],
+                    w,
+                    np.inf,
+                )
                 count += 1
                 if past.errors is not None and leaving.known[w, b] > 0.0:
-                    # The measurements that cut this label are those that the windows apply at first.
+                    # The measurements that cut this label are those that the windows apply at
+                    # first.
                     run(leaving.known[w, b], past)
         while count > 0:
             worst = 0
-            for i in range(count):  # of the pieces without a bound the last one, which often has the maximum miss
+            for i in range(
+                count
+            ):  # of the pieces without a bound the last one, which often has the maximum miss
                 if pieces[i].bound >= pieces[worst].bound:
                     worst = i
             piece = pieces[worst]
-            near, far, step = piece.near, piece.far, piece.step
+            near = piece.near
+            far = piece.far
+            step = piece.step
             if piece.bound < np.inf:
                 phi[b] = piece.bound
                 divided += 1
@@ -371,25 +474,30 @@ def bound_all(leaving: Leaving, past: Past, outlines: Outlines, pieces: Records,
                     break
             count -= 1
             pieces[worst] = pieces[count]
-            until = EventLog(log.kinds, log.values, log.applies, leaving.events[step], leaving.elapsed[step])
+            until = EventLog(
+                log.kinds, log.values, log.applies, leaving.events[step], leaving.elapsed[step]
+            )
             window = Past(until, past.errors, past.laws, past.room, near, far, TRUE)
             living = living_part(leaving.known[step, b], window)
             if living.exists:
                 replayed = replay_labels(living, window, outlines)
-                before, count = count, bound_pieces(living, replayed, window, outlines, pieces, count)
+                before = count
+                count = bound_pieces(living, replayed, window, outlines, pieces, count)
                 for i in range(before, count):
                     pieces[i].step = step
                 reached = max(reached, max_exact_miss(replayed, reached, window, outlines))
 
 
 class GuaranteedMiss:
-    """Phi of a batch of engagements: an upper bound of the true miss over the labels that have left the set.
+    """Phi of a batch of engagements: an upper bound of the true miss over the labels that have left
+    the set.
 
     `speed_error` is the maximum |eta|, the relative error of the closing speed.
     """
 
     def __init__(self, law: SectionLaw, batch: int, speed_error: float) -> None:
-        self._law, self._speed_error = law, speed_error
+        self._law = law
+        self._speed_error = speed_error
         steps = law.label_max / (law.closing_speed * law.step)
         self._group_steps = max(1, int(steps / GROUPS))
         self._bounded_below = np.full(batch, -np.inf)
@@ -401,33 +509,42 @@ class GuaranteedMiss:
         twin._leaving = self._leaving.copy()
         return twin
 
-    def leave(self, active: Flags, lower: Floats, upper: Floats, sections: Sections, history: History) -> None:
+    def leave(
+        self, active: Flags, lower: Floats, upper: Floats, sections: Sections, history: History
+    ) -> None:
         """Note that the living labels from `lower` to `upper`, shape (B,), m, leave in this step.
 
-        Labels that leave during the following steps of a group are noted too, so that their number of windows does not
-        grow with the number of steps.
+        Labels that leave during the following steps of a group are noted too, so that their number
+        of windows does not grow with the number of steps.
         """
         lower = np.maximum(lower, self._bounded_below)
         active = active & (lower <= upper) & (lower < self._min_label(history.elapsed + 1))
         if not active.any():
             return
         below = self._min_label(history.elapsed + self._group_steps)
-        near, far = np.where(active, lower, np.inf), np.minimum(upper, below)
+        near = np.where(active, lower, np.inf)
+        far = np.minimum(upper, below)
         self._bounded_below = np.where(active, below, self._bounded_below)
         slots = sections.slots
-        lives = slots["living"] & (slots["label"] >= near[:, None]) & (slots["label"] <= far[:, None])
+        lives = (
+            slots["living"] & (slots["label"] >= near[:, None]) & (slots["label"] <= far[:, None])
+        )
         lives &= np.arange(slots.shape[1]) < sections.used[:, None]
         known = np.where(lives, slots["label"], -np.inf).max(axis=1)
-        events, elapsed = np.array(history.events), np.array(history.elapsed)
+        events = np.array(history.events)
+        elapsed = np.array(history.elapsed)
         self._leaving.append(Leaving(near, far, known, events, elapsed))
 
     def bound(self, laws: Laws, history: History) -> tuple[Floats, Flags]:
         """Return Phi so far, m, and whether a label has left, both of shape (B,).
 
-        The labels that have left are replayed from the start; the impulses that followed act on them. The time is
-        linear in the number of events and in that of the steps in which labels leave.
+        The labels that have left are replayed from the start; the impulses that followed act on
+        them. The time is linear in the number of events and in that of the steps in which labels
+        leave.
         """
-        batch, channels, windows = len(self._bounded_below), len(laws), len(self._leaving)
+        batch = len(self._bounded_below)
+        channels = len(laws)
+        windows = len(self._leaving)
         phi = np.full(batch, -np.inf)
         if windows:
             outlines = Outlines(
@@ -444,5 +561,7 @@ class GuaranteedMiss:
         return np.where(exists, (phi + ROUNDING * self._law.label_max) * factor, 0.0), exists
 
     def _min_label(self, elapsed: int) -> float:
-        """Return the minimum label, m, that is not below the range threshold after a number of steps."""
+        """Return the minimum label, m, that is not below the range threshold after a number of
+        steps.
+        """
         return self._law.min_range + self._law.closing_speed * (self._law.step * elapsed)

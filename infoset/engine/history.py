@@ -15,7 +15,8 @@ ROOM_AT_START = 64
 
 
 class EventLog(NamedTuple):
-    """Events of a batch of B engagements in order, as kernels take them: the arrays and counts of `History`.
+    """Events of a batch of B engagements in order, as kernels take them: the arrays and counts of
+    `History`.
 
     Parameters
     ----------
@@ -62,7 +63,8 @@ NO_SIGHT = LastSight(False, 0.0, 0.0, 0, 0.0)
 
 
 class History:
-    """Events of a batch of B engagements: the kinds are common to all of them, the values belong to one each.
+    """Events of a batch of B engagements: the kinds are common to all of them, the values belong to
+    one each.
 
     Attributes
     ----------
@@ -71,9 +73,11 @@ class History:
     errors : ndarray, shape (>= events,)
         Error bound of each measured rate, rad/s; zero for the other kinds.
     sights : ndarray, shape (C, B, columns)
-        Fields of the last sight of each axis and engagement after the first `seen` events, for measured rates.
+        Fields of the last sight of each axis and engagement after the first `seen` events, for
+        measured rates.
     seen : int
-        Number of events before the latest measured rate. They are final: `retract` removes only the latest measurement.
+        Number of events before the latest measured rate. They are final: `retract` removes only the
+        latest measurement.
     """
 
     def __init__(self, channels: int, batch: int) -> None:
@@ -86,9 +90,16 @@ class History:
         self.sights = np.zeros((channels, batch, len(NO_SIGHT)))
         self.seen = 0
         self._has_rates = False
-        self._fired, self._summed = np.zeros(batch), 0
+        self._fired = np.zeros(batch)
+        self._summed = 0
 
-    def record(self, kind: int, values: Floats | None = None, applies: Flags | bool = True, error: float = 0.0) -> int:
+    def record(
+        self,
+        kind: int,
+        values: Floats | None = None,
+        applies: Flags | bool = True,
+        error: float = 0.0,
+    ) -> int:
         """Append an event, with values of shape (C, B), and return its number."""
         event = self.events
         if event == self.kinds.size:

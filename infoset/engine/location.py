@@ -1,9 +1,10 @@
-"""Search for the living labels: those whose section is not empty. Each probe of a label replays the history.
+"""Search for the living labels: those whose section is not empty. Each probe of a label replays the
+history.
 
-If the set is convex in (z, V, label), the living labels form one interval. This holds for the guaranteed model without
-rates. With rates the search finds one interval and does not narrow the limits of the
-labels to it; before it reports that no label lives, it searches windows of labels with bands that are convex there.
-See docs/guarantee.md for the other cases.
+If the set is convex in (z, V, label), the living labels form one interval. This holds for the
+guaranteed model without rates. With rates the search finds one interval and does not narrow the
+limits of the labels to it; before it reports that no label lives, it searches windows of labels
+with bands that are convex there. See docs/guarantee.md for the other cases.
 """
 
 from __future__ import annotations
@@ -40,21 +41,27 @@ from infoset.engine.section_passes import Sections, row_of
 FIRST, MIDDLE, LAST = constants(3)
 """Indices of a bracket of three labels."""
 LABEL_RESOLUTION = 1e-13
-"""Accuracy of the ends of the living labels, relative to the labels: some 500 ulp, so that probes differ; 1 um of range
-in the scenario of 1997."""
+"""Accuracy of the ends of the living labels, relative to the labels: some 500 ulp, so that probes
+differ; 1 um of range in the scenario of 1997."""
 COARSE = 1.0 / 64.0
-"""Accuracy of an end in a window for Phi, relative to the living labels there: bounds hold up to the dead label."""
+"""Accuracy of an end in a window for Phi, relative to the living labels there: bounds hold up to
+the dead label.
+"""
 NARROWEST = 1e-15
-"""Width of an interval of living labels that the search may miss, relative to the labels: 5 to 9 ulp. The slack of the
-cuts makes the labels next to that of a true state live over a wider interval."""
+"""Width of an interval of living labels that the search may miss, relative to the labels: 5 to 9
+ulp. The slack of the cuts makes the labels next to that of a true state live over a wider interval.
+"""
 MAX_PROBES = 200
-"""Maximum number of probes of one search; bisection alone needs 53 to divide an interval to an ulp."""
+"""Maximum number of probes of one search; bisection alone needs 53 to divide an interval to an
+ulp.
+"""
 
 
 class Living(NamedTuple):
     """Interval of living labels [lower, upper], m, and a bracket of each end: `below` and `above`.
 
-    The outer two labels are dead, or equal to an end at a limit of the search. `exists` is whether a label lives.
+    The outer two labels are dead, or equal to an end at a limit of the search. `exists` is whether
+    a label lives.
     """
 
     exists: bool
@@ -74,17 +81,22 @@ def locate_end(
 ) -> tuple[float, float]:
     """Narrow the bracket between a dead and a living label; return the bracket (dead, living).
 
-    The section at the living label is stored in `row` of the workspace. The overlap at the event that makes the section
-    empty is a concave function of the label, so that the Illinois variant of regula falsi converges fast. If four
-    probes have not narrowed the bracket to an eighth, because that event changes with the label, one bisection follows.
+    The section at the living label is stored in `row` of the workspace. The overlap at the event
+    that makes the section empty is a concave function of the label, so that the Illinois variant of
+    regula falsi converges fast. If four probes have not narrowed the bracket to an eighth, because
+    that event changes with the label, one bisection follows.
     """
     run(living, past)
     keep_living(past, row)
-    end, died, overlap, emptied = dead.label, dead.died, dead.overlap, dead.emptied
+    end = dead.label
+    died = dead.died
+    overlap = dead.overlap
+    emptied = dead.emptied
     weight_dead = overlap
     weight_living = past.room.living_overlaps[emptied, died]
     side = 0
-    before, first = 0.0, living
+    before = 0.0
+    first = living
     for probes in range(MAX_PROBES):
         width = abs(living - end)
         coarse = past.errors is not None and past.thinned
@@ -97,7 +109,9 @@ def locate_end(
         if not slow and weight_living > weight_dead:
             # A probe at an end gives no information: keep half a resolution away from both.
             minimum = 0.5 * resolution / width
-            fraction = min(max(-weight_dead / (weight_living - weight_dead), minimum), 1.0 - minimum)
+            fraction = min(
+                max(-weight_dead / (weight_living - weight_dead), minimum), 1.0 - minimum
+            )
         label = end + fraction * (living - end)
         probe_died, probe_overlap, probe_emptied = run(label, past)
         if probe_died == ALIVE:
@@ -107,7 +121,10 @@ def locate_end(
             weight_dead = 0.5 * weight_dead if side == 1 else overlap
             side = 1
         else:
-            end, died, overlap, emptied = label, probe_died, probe_overlap, probe_emptied
+            end = label
+            died = probe_died
+            overlap = probe_overlap
+            emptied = probe_emptied
             weight_dead = overlap
             weight_living = (0.5 if side == -1 else 1.0) * past.room.living_overlaps[emptied, died]
             side = -1
@@ -116,13 +133,16 @@ def locate_end(
 
 @allocation_free
 def search_living(past: Past) -> bool:
-    """Search for a living label between the first three known ones, which are dead; the middle one outlives the others.
+    """Search for a living label between the first three known ones, which are dead; the middle one
+    outlives the others.
 
-    Return whether the middle label now lives; if not, there is no living label in the bracket. The pair (event,
-    overlap) is a unimodal function of the label: the larger half of the bracket is probed at its middle. The search
-    ends if the bracket is as narrow as `NARROWEST`, or if no label in it can live.
+    Return whether the middle label now lives; if not, there is no living label in the bracket. The
+    pair (event, overlap) is a unimodal function of the label: the larger half of the bracket is
+    probed at its middle. The search ends if the bracket is as narrow as `NARROWEST`, or if no label
+    in it can live.
     """
-    known, four = past.room.known, past.room.four
+    known = past.room.known
+    four = past.room.four
     for _ in range(MAX_PROBES):
         if known[2].label - known[0].label <= NARROWEST * known[2].label:
             return False
@@ -151,7 +171,8 @@ def search_window(
 ) -> bool:
     """Return whether a label of the window lives with the bands that are convex on the window.
 
-    `first` is the first label replayed. If a label lives, it is the second of the known ones afterwards.
+    `first` is the first label replayed. If a label lives, it is the second of the known ones
+    afterwards.
     """
     known = past.room.known
     for i, label in ((MIDDLE, first), (FIRST, lower), (LAST, upper)):
@@ -163,7 +184,9 @@ def search_window(
 
 @allocation_free
 def search_bracket(past: Past) -> bool:
-    """Return whether a label lives between the first three known ones, which are dead; it is then the second one."""
+    """Return whether a label lives between the first three known ones, which are dead; it is then
+    the second one.
+    """
     known = past.room.known
     for end in (0, 2):
         if outlives(known[end], known[1]):
@@ -174,18 +197,26 @@ def search_bracket(past: Past) -> bool:
 
 
 @allocation_free
-def search_everywhere(lower: float, upper: float, past: Past, errors: Floats | None) -> tuple[bool, float]:
-    """Find a living label within limits if the living labels need not form an interval, or prove that none lives.
+def search_everywhere(
+    lower: float, upper: float, past: Past, errors: Floats | None
+) -> tuple[bool, float]:
+    """Find a living label within limits if the living labels need not form an interval, or prove
+    that none lives.
 
-    A window without living labels under the bands that are convex on it is discarded. The others are halved until they
-    are as narrow as `NARROWEST`, beginning with the one in which a probed label lived longest with its own bands.
+    A window without living labels under the bands that are convex on it is discarded. The others
+    are halved until they are as narrow as `NARROWEST`, beginning with the one in which a probed
+    label lived longest with its own bands.
 
     Only rates make the search necessary. `errors` are those of the history, as in `replay`.
     """
     if errors is None:
         return False, lower
-    windows, probed = past.room.windows, past.room.four
-    windows[0].near, windows[0].far, windows[0].died, windows[0].overlap = lower, upper, ALIVE, 0.0
+    windows = past.room.windows
+    probed = past.room.four
+    windows[0].near = lower
+    windows[0].far = upper
+    windows[0].died = ALIVE
+    windows[0].overlap = 0.0
     count = 1
     for _ in range(MAX_HALVED_WINDOWS):
         if count == 0:
@@ -194,7 +225,8 @@ def search_everywhere(lower: float, upper: float, past: Past, errors: Floats | N
         for i in range(1, count):
             if outlives(windows[i], windows[best]):
                 best = i
-        near, far = windows[best].near, windows[best].far
+        near = windows[best].near
+        far = windows[best].far
         middle = 0.5 * (near + far)
         count -= 1
         windows[best] = windows[count]
@@ -229,7 +261,9 @@ def locate_living(
         return none_lives
     resolution = LABEL_RESOLUTION * max(abs(limit_below), abs(limit_above))
     # The limits, and the stored labels between them.
-    slots, stored, known = sections.slots, sections.used[b], past.room.known
+    slots = sections.slots
+    stored = sections.used[b]
+    known = past.room.known
     end = FIRST + 1
     first = last = 0
     known[0].label = limit_below
@@ -253,13 +287,15 @@ def locate_living(
     if (not some_live or last == end - 1) and probe(known, end, limit_above, past):
         keep_section(past, UPPER)
         first = first if some_live else end
-        last, some_live = end, True
+        last = end
+        some_live = True
     if not some_live:
         best = 0
         for i in range(1, end + 1):
             if outlives(known[i], known[best]):
                 best = i
-        # Bracket of the dead label that lived longest: this label and its neighbours, at the front of the same array.
+        # Bracket of the dead label that lived longest: this label and its neighbours, at the front
+        # of the same array.
         past.room.four[0] = known[best]
         known[0], known[2] = known[max(best - 1, 0)], known[min(best + 1, end)]
         known[1] = past.room.four[0]
@@ -268,7 +304,8 @@ def locate_living(
             alive_now, label = search_everywhere(limit_below, limit_above, past, past.errors)
             if not alive_now:
                 return none_lives
-            below, above = limit_below, limit_above
+            below = limit_below
+            above = limit_above
             for s in range(stored):
                 stored_label = slots[b, s].label
                 if below < stored_label < label:
@@ -293,7 +330,9 @@ def locate_living(
 
 @allocation_free
 def is_convex(laws: Laws) -> bool:
-    """Whether sets without rates are convex along all axes, so that the living labels form one interval."""
+    """Whether sets without rates are convex along all axes, so that the living labels form one
+    interval.
+    """
     for channel in range(laws.shape[0]):
         law = law_of(laws, channel)
         if not law.exact_angles and law.error_slope > 0.0:
@@ -302,15 +341,21 @@ def is_convex(laws: Laws) -> bool:
 
 
 @entry
-def refine_all(wanted: Flags, number: int, limits: tuple[Floats, Floats], past: Past, sections: Sections) -> int:
-    """Replace the sections of the wanted engagements by a grid of `number` over the living labels, ends included.
+def refine_all(
+    wanted: Flags, number: int, limits: tuple[Floats, Floats], past: Past, sections: Sections
+) -> int:
+    """Replace the sections of the wanted engagements by a grid of `number` over the living labels,
+    ends included.
 
-    Return the number of vertices that every new section may gain. If no label lives, the engagement has no living
-    section afterwards. The limits of the labels, each of shape (B,), are narrowed to dead labels, except where other
-    labels may live beyond them: with rates, and with an error bound that rises with range in the paper's model.
+    Return the number of vertices that every new section may gain. If no label lives, the engagement
+    has no living section afterwards. The limits of the labels, each of shape (B,), are narrowed to
+    dead labels, except where other labels may live beyond them: with rates, and with an error bound
+    that rises with range in the paper's model.
     """
     spare = CAPACITY
-    slots, used, laws = sections.slots, sections.used, past.laws
+    slots = sections.slots
+    used = sections.used
+    laws = past.laws
     limit_below, limit_above = limits
     for b in range(len(used)):
         if not wanted[b]:
@@ -330,17 +375,20 @@ def refine_all(wanted: Flags, number: int, limits: tuple[Floats, Floats], past: 
             label = living.lower + share * (living.upper - living.lower)
             if s > 0 and s == number - 1:
                 label = living.upper
-            slot, row = slots[b, s], PROBE
+            slot = slots[b, s]
+            row = PROBE
             slot.label = label
             if number > 1 and (s == 0 or s == number - 1):
                 row = LOWER if s == 0 else UPPER
-                slot.died, slot.overlap = ALIVE, 0.0
+                slot.died = ALIVE
+                slot.overlap = 0.0
             else:
                 slot.died, slot.overlap, slot.emptied = run(label, past)
             slot.living = slot.died == ALIVE
             if slot.living:
                 for channel in range(laws.shape[0]):
-                    n, law = row_of(sections, channel, b, s), law_of(laws, channel)
+                    n = row_of(sections, channel, b, s)
+                    law = law_of(laws, channel)
                     copy_section(past.room.chains, ROWS * channel + row, sections.chains, n)
                     section = view_of(sections.chains, n, label)
                     summarise_section(section, past.log.elapsed, law, sections.summaries, b, s)

@@ -9,7 +9,8 @@ from infoset.arrays import Flags, Floats
 
 @dataclass(frozen=True)
 class ExtremePoints:
-    """States that reach an end of the predicted-miss interval, one for each engagement and lateral axis.
+    """States that reach an end of the predicted-miss interval, one for each engagement and lateral
+    axis.
 
     Parameters
     ----------
@@ -24,7 +25,8 @@ class ExtremePoints:
 
 @dataclass(frozen=True)
 class PredictedMiss:
-    """Interval of the misses that are possible without control, for all disturbances within the bound.
+    """Interval of the misses that are possible without control, for all disturbances within the
+    bound.
 
     Parameters
     ----------

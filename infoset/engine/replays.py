@@ -1,4 +1,6 @@
-"""Replays of a history at chosen labels, and the working arrays of replays and of searches over labels."""
+"""Replays of a history at chosen labels, and the working arrays of replays and of searches over
+labels.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,17 @@ from infoset.arrays import Flags, Floats, Integers
 from infoset.engine import chains
 from infoset.engine.chain_storage import Chains, copy_section, empty_sections, view_of, working_room
 from infoset.engine.chains import SectionView
-from infoset.engine.history import ANGLE, IMPULSE, NO_SIGHT, PREDICTION, RATE, WIDENING, EventLog, History, LastSight
+from infoset.engine.history import (
+    ANGLE,
+    IMPULSE,
+    NO_SIGHT,
+    PREDICTION,
+    RATE,
+    WIDENING,
+    EventLog,
+    History,
+    LastSight,
+)
 from infoset.engine.section_law import Laws, SectionLaw, law_of
 from infoset.engine.section_life import (
     ALIVE,
@@ -38,10 +50,13 @@ from infoset.engine.section_window import (
 )
 
 MAX_HALVED_WINDOWS = 1000
-"""Maximum number of windows of labels that a search halves. If more are needed, the set counts as empty."""
+"""Maximum number of windows of labels that a search halves. If more are needed, the set counts as
+empty.
+"""
 
 PROBE, LOWER, UPPER = constants(3)
-"""Rows of the workspace: the section of the last replay, and the sections at the ends of the living labels.
+"""Rows of the workspace: the section of the last replay, and the sections at the ends of the living
+labels.
 
 Row i of axis c is `ROWS` c + i.
 """
@@ -53,7 +68,9 @@ Record = Any
 """One of the records: a label that was replayed, or a window."""
 
 OUTCOME = [("died", np.int64), ("overlap", np.float64), ("emptied", np.int64)]
-"""Event at which a label became empty, or ALIVE, its overlap with the band there, m, and along which axis."""
+"""Event at which a label became empty, or ALIVE, its overlap with the band there, m, and along
+which axis.
+"""
 PROBED = np.dtype([("label", np.float64), *OUTCOME])
 """A replayed label, m."""
 WINDOW = np.dtype([("near", np.float64), ("far", np.float64), *OUTCOME])
@@ -66,17 +83,21 @@ class Workspace(NamedTuple):
     Parameters
     ----------
     values, applies : ndarray, shape (C, E) and (E,)
-        Events of the engagement that is replayed, contiguous: values and whether they apply, as in `EventLog`.
+        Events of the engagement that is replayed, contiguous: values and whether they apply, as in
+        `EventLog`.
     chains : Chains
         The sections `PROBE`, which is the last replay, `LOWER` and `UPPER` along each axis.
     overlaps, living_overlaps : ndarray, shape (C, E)
-        Overlap of section and band at each measurement, m, in the last replay and in that of a living label.
+        Overlap of section and band at each measurement, m, in the last replay and in that of a
+        living label.
     drifts : ndarray, shape (C, 2)
-        With rates: `turned` and the room of (13), m/s and m, of the window of the last replay that lived.
+        With rates: `turned` and the room of (13), m/s and m, of the window of the last replay that
+        lived.
     points : ndarray, shape (n, 2)
         Vertices of a section.
     cuts : ndarray of bool, shape (E,)
-        With rates, the measurements that have cut the section of a single label, in replays of all events.
+        With rates, the measurements that have cut the section of a single label, in replays of all
+        events.
     known : recarray of PROBED, shape (K,)
         Replayed labels.
     four : recarray of PROBED, shape (4,)
@@ -115,10 +136,11 @@ class Past(NamedTuple):
     room : Workspace
         Working arrays, with the events of the engagement that `select` has chosen.
     nearest, farthest : float
-        With rates, the window of labels, m, on which sections are convex. The empty window, from infinity to minus
-        infinity, makes the window of each label the label itself.
+        With rates, the window of labels, m, on which sections are convex. The empty window, from
+        infinity to minus infinity, makes the window of each label the label itself.
     thinned : bool
-        With rates, whether replays leave out the measurements that have not cut the section of a label so far.
+        With rates, whether replays leave out the measurements that have not cut the section of a
+        label so far.
     """
 
     log: EventLog
@@ -131,8 +153,11 @@ class Past(NamedTuple):
 
 
 def past_of(history: History, laws: Laws, slots: int = 1) -> Past:
-    """Return the history of a batch, with working arrays for a search over `slots` stored labels."""
-    channels, events = len(laws), history.events
+    """Return the history of a batch, with working arrays for a search over `slots` stored
+    labels.
+    """
+    channels = len(laws)
+    events = history.events
     room = Workspace(
         np.empty((channels, events)),
         np.empty(events, dtype=bool),
@@ -153,7 +178,9 @@ def past_of(history: History, laws: Laws, slots: int = 1) -> Past:
 @allocation_free
 def select(past: Past, b: int) -> None:
     """Copy the events of an engagement to the contiguous arrays that replays read."""
-    log, values, applies = past.log, past.room.values, past.room.applies
+    log = past.log
+    values = past.room.values
+    applies = past.room.applies
     for event in range(log.number):
         applies[event], past.room.cuts[event] = log.applies[event, b], log.kinds[event] == WIDENING
         for channel in range(values.shape[0]):
@@ -168,7 +195,9 @@ def with_window(past: Past, nearest: float, farthest: float) -> Past:
 
 @inlined
 def middle_label(label: float, past: Past) -> float:
-    """Return the label in whose coordinates a replayed section is: with rates, the middle of its window."""
+    """Return the label in whose coordinates a replayed section is: with rates, the middle of its
+    window.
+    """
     if past.errors is None:
         return label
     return 0.5 * (min(label, past.nearest) + max(label, past.farthest))
@@ -181,7 +210,9 @@ def replayed_section(past: Past, channel: int, row: int, label: float) -> Sectio
 
 
 class Replayed(NamedTuple):
-    """Part of a history that is replayed: its events, the predictions among them, and the last sight after them."""
+    """Part of a history that is replayed: its events, the predictions among them, and the last
+    sight after them.
+    """
 
     events: int
     elapsed: int
@@ -195,30 +226,42 @@ AT_START = Replayed(ZERO, ZERO, NO_SIGHT)
 def replay(
     done: Replayed, label: float, until: int, past: Past, errors: Floats | None, law: SectionLaw
 ) -> tuple[int, Replayed]:
-    """Compute the section at any label along one axis: apply the events after those `done`, up to number `until`.
+    """Compute the section at any label along one axis: apply the events after those `done`, up to
+    number `until`.
 
-    Return the number of the event that makes the section empty, or ALIVE, and the events done. About 30 ns for each
-    event. The workspace receives the section, in row `PROBE` of the axis, and the overlaps with the bands of the
-    measurements up to the one that makes it empty.
+    Return the number of the event that makes the section empty, or ALIVE, and the events done.
+    About 30 ns for each event. The workspace receives the section, in row `PROBE` of the axis, and
+    the overlaps with the bands of the measurements up to the one that makes it empty.
 
-    `errors` are those of the history. They are an argument because the compiler omits the code for rates, which is most
-    of it, only if an argument is None.
+    `errors` are those of the history. They are an argument because the compiler omits the code for
+    rates, which is most of it, only if an argument is None.
     """
-    kinds, applies, points = past.log.kinds, past.room.applies, past.room.points
-    values, overlaps, cuts = past.room.values, past.room.overlaps[law.channel], past.room.cuts
+    kinds = past.log.kinds
+    applies = past.room.applies
+    points = past.room.points
+    values = past.room.values
+    overlaps = past.room.overlaps[law.channel]
+    cuts = past.room.cuts
     own = values[law.channel]
     first, elapsed, sight = done
-    middle, room = label, 0.0
+    middle = label
+    room = 0.0
     if errors is not None:
         window = new_window(min(label, past.nearest), max(label, past.farthest), law)
         stretch = new_stretch(elapsed)
-        middle, room = middle_of(window), window.fastest * half_time(window, law)
+        middle = middle_of(window)
+        room = window.fastest * half_time(window, law)
     section = replayed_section(past, law.channel, PROBE, middle)
     if first == 0:
         start_section(section, room, law)
     for event in range(first, until):
         across = across_of(values, event, law)
-        if errors is not None and past.thinned and not cuts[event] and kinds[event] in (ANGLE, RATE):
+        if (
+            errors is not None
+            and past.thinned
+            and not cuts[event]
+            and kinds[event] in (ANGLE, RATE)
+        ):
             sight = sight_after(sight, kinds[event], own[event], across, applies[event], law)
             continue
         if errors is not None and past.thinned and applies[event] and cuts[event]:
@@ -228,7 +271,9 @@ def replay(
             elapsed += kinds[event] == PREDICTION
             if not applies[event]:
                 continue
-            stretch = stretch_after(stretch, kinds[event], own[event], across, window.fastest, elapsed, law)
+            stretch = stretch_after(
+                stretch, kinds[event], own[event], across, window.fastest, elapsed, law
+            )
         elif kinds[event] == PREDICTION:
             if chains.is_crowded(section):
                 chains.reduce_outward(section, time_to_go(middle, elapsed, law), points)
@@ -241,7 +286,9 @@ def replay(
                 living, overlaps[event] = measure_section(section, elapsed, own[event], across, law)
             else:
                 angles = own[event], across
-                living, overlaps[event], is_cut = measure_in_window(section, label, elapsed, angles, window, law)
+                living, overlaps[event], is_cut = measure_in_window(
+                    section, label, elapsed, angles, window, law
+                )
                 cuts[event] |= is_cut
             if not living:
                 return event, done
@@ -251,14 +298,20 @@ def replay(
             widen_section(section, elapsed, law)
         elif errors is not None:
             rate = Rate(own[event], errors[event], sight)
-            living, overlaps[event], is_cut = measure_rate_section(section, label, elapsed, rate, window, law, points)
+            living, overlaps[event], is_cut = measure_rate_section(
+                section, label, elapsed, rate, window, law, points
+            )
             cuts[event] |= is_cut
             if not living:
                 return event, done
         if errors is not None:
             sight = sight_after(sight, kinds[event], own[event], across, applies[event], law)
-            if past.thinned or window.near < window.far:  # of a single label only the limits are used
-                window = window_after(window, kinds[event], own[event], across, errors[event], elapsed, law)
+            if (
+                past.thinned or window.near < window.far
+            ):  # of a single label only the limits are used
+                window = window_after(
+                    window, kinds[event], own[event], across, errors[event], elapsed, law
+                )
     if errors is not None:
         if past.thinned:
             apply_stretch(section, stretch, elapsed, law, points)
@@ -269,11 +322,15 @@ def replay(
 
 @allocation_free
 def run(label: float, past: Past) -> tuple[int, float, int]:
-    """Replay a label along all axes; return the event at which it became empty, or ALIVE, the overlap, m, and its axis.
+    """Replay a label along all axes; return the event at which it became empty, or ALIVE, the
+    overlap, m, and its axis.
 
-    A label becomes empty with the first of its axes. If several become empty at one event, the minimum overlap counts.
+    A label becomes empty with the first of its axes. If several become empty at one event, the
+    minimum overlap counts.
     """
-    died, overlap, emptied = ALIVE, 0.0, 0
+    died = ALIVE
+    overlap = 0.0
+    emptied = 0
     for channel in range(past.laws.shape[0]):
         # Later events of a label that is empty along one axis do not matter.
         until = past.log.number if died == ALIVE else died + 1
@@ -281,7 +338,8 @@ def run(label: float, past: Past) -> tuple[int, float, int]:
         if died_here != ALIVE:
             overlap_here = past.room.overlaps[channel, died_here]
             if died_here != died or overlap_here < overlap:
-                overlap, emptied = overlap_here, channel
+                overlap = overlap_here
+                emptied = channel
             died = died_here
     return died, overlap, emptied
 
@@ -290,7 +348,10 @@ def run(label: float, past: Past) -> tuple[int, float, int]:
 def probe(known: Records, i: int, label: float, past: Past) -> bool:
     """Replay a label and write it to record `i`; return whether it lives."""
     died, overlap, emptied = run(label, past)
-    known[i].label, known[i].died, known[i].overlap, known[i].emptied = label, died, overlap, emptied
+    known[i].label = label
+    known[i].died = died
+    known[i].overlap = overlap
+    known[i].emptied = emptied
     return died == ALIVE
 
 
@@ -314,42 +375,56 @@ def keep_living(past: Past, row: int) -> None:
 
 @allocation_free
 def outlives(one: Record, other: Record) -> bool:
-    """Whether a label became empty later than another one, or at the same event with a greater overlap."""
+    """Whether a label became empty later than another one, or at the same event with a greater
+    overlap.
+    """
     return bool(one.died > other.died or (one.died == other.died and one.overlap > other.overlap))
 
 
 def margins_along(
     labels: Floats, looks: Integers, v: Floats, z: Floats, history: History, laws: Laws
 ) -> tuple[Floats, Floats]:
-    """Return the signed distances, m, of states (V, z) to the boundaries of sections during an engagement, (C, L, B).
+    """Return the signed distances, m, of states (V, z) to the boundaries of sections during an
+    engagement, (C, L, B).
 
-    They are positive inside; for an empty section the overlap with the band that made it empty. Also return the bounds
-    of |V| in the sections, m/s, (C, L, B), to which rounding errors are relative. `labels` has the shape (B,), and
-    `looks`, shape (L,), the number of events before each state. The states `v` and `z`, shape (C, L, B), are along each
-    axis, m/s and m.
+    They are positive inside; for an empty section the overlap with the band that made it empty.
+    Also return the bounds of |V| in the sections, m/s, (C, L, B), to which rounding errors are
+    relative. `labels` has the shape (B,), and `looks`, shape (L,), the number of events before each
+    state. The states `v` and `z`, shape (C, L, B), are along each axis, m/s and m.
     """
-    margins, reaches = np.empty(v.shape), np.empty(v.shape)
+    margins = np.empty(v.shape)
+    reaches = np.empty(v.shape)
     margins_all(labels, looks, v, z, past_of(history, laws), margins, reaches)
     return margins, reaches
 
 
 @entry
 def margins_all(
-    labels: Floats, looks: Integers, v: Floats, z: Floats, past: Past, margins: Floats, reaches: Floats
+    labels: Floats,
+    looks: Integers,
+    v: Floats,
+    z: Floats,
+    past: Past,
+    margins: Floats,
+    reaches: Floats,
 ) -> None:
     """Write the results of `margins_along`."""
     for b in range(labels.shape[0]):
         label = labels[b]
         select(past, b)
         for channel in range(past.laws.shape[0]):
-            law, section = law_of(past.laws, channel), replayed_section(past, channel, PROBE, label)
-            died, done = ALIVE, AT_START
+            law = law_of(past.laws, channel)
+            section = replayed_section(past, channel, PROBE, label)
+            died = ALIVE
+            done = AT_START
             for look in range(looks.shape[0]):
                 if died == ALIVE:
                     died, done = replay(done, label, looks[look], past, past.errors, law)
                 if died == ALIVE:
                     tau = time_to_go(label, done.elapsed, law)
-                    margins[channel, look, b] = chains.margin_in(section, tau, v[channel, look, b], z[channel, look, b])
+                    margins[channel, look, b] = chains.margin_in(
+                        section, tau, v[channel, look, b], z[channel, look, b]
+                    )
                 else:
                     margins[channel, look, b] = past.room.overlaps[channel, died]
                 reaches[channel, look, b] = section.right.reach
@@ -357,6 +432,8 @@ def margins_all(
 
 @entry
 def replay_label(label: float, b: int, past: Past) -> int:
-    """Replay a label of an engagement from Python; return the event at which it became empty, or ALIVE."""
+    """Replay a label of an engagement from Python; return the event at which it became empty, or
+    ALIVE.
+    """
     select(past, b)
     return run(label, past)[0]

@@ -16,7 +16,9 @@ from infoset.model import Interval, SetModel
 BOUND_SLACK = 1e-9
 """Relative enlargement of the bounds of the guaranteed model; rounding errors are far smaller."""
 ROUNDING = 16.0 * sys.float_info.epsilon
-"""Enlargement of the box, in the largest values that its coordinates take: that of a cut, which is 16 ulp."""
+"""Enlargement of the box, in the largest values that its coordinates take: that of a cut, which is
+16 ulp.
+"""
 
 
 class SectionLaw(NamedTuple):
@@ -33,11 +35,12 @@ class SectionLaw(NamedTuple):
     half_v : float
         Maximum change of V by the disturbance in one step, nu times the step, m/s.
     half_v_at_start : float
-        Part of `half_v` added at t = 0, m/s. The guaranteed model adds half of the change at the start of a step and
-        half at its end; after t = 0 the two halves of adjacent steps are added together.
+        Part of `half_v` added at t = 0, m/s. The guaranteed model adds half of the change at the
+        start of a step and half at its end; after t = 0 the two halves of adjacent steps are added
+        together.
     disturbance_lead : float
-        Time before the end of a step at which its disturbance is added, s: half a step in the paper's model, zero in
-        the guaranteed one.
+        Time before the end of a step at which its disturbance is added, s: half a step in the
+        paper's model, zero in the guaranteed one.
     impulse_error : float
         Relative error bound of an impulse.
     error_at_zero_range, error_slope : float
@@ -47,17 +50,21 @@ class SectionLaw(NamedTuple):
     label_min, label_max : float
         Limits of the labels of a true state, m.
     z_min, z_max, vz_min, vz_max, vx_min, vx_max : float
-        Box of initial states, m and m/s; the guaranteed model enlarges it by the error of the scale.
+        Box of initial states, m and m/s; the guaranteed model enlarges it by the error of the
+        scale.
     rectangle : bool
         Whether the initial set is the paper's rectangle in (omega, alpha). Otherwise it is the box.
     linear_band : bool
-        Whether the band of an angle is made linear in the range, because the exact one is not concave.
+        Whether the band of an angle is made linear in the range, because the exact one is not
+        concave.
     other_error_at_zero_range, other_error_slope : float
         Error bound of the angle of the other axis; zero in a plane.
     pointing_along, pointing_across : float
-        Error of an impulse by the engine's direction, as shares of its component along the axis and of its modulus.
+        Error of an impulse by the engine's direction, as shares of its component along the axis and
+        of its modulus.
     channel, other : int
-        Number of this axis and of the other one in arrays with an axis of channels; `other` is -1 in a plane.
+        Number of this axis and of the other one in arrays with an axis of channels; `other` is -1
+        in a plane.
     centroid_error : float
         Part of the error bound of both angles that falls with the range x: centroid_error / x, m.
     min_range : float
@@ -130,24 +137,32 @@ def law_of(laws: Laws, channel: int) -> SectionLaw:
 
 
 def impulse_doubts(impulse: Floats, law: SectionLaw) -> Floats:
-    """Return the error bounds of impulses of shape (C, B) along an axis, m/s, shape (B,), as `impulse_doubt` does."""
+    """Return the error bounds of impulses of shape (C, B) along an axis, m/s, shape (B,), as
+    `impulse_doubt` does.
+    """
     along = np.abs(impulse[law.channel])
     if law.pointing_across == 0.0:
         return np.asarray(law.impulse_error * along)
     size = np.hypot.reduce(impulse, axis=0)
-    return np.asarray(law.impulse_error * along + (law.pointing_along * along + law.pointing_across * size))
+    return np.asarray(
+        law.impulse_error * along + (law.pointing_along * along + law.pointing_across * size)
+    )
 
 
 def _law(model: SetModel) -> SectionLaw:
     """Return the constants of a planar model.
 
-    Angles contain no information about scale: a true motion with closing speed e (1 + eta) has the angles of a motion
-    of the model with all lengths, velocities and impulses divided by 1 + eta. Therefore the guaranteed model enlarges
-    the bounds of lengths and velocities by eta, takes the maximum error bound of an angle over the ranges that
-    correspond to a label, and adds eta to the engine's error of an impulse. See docs/guarantee.md.
+    Angles contain no information about scale: a true motion with closing speed e (1 + eta) has the
+    angles of a motion of the model with all lengths, velocities and impulses divided by 1 + eta.
+    Therefore the guaranteed model enlarges the bounds of lengths and velocities by eta, takes the
+    maximum error bound of an angle over the ranges that correspond to a label, and adds eta to the
+    engine's error of an impulse. See docs/guarantee.md.
     """
-    box, sensor, eta = model.bounds, model.angle_sensor, model.speed_error
-    slope, error = sensor.error_slope_rad_per_m, sensor.constant_error_rad
+    box = model.bounds
+    sensor = model.angle_sensor
+    eta = model.speed_error
+    slope = sensor.error_slope_rad_per_m
+    error = sensor.constant_error_rad
     half_v = model.acceleration_m_s2 * model.step_s
     guaranteed = model.is_guaranteed
     if guaranteed:
@@ -159,24 +174,30 @@ def _law(model: SetModel) -> SectionLaw:
     centroid = sensor.centroid_error_m * (1.0 + BOUND_SLACK) / (1.0 - eta)
     min_label, max_label = model.label_limits_m
     if guaranteed:
-        offset, speed = max(abs(z) for z in box.z_m), max(abs(v) for v in box.vz_m_s)
+        offset = max(abs(z) for z in box.z_m)
+        speed = max(abs(v) for v in box.vz_m_s)
         rate = model.closing_speed_m_s / min_label
-        # Gravity changes the scale 1/(1 + eta), and thereby V where z is not zero. The rounding term keeps coordinates
-        # that are known exactly inside the set.
+        # Gravity changes the scale 1/(1 + eta), and thereby V where z is not zero. The rounding
+        # term keeps coordinates that are known exactly inside the set.
         slack = rate * offset * model.gravity_speed_change + ROUNDING * (speed + rate * offset)
-        vz_min, vz_max = vz_min - slack, vz_max + slack
+        vz_min = vz_min - slack
+        vz_max = vz_max + slack
         slack = ROUNDING * (offset + speed * max_label / model.closing_speed_m_s)
-        z_min, z_max = z_min - slack, z_max + slack
+        z_min = z_min - slack
+        z_max = z_max + slack
     return SectionLaw(
         closing_speed=float(model.closing_speed_m_s),
         step=float(model.step_s),
         disturbance=float(model.acceleration_m_s2),
         half_v=float(half_v),
-        # The exact disturbance is a thin lens. The paper takes the segment between its ends. The guaranteed model adds
-        # half of the change of V at the start of the step and half at its end: their sum contains the lens.
+        # The exact disturbance is a thin lens. The paper takes the segment between its ends. The
+        # guaranteed model adds half of the change of V at the start of the step and half at its
+        # end: their sum contains the lens.
         half_v_at_start=0.5 * float(half_v) if guaranteed else 0.0,
         disturbance_lead=0.0 if guaranteed else 0.5 * float(model.step_s),
-        impulse_error=(1.0 + model.execution_error_relative) / (1.0 - eta) - 1.0 if guaranteed else 0.0,
+        impulse_error=(1.0 + model.execution_error_relative) / (1.0 - eta) - 1.0
+        if guaranteed
+        else 0.0,
         error_at_zero_range=float(error),
         error_slope=float(slope),
         exact_angles=guaranteed,

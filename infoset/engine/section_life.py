@@ -1,11 +1,11 @@
 """Compiled operations on one section: start, measurements, shift, prediction and summary.
 
-A section is the polygon of all (V, z) that agree with the history under the hypothesis that the range is
-x = label - e t. With z = alpha x and V = omega x - e alpha, the motion (9) of the paper is z' = V, V' = v_z: an angle
-measurement is a band of z, and an impulse is a shift of V. A section depends only on its label and on the history.
-Therefore `replays` computes the section at any label exactly, with the functions that update the stored sections in
-`section_passes`. Numbers of equations, lemmas and assumptions are those of docs/guarantee.md, unless they are of the
-paper.
+A section is the polygon of all (V, z) that agree with the history under the hypothesis that the
+range is x = label - e t. With z = alpha x and V = omega x - e alpha, the motion (9) of the paper is
+z' = V, V' = v_z: an angle measurement is a band of z, and an impulse is a shift of V. A section
+depends only on its label and on the history. Therefore `replays` computes the section at any label
+exactly, with the functions that update the stored sections in `section_passes`. Numbers of
+equations, lemmas and assumptions are those of docs/guarantee.md, unless they are of the paper.
 """
 
 from __future__ import annotations
@@ -22,10 +22,12 @@ from infoset.engine.history import ANGLE, IMPULSE, PREDICTION, LastSight
 from infoset.engine.section_law import SectionLaw
 
 CUT_SLACK = 16.0 * chains.EPSILON
-"""Enlargement of a cut, in the terms whose difference is a height. With 4 ulp no set of 60 runs of 190 cuts by errors
-of random sign at their bounds was lost; with none, 33 were."""
+"""Enlargement of a cut, in the terms whose difference is a height. With 4 ulp no set of 60 runs of
+190 cuts by errors of random sign at their bounds was lost; with none, 33 were."""
 SUM_SLACK = 8.0 * chains.EPSILON
-"""Enlargement of a sum with a segment, in the bound of |V|: several times the rounding error of the sum."""
+"""Enlargement of a sum with a segment, in the bound of |V|: several times the rounding error of the
+sum.
+"""
 RIGHT_ANGLE = 0.5 * math.pi
 ANGLE_SLACK = 1e-12
 """Added to an angle of about 1 rad, whose iteration has rounding errors of some 1e-16 rad."""
@@ -51,22 +53,31 @@ def time_to_go(label: float, elapsed: int, law: SectionLaw) -> float:
 
 @allocation_free
 def start_section(section: SectionView, room: float, law: SectionLaw) -> None:
-    """Write the section at t = 0: the box of part 1 of Lemma 1, or the rectangle, with half a disturbance of Lemma 3.
+    """Write the section at t = 0: the box of part 1 of Lemma 1, or the rectangle, with half a
+    disturbance of Lemma 3.
 
-    Both are enlarged by `room` along z, m: zero, or what the labels of a window need in the section of its middle.
-    The rectangle is that of the paper (section 4), but with V_x at the end of its interval that makes the rectangle
-    larger. The printed formula always takes the lower end; both agree if z can have either sign.
+    Both are enlarged by `room` along z, m: zero, or what the labels of a window need in the section
+    of its middle. The rectangle is that of the paper (section 4), but with V_x at the end of its
+    interval that makes the rectangle larger. The printed formula always takes the lower end; both
+    agree if z can have either sign.
     """
-    x, e = section.label, law.closing_speed
-    z_min, z_max = law.z_min, law.z_max
+    x = section.label
+    e = law.closing_speed
+    z_min = law.z_min
+    z_max = law.z_max
     shift_at_min = shift_at_max = 0.0
-    lowest, highest = law.vz_min, law.vz_max
+    lowest = law.vz_min
+    highest = law.vz_max
     if law.rectangle:
         lowest -= max(law.vx_min * z_min, law.vx_max * z_min) / x
         highest -= min(law.vx_min * z_max, law.vx_max * z_max) / x
-        shift_at_min, shift_at_max = -e * math.atan(z_min / x), -e * math.atan(z_max / x)
-        z_min, z_max = math.atan(z_min / x) * x, math.atan(z_max / x) * x
-    z_min, z_max, tau = z_min - room, z_max + room, time_to_go(x, ZERO, law)
+        shift_at_min = -e * math.atan(z_min / x)
+        shift_at_max = -e * math.atan(z_max / x)
+        z_min = math.atan(z_min / x) * x
+        z_max = math.atan(z_max / x) * x
+    z_min = z_min - room
+    z_max = z_max + room
+    tau = time_to_go(x, ZERO, law)
     chains.start(
         section,
         tau,
@@ -79,25 +90,31 @@ def start_section(section: SectionView, room: float, law: SectionLaw) -> None:
 
 @inlined
 def nearest_range(travelled: float, law: SectionLaw) -> float:
-    """Return the minimum range of a label in the set after the range has decreased by `travelled`, m."""
+    """Return the minimum range of a label in the set after the range has decreased by `travelled`,
+    m.
+    """
     return max(law.label_min - travelled, law.min_range)
 
 
 @allocation_free
-def steepest_angles(alpha: float, across: float, range_m: float, law: SectionLaw) -> tuple[float, float]:
-    """Return the maximum sizes of two measured angles, rad, that agree with the measurements up to a range.
+def steepest_angles(
+    alpha: float, across: float, range_m: float, law: SectionLaw
+) -> tuple[float, float]:
+    """Return the maximum sizes of two measured angles, rad, that agree with the measurements up to
+    a range.
 
-    The solution s of Assumption 5 for both axes, with the distances (14). `alpha` and `across` are the measured angles
-    of this axis and of the other one. The distance is at most x/(cos(own) cos(other)). If one of the angles is
-    unbounded, the first is pi/2 and the second zero.
+    The solution s of Assumption 5 for both axes, with the distances (14). `alpha` and `across` are
+    the measured angles of this axis and of the other one. The distance is at most x/(cos(own)
+    cos(other)). If one of the angles is unbounded, the first is pi/2 and the second zero.
 
-    The bound of a camera is largest at the minimum distance, that of the nearest label. Another error bound that grows
-    with the distance r grows with the angles: in a plane r = x/cos(alpha), in space r is at most x/(cos(alpha_y)
-    cos(alpha_z)). The maximum angles are the minimum solution of s = |alpha_m| + a + h(r(s)). Three fixed-point
-    iterations approach it from below; a fourth step of the length of the third passes it if the right-hand side does
-    not exceed s there.
+    The bound of a camera is largest at the minimum distance, that of the nearest label. Another
+    error bound that grows with the distance r grows with the angles: in a plane r = x/cos(alpha),
+    in space r is at most x/(cos(alpha_y) cos(alpha_z)). The maximum angles are the minimum solution
+    of s = |alpha_m| + a + h(r(s)). Three fixed-point iterations approach it from below; a fourth
+    step of the length of the third passes it if the right-hand side does not exceed s there.
     """
-    growth, other_growth = max(law.error_slope, 0.0) * range_m, max(law.other_error_slope, 0.0) * range_m
+    growth = max(law.error_slope, 0.0) * range_m
+    other_growth = max(law.other_error_slope, 0.0) * range_m
     centroid = 0.0
     if law.centroid_error > 0.0:
         centroid = law.centroid_error / nearest_range(law.label_max - range_m, law)
@@ -108,14 +125,18 @@ def steepest_angles(alpha: float, across: float, range_m: float, law: SectionLaw
     for _ in range(3):
         if own >= RIGHT_ANGLE or other >= RIGHT_ANGLE:
             return RIGHT_ANGLE, 0.0
-        cosine, other_cosine = math.cos(own), math.cos(other)
-        before, own = own, minimum + growth / cosine / other_cosine
-        other_before, other = other, other_min + other_growth / cosine / other_cosine
+        cosine = math.cos(own)
+        other_cosine = math.cos(other)
+        before = own
+        own = minimum + growth / cosine / other_cosine
+        other_before = other
+        other = other_min + other_growth / cosine / other_cosine
     own += (own - before) + ANGLE_SLACK
     other += (other - other_before) + ANGLE_SLACK
     if own >= RIGHT_ANGLE or other >= RIGHT_ANGLE:
         return RIGHT_ANGLE, 0.0
-    cosine, other_cosine = math.cos(own), math.cos(other)
+    cosine = math.cos(own)
+    other_cosine = math.cos(other)
     passed = minimum + growth / cosine / other_cosine <= own
     if passed and other_min + other_growth / cosine / other_cosine <= other:
         return own, other
@@ -123,17 +144,21 @@ def steepest_angles(alpha: float, across: float, range_m: float, law: SectionLaw
 
 
 @inlined
-def slope_band(alpha: float, across: float, travelled: float, x: float, law: SectionLaw) -> tuple[float, float]:
+def slope_band(
+    alpha: float, across: float, travelled: float, x: float, law: SectionLaw
+) -> tuple[float, float]:
     """Return the minimum and the maximum slope z/x that agree with measured angles, at range x.
 
-    By (8), the tangents of alpha -+ b(x), with the error bound b(x) of the label: part 4 of Lemma 1. The paper's model
-    takes the angles in place of their tangents. `alpha` and `across` are the angles of this axis and of the other one,
-    rad. `travelled` is the decrease of the range since the start, m, the same for all labels.
+    By (8), the tangents of alpha -+ b(x), with the error bound b(x) of the label: part 4 of Lemma
+    1. The paper's model takes the angles in place of their tangents. `alpha` and `across` are the
+    angles of this axis and of the other one, rad. `travelled` is the decrease of the range since
+    the start, m, the same for all labels.
     """
     if law.linear_band:
         return linear_slope_band(alpha, across, travelled, x, law)
     bound = law.error_at_zero_range + law.error_slope * x
-    lower, upper = alpha - bound, alpha + bound
+    lower = alpha - bound
+    upper = alpha + bound
     if law.exact_angles:
         lower = math.tan(lower) if lower > -RIGHT_ANGLE else -np.inf
         upper = math.tan(upper) if upper < RIGHT_ANGLE else np.inf
@@ -141,13 +166,17 @@ def slope_band(alpha: float, across: float, travelled: float, x: float, law: Sec
 
 
 @allocation_free
-def linear_slope_band(alpha: float, across: float, travelled: float, x: float, law: SectionLaw) -> tuple[float, float]:
-    """Return what `slope_band` does for an error bound that rises with the range, or that of a camera: (21).
+def linear_slope_band(
+    alpha: float, across: float, travelled: float, x: float, law: SectionLaw
+) -> tuple[float, float]:
+    """Return what `slope_band` does for an error bound that rises with the range, or that of a
+    camera: (21).
 
-    Bounds over all labels need an upper bound whose product with x is a concave function of x. Therefore these two
-    error bounds have a wider band, whose product with x is linear. If the bound h(x) rises with range, x h(x) is
-    convex: a chord and a tangent are above it. With the bound p + c/x of a camera, x tan(alpha + p + c/x) is convex: a
-    tangent in the angle, with the slope at the steepest angle of all labels, is above it.
+    Bounds over all labels need an upper bound whose product with x is a concave function of x.
+    Therefore these two error bounds have a wider band, whose product with x is linear. If the bound
+    h(x) rises with range, x h(x) is convex: a chord and a tangent are above it. With the bound p +
+    c/x of a camera, x tan(alpha + p + c/x) is convex: a tangent in the angle, with the slope at the
+    steepest angle of all labels, is above it.
     """
     bound = law.error_at_zero_range + law.error_slope * x
     if law.centroid_error > 0.0 and x > 0.0:
@@ -162,7 +191,9 @@ def linear_slope_band(alpha: float, across: float, travelled: float, x: float, l
     if law.error_slope > 0.0:
         near = max(law.label_min - travelled, 0.0)
         # The error bound depends on the true distance, at most x/(cos(own) cos(other)).
-        bound = law.error_at_zero_range + law.error_slope * ((near + far - near * far / x) / cosine / math.cos(other))
+        bound = law.error_at_zero_range + law.error_slope * (
+            (near + far - near * far / x) / cosine / math.cos(other)
+        )
     bound = bound / cosine**2
     return math.tan(alpha) - bound, math.tan(alpha) + bound
 
@@ -171,17 +202,21 @@ def linear_slope_band(alpha: float, across: float, travelled: float, x: float, l
 def measure_section(
     section: SectionView, elapsed: int, alpha: float, across: float, law: SectionLaw
 ) -> tuple[bool, float]:
-    """Cut a section by an angle measurement; return what `chains.cut` does. `across` is the angle of the other axis.
+    """Cut a section by an angle measurement; return what `chains.cut` does. `across` is the angle
+    of the other axis.
 
-    By (8), z lies between x tan(alpha - b) and x tan(alpha + b), with the error bound b of the angle at range x. The
-    band is widened by 16 ulp, so that rounding does not exclude true states on the border, which extremal noise
-    produces. The ulp is that of the terms of a height and does not decrease with the range.
+    By (8), z lies between x tan(alpha - b) and x tan(alpha + b), with the error bound b of the
+    angle at range x. The band is widened by 16 ulp, so that rounding does not exclude true states
+    on the border, which extremal noise produces. The ulp is that of the terms of a height and does
+    not decrease with the range.
     """
     label = section.label
     x = range_of(label, elapsed, law)
     bound = law.error_at_zero_range + law.error_slope * x
     lower, upper = slope_band(alpha, across, law.closing_speed * (law.step * elapsed), x, law)
-    slack = CUT_SLACK * (label * (abs(alpha) + bound) + section.right.reach * (label / law.closing_speed))
+    slack = CUT_SLACK * (
+        label * (abs(alpha) + bound) + section.right.reach * (label / law.closing_speed)
+    )
     return chains.cut(section, x / law.closing_speed, x * lower - slack, x * upper + slack)
 
 
@@ -194,7 +229,10 @@ def sight_after(
     if kind == PREDICTION:
         steps += 1
     elif applies and kind == ANGLE:
-        known, alpha, across, steps = True, value, other_value, 0
+        known = True
+        alpha = value
+        across = other_value
+        steps = 0
     elif applies and kind == IMPULSE:
         fired += abs(value) + pointing_doubt(value, other_value, law)
     return LastSight(known, alpha, across, steps, fired)
@@ -213,31 +251,41 @@ def pointing_doubt(impulse: float, across: float, law: SectionLaw) -> float:
 
 @inlined
 def impulse_doubt(impulse: float, across: float, law: SectionLaw) -> float:
-    """Return the error bound of an impulse along an axis, m/s: (2), in space (15); `across` is along the other axis."""
+    """Return the error bound of an impulse along an axis, m/s: (2), in space (15); `across` is
+    along the other axis.
+    """
     return abs(impulse) * law.impulse_error + pointing_doubt(impulse, across, law)
 
 
 @inlined
 def across_of(values: Floats, i: int, law: SectionLaw) -> float:
-    """Return the value with number `i` along the other axis, of values of shape (C, N); zero in a plane."""
+    """Return the value with number `i` along the other axis, of values of shape (C, N); zero in a
+    plane.
+    """
     return values[law.other, i] if law.other >= 0 else 0.0
 
 
 @inlined
 def widen_section(section: SectionView, elapsed: int, law: SectionLaw) -> None:
-    """Enlarge a section by the error bound b of one angle measurement: by e b in V, or x b in the predicted miss."""
+    """Enlarge a section by the error bound b of one angle measurement: by e b in V, or x b in the
+    predicted miss.
+    """
     x = range_of(section.label, elapsed, law)
     bound = law.error_at_zero_range + law.error_slope * x + law.centroid_error / x
     chains.spread(section, x / law.closing_speed, law.closing_speed * bound)
 
 
 @inlined
-def shift_section(section: SectionView, elapsed: int, impulse: float, across: float, law: SectionLaw) -> None:
-    """Shift a section by an impulse k: V becomes V - k, and is widened by the error bound of k, (2) or (15).
+def shift_section(
+    section: SectionView, elapsed: int, impulse: float, across: float, law: SectionLaw
+) -> None:
+    """Shift a section by an impulse k: V becomes V - k, and is widened by the error bound of k, (2)
+    or (15).
 
     `across` is the impulse along the other axis.
     """
-    tau, doubt = time_to_go(section.label, elapsed, law), impulse_doubt(impulse, across, law)
+    tau = time_to_go(section.label, elapsed, law)
+    doubt = impulse_doubt(impulse, across, law)
     chains.shift(section, tau, -impulse)
     if law.impulse_error > 0.0 or law.pointing_across > 0.0:
         chains.spread(section, tau, doubt)
@@ -245,7 +293,8 @@ def shift_section(section: SectionView, elapsed: int, impulse: float, across: fl
 
 @inlined
 def predict_section(section: SectionView, elapsed: int, law: SectionLaw) -> None:
-    """Move a section to step `elapsed`: the level turns, and the segment of the disturbance, 8 ulp longer, is added.
+    """Move a section to step `elapsed`: the level turns, and the segment of the disturbance, 8 ulp
+    longer, is added.
 
     By Lemma 3, the segment is nu times the step in V, with both halves of adjacent steps.
     """
@@ -257,8 +306,11 @@ def predict_section(section: SectionView, elapsed: int, law: SectionLaw) -> None
 
 
 @inlined
-def summarise_section(section: SectionView, elapsed: int, law: SectionLaw, summaries: Floats, b: int, s: int) -> None:
-    """Write the extremes (13), (14) of the paper: those of the predicted miss z + V x/e -+ nu/2 (x/e)^2 of a section.
+def summarise_section(
+    section: SectionView, elapsed: int, law: SectionLaw, summaries: Floats, b: int, s: int
+) -> None:
+    """Write the extremes (13), (14) of the paper: those of the predicted miss z + V x/e -+ nu/2
+    (x/e)^2 of a section.
 
     `summaries` has the shape (C, B, S, columns).
     """

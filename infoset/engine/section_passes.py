@@ -1,4 +1,6 @@
-"""Compiled operations on all sections of a batch of engagements; `section_life` contains those on one section."""
+"""Compiled operations on all sections of a batch of engagements; `section_life` contains those on
+one section.
+"""
 
 from __future__ import annotations
 
@@ -37,11 +39,13 @@ from infoset.engine.section_life import (
 from infoset.engine.section_window import Rate, measure_rate_section, new_window
 
 TIE_TOLERANCE = 1e-9
-"""Misses of two vertices that differ by less than this part of the interval of misses count as equal, those of one
-edge; their rounding errors are far smaller."""
+"""Misses of two vertices that differ by less than this part of the interval of misses count as
+equal, those of one edge; their rounding errors are far smaller."""
 
 MOVED, SUMMARISED, WITH_HEIGHTS = constants(3)
-"""What `step_all` brings up to date: sections, and with each further value also summaries, and their columns of z."""
+"""What `step_all` brings up to date: sections, and with each further value also summaries, and
+their columns of z.
+"""
 NO_EVENT = -1
 
 
@@ -57,8 +61,8 @@ class Slot(Protocol):
     died : int
         Number of the event that made a section empty, or ALIVE.
     overlap : float
-        Overlap of an empty section with the band that made it empty, m: negative. The minimum one if several became
-        empty at that event.
+        Overlap of an empty section with the band that made it empty, m: negative. The minimum one
+        if several became empty at that event.
     emptied : int
         Axis of the section with that overlap.
     """
@@ -86,7 +90,8 @@ class Sections(NamedTuple):
     summaries : ndarray, shape (C, B, S, columns)
         Extremes of the predicted miss and of z, m.
     behind, stale : ndarray of bool, shape (B,)
-        Engagements with sections one step behind the present one, and those with summaries out of date.
+        Engagements with sections one step behind the present one, and those with summaries out of
+        date.
     rows : ndarray of int, shape (B S, 3)
         Working array for a list of sections: row, engagement and slot.
     """
@@ -103,7 +108,8 @@ class Sections(NamedTuple):
 def room_for_sections(channels: int, labels: Floats, used: Integers) -> Sections:
     """Allocate the arrays of a batch of sections for a number of axes."""
     slots = np.zeros(labels.shape, dtype=record_of(Slot))
-    slots["label"], slots["died"] = labels, ALIVE
+    slots["label"] = labels
+    slots["died"] = ALIVE
     return Sections(
         slots=slots,
         used=used,
@@ -140,9 +146,11 @@ def start_all(sections: Sections, laws: Laws) -> None:
 
 @inlined
 def is_cut(sections: Sections, channel: int, event: int, b: int, s: int) -> bool:
-    """Whether a section is cut at an event: if the label lives, or another axis has just made it empty.
+    """Whether a section is cut at an event: if the label lives, or another axis has just made it
+    empty.
 
-    The overlap of a label that an event makes empty is the smallest one of its axes, whatever their order.
+    The overlap of a label that an event makes empty is the smallest one of its axes, whatever their
+    order.
     """
     slot = sections.slots[b, s]
     return bool(slot.living or (channel > 0 and slot.died == event))
@@ -150,7 +158,9 @@ def is_cut(sections: Sections, channel: int, event: int, b: int, s: int) -> bool
 
 @inlined
 def mark_empty(slot: Slot, channel: int, event: int, overlap: float) -> int:
-    """Note that an event has made a section empty; return 1 if the label lived until now, else 0."""
+    """Note that an event has made a section empty; return 1 if the label lived until now, else
+    0.
+    """
     lived = slot.living
     if lived or overlap < slot.overlap:
         slot.overlap = overlap
@@ -163,46 +173,65 @@ def mark_empty(slot: Slot, channel: int, event: int, overlap: float) -> int:
 @allocation_free
 def list_rows(channel: int, event: int, measured: Flags, wanted: int, sections: Sections) -> int:
     """List the sections of an axis that `step_all` changes; return their number."""
-    used, rows, behind, stale = sections.used, sections.rows, sections.behind, sections.stale
+    used = sections.used
+    rows = sections.rows
+    behind = sections.behind
+    stale = sections.stale
     count = 0
     for b in range(len(used)):
-        if behind[b] or measured[b] or (stale[b] and wanted >= SUMMARISED) or wanted == WITH_HEIGHTS:
+        if (
+            behind[b]
+            or measured[b]
+            or (stale[b] and wanted >= SUMMARISED)
+            or wanted == WITH_HEIGHTS
+        ):
             for s in range(used[b]):
                 if is_cut(sections, channel, event, b, s):
-                    rows[count, 0], rows[count, 1], rows[count, 2] = row_of(sections, channel, b, s), b, s
+                    rows[count, 0] = row_of(sections, channel, b, s)
+                    rows[count, 1] = b
+                    rows[count, 2] = s
                     count += 1
     return count
 
 
 @entry
 def step_all(
-    measured: Flags, alpha: Floats, event: int, elapsed: int, wanted: int, sections: Sections, laws: Laws
+    measured: Flags,
+    alpha: Floats,
+    event: int,
+    elapsed: int,
+    wanted: int,
+    sections: Sections,
+    laws: Laws,
 ) -> int:
-    """Predict, cut and summarise the living sections in one pass; return the number of labels that became empty.
+    """Predict, cut and summarise the living sections in one pass; return the number of labels that
+    became empty.
 
-    Sections that are behind are moved to the present step `elapsed`. Those of the engagements that are `measured`,
-    shape (B,), are cut by angles `alpha`, shape (C, B), rad, and summarised. `event` is the number of the measurement,
-    `NO_EVENT` without one. `wanted` is what is brought up to date besides: `MOVED`, `SUMMARISED` or `WITH_HEIGHTS`.
+    Sections that are behind are moved to the present step `elapsed`. Those of the engagements that
+    are `measured`, shape (B,), are cut by angles `alpha`, shape (C, B), rad, and summarised.
+    `event` is the number of the measurement, `NO_EVENT` without one. `wanted` is what is brought up
+    to date besides: `MOVED`, `SUMMARISED` or `WITH_HEIGHTS`.
     """
     deaths = 0
-    slots, summaries, rows, behind, stale = (
-        sections.slots,
-        sections.summaries,
-        sections.rows,
-        sections.behind,
-        sections.stale,
-    )
+    slots = sections.slots
+    summaries = sections.summaries
+    rows = sections.rows
+    behind = sections.behind
+    stale = sections.stale
     for channel in range(laws.shape[0]):
         law = law_of(laws, channel)
         count = list_rows(channel, event, measured, wanted, sections)
         for k in range(count):
-            b, s = rows[k, 1], rows[k, 2]
+            b = rows[k, 1]
+            s = rows[k, 2]
             slot = slots[b, s]
             section = view_of(sections.chains, rows[k, 0], slot.label)
             if behind[b]:
                 predict_section(section, elapsed, law)
             if measured[b]:
-                survives, overlap = measure_section(section, elapsed, alpha[channel, b], across_of(alpha, b, law), law)
+                survives, overlap = measure_section(
+                    section, elapsed, alpha[channel, b], across_of(alpha, b, law), law
+                )
                 if not survives:
                     deaths += mark_empty(slot, channel, event, overlap)
                 if not slot.living:
@@ -235,7 +264,8 @@ def follow_sight(log: EventLog, done: int, b: int, sights: Floats, law: SectionL
     )
     for event in range(done, log.number):
         values = log.values[event]
-        across, applies = across_of(values, b, law), log.applies[event, b]
+        across = across_of(values, b, law)
+        applies = log.applies[event, b]
         sight = sight_after(sight, log.kinds[event], values[c, b], across, applies, law)
     sights[c, b, 0] = 1.0 if sight.known else 0.0
     sights[c, b, 1], sights[c, b, 2] = sight.alpha, sight.across
@@ -245,16 +275,26 @@ def follow_sight(log: EventLog, done: int, b: int, sights: Floats, law: SectionL
 
 @entry
 def measure_rate_all(
-    log: EventLog, error: float, done: int, sights: Floats, sections: Sections, laws: Laws, points: Floats
+    log: EventLog,
+    error: float,
+    done: int,
+    sights: Floats,
+    sections: Sections,
+    laws: Laws,
+    points: Floats,
 ) -> int:
-    """Cut the living sections by the rates of the latest event and summarise them; return how many became empty.
+    """Cut the living sections by the rates of the latest event and summarise them; return how many
+    became empty.
 
-    `error` is the error bound of the rates, rad/s; `sights` has the last sights after `done` events and is updated.
+    `error` is the error bound of the rates, rad/s; `sights` has the last sights after `done` events
+    and is updated.
     """
     deaths = 0
-    slots, used = sections.slots, sections.used
+    slots = sections.slots
+    used = sections.used
     event = log.number - 1
-    active, omega = log.applies[event], log.values[event]
+    active = log.applies[event]
+    omega = log.values[event]
     for b in range(len(used)):
         for channel in range(laws.shape[0]):
             law = law_of(laws, channel)
@@ -263,9 +303,12 @@ def measure_rate_all(
             for s in range(used[b]):
                 if not (active[b] and is_cut(sections, channel, event, b, s)):
                     continue
-                section, label = section_of(sections, channel, b, s), slots[b, s].label
+                section = section_of(sections, channel, b, s)
+                label = slots[b, s].label
                 alone = new_window(label, label, law)
-                survives, overlap, _ = measure_rate_section(section, label, log.elapsed, rate, alone, law, points)
+                survives, overlap, _ = measure_rate_section(
+                    section, label, log.elapsed, rate, alone, law, points
+                )
                 if not survives:
                     deaths += mark_empty(slots[b, s], channel, event, overlap)
                 if slots[b, s].living:
@@ -276,14 +319,19 @@ def measure_rate_all(
 
 @entry
 def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, laws: Laws) -> None:
-    """Shift the living sections of the active engagements and their summaries by impulses of shape (C, B)."""
-    slots, used, summaries = sections.slots, sections.used, sections.summaries
+    """Shift the living sections of the active engagements and their summaries by impulses of shape
+    (C, B).
+    """
+    slots = sections.slots
+    used = sections.used
+    summaries = sections.summaries
     for channel in range(laws.shape[0]):
         law = law_of(laws, channel)
         for b in range(len(used)):
             if not active[b]:
                 continue
-            along, across = impulse[channel, b], across_of(impulse, b, law)
+            along = impulse[channel, b]
+            across = across_of(impulse, b, law)
             if along == 0.0 and across == 0.0:
                 continue
             for s in range(used[b]):
@@ -291,22 +339,31 @@ def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, 
                 if not slot.living:
                     continue
                 shift_section(section_of(sections, channel, b, s), elapsed, along, across, law)
-                tau, error = time_to_go(slot.label, elapsed, law), impulse_doubt(along, across, law)
+                tau = time_to_go(slot.label, elapsed, law)
+                error = impulse_doubt(along, across, law)
                 summaries[channel, b, s, UPPER_MISS] += (error - along) * tau
                 summaries[channel, b, s, LOWER_MISS] -= (error + along) * tau
 
 
 @entry
 def make_room_all(
-    active: Flags, added: int, elapsed: int, sections: Sections, laws: Laws, points: Floats, widen: bool
+    active: Flags,
+    added: int,
+    elapsed: int,
+    sections: Sections,
+    laws: Laws,
+    points: Floats,
+    widen: bool,
 ) -> tuple[int, int]:
     """Compute the room that the living sections need; with `widen`, enlarge their rings.
 
-    Every section must be able to gain `added` vertices. Return the number of floats by which the rings are too small,
-    for which memory must be allocated, and the number of vertices that every section may gain. It is less than
-    `MAX_ADDED` if a section must be reduced first; `widen` reduces those of the active engagements.
+    Every section must be able to gain `added` vertices. Return the number of floats by which the
+    rings are too small, for which memory must be allocated, and the number of vertices that every
+    section may gain. It is less than `MAX_ADDED` if a section must be reduced first; `widen`
+    reduces those of the active engagements.
     """
-    slots, used = sections.slots, sections.used
+    slots = sections.slots
+    used = sections.used
     floats = ZERO
     spare = chains.CAPACITY
     for channel in range(laws.shape[0]):
@@ -319,7 +376,8 @@ def make_room_all(
                 section = section_of(sections, channel, b, s)
                 if widen and active[b] and chains.is_crowded(section):
                     chains.reduce_outward(section, time_to_go(slot.label, elapsed, law), points)
-                count, room = chains.count_of(section), chain_storage.room_of(section)
+                count = chains.count_of(section)
+                room = chain_storage.room_of(section)
                 wanted = chain_storage.room_for(min(count + added, chains.CAPACITY), room)
                 if wanted > room and widen:
                     chain_storage.widen_rings(section, wanted)
@@ -331,31 +389,44 @@ def make_room_all(
 
 @entry
 def widest_all(elapsed: int, sections: Sections, laws: Laws, exists: Flags, ends: Floats) -> None:
-    """Write the predicted-miss interval of each engagement along each axis, and whether it has a living section.
+    """Write the predicted-miss interval of each engagement along each axis, and whether it has a
+    living section.
 
-    `ends`, shape (C, B, 2, 4), has for the lower and the upper end the predicted miss, m, and alpha, rad, omega, rad/s,
-    and range, m, of a state that reaches it; it is not written for engagements without a living section. An extreme is
-    usually reached on a whole edge. The lowest point is taken for the upper end and the highest for the lower end, so
-    that a mirrored engagement gives exactly mirrored results.
+    `ends`, shape (C, B, 2, 4), has for the lower and the upper end the predicted miss, m, and
+    alpha, rad, omega, rad/s, and range, m, of a state that reaches it; it is not written for
+    engagements without a living section. An extreme is usually reached on a whole edge. The lowest
+    point is taken for the upper end and the highest for the lower end, so that a mirrored
+    engagement gives exactly mirrored results.
     """
-    slots, used = sections.slots, sections.used
+    slots = sections.slots
+    used = sections.used
     for channel in range(laws.shape[0]):
-        law, summaries = law_of(laws, channel), sections.summaries
+        law = law_of(laws, channel)
+        summaries = sections.summaries
         for b in range(len(used)):
             lowest = highest = -1
             for s in range(used[b]):
                 # Only sections of stopped engagements can be at range zero.
                 if not slots[b, s].living or range_of(slots[b, s].label, elapsed, law) == 0.0:
                     continue
-                if lowest < 0 or summaries[channel, b, s, LOWER_MISS] < summaries[channel, b, lowest, LOWER_MISS]:
+                if (
+                    lowest < 0
+                    or summaries[channel, b, s, LOWER_MISS]
+                    < summaries[channel, b, lowest, LOWER_MISS]
+                ):
                     lowest = s
-                if highest < 0 or summaries[channel, b, s, UPPER_MISS] > summaries[channel, b, highest, UPPER_MISS]:
+                if (
+                    highest < 0
+                    or summaries[channel, b, s, UPPER_MISS]
+                    > summaries[channel, b, highest, UPPER_MISS]
+                ):
                     highest = s
             if lowest < 0:
                 continue
             exists[b] = True
             for end, s in ((0, lowest), (1, highest)):
-                tau, x = time_to_go(slots[b, s].label, elapsed, law), range_of(slots[b, s].label, elapsed, law)
+                tau = time_to_go(slots[b, s].label, elapsed, law)
+                x = range_of(slots[b, s].label, elapsed, law)
                 section = section_of(sections, channel, b, s)
                 points = chains.extreme_points(section, tau, TIE_TOLERANCE, CUT_SLACK)
                 v, m = points[1 - end]
@@ -368,11 +439,14 @@ def widest_all(elapsed: int, sections: Sections, laws: Laws, exists: Flags, ends
 
 @entry
 def extreme_angles_all(elapsed: int, sections: Sections, laws: Laws, extremes: Floats) -> None:
-    """Write the minimum and the maximum alpha of the living sections along each axis, rad, and their ranges, m.
+    """Write the minimum and the maximum alpha of the living sections along each axis, rad, and
+    their ranges, m.
 
     `extremes`, shape (4, C, B), is not written for engagements without a living section.
     """
-    slots, used, summaries = sections.slots, sections.used, sections.summaries
+    slots = sections.slots
+    used = sections.used
+    summaries = sections.summaries
     for channel in range(laws.shape[0]):
         law = law_of(laws, channel)
         for b in range(len(used)):
@@ -382,16 +456,21 @@ def extreme_angles_all(elapsed: int, sections: Sections, laws: Laws, extremes: F
                 # Only sections of stopped engagements can be at range zero.
                 if not slots[b, s].living or x == 0.0:
                     continue
-                minimum, maximum = summaries[channel, b, s, Z_MIN] / x, summaries[channel, b, s, Z_MAX] / x
+                minimum = summaries[channel, b, s, Z_MIN] / x
+                maximum = summaries[channel, b, s, Z_MAX] / x
                 if none or minimum < extremes[0, channel, b]:
-                    extremes[0, channel, b], extremes[2, channel, b] = minimum, x
+                    extremes[0, channel, b] = minimum
+                    extremes[2, channel, b] = x
                 if none or maximum > extremes[1, channel, b]:
-                    extremes[1, channel, b], extremes[3, channel, b] = maximum, x
+                    extremes[1, channel, b] = maximum
+                    extremes[3, channel, b] = x
                 none = False
 
 
 @entry
-def keep_labels_all(active: Flags, minimum: Floats, maximum: Floats, sections: Sections, removed: Flags) -> int:
+def keep_labels_all(
+    active: Flags, minimum: Floats, maximum: Floats, sections: Sections, removed: Flags
+) -> int:
     """Remove the living sections with labels outside limits of shape (B,), m; return their number.
 
     `removed`, shape (B, S), receives the mask of the removed ones.
@@ -424,7 +503,11 @@ def write_outline(section: Chains, n: int, tau: float, out: Floats) -> int:
 
 @entry
 def steepest_all(alpha: Floats, farthest: float, laws: Laws, steepest: Floats) -> None:
-    """Write the maximum sizes of angles of shape (C, B) up to a range: those of `steepest_angles`, shape (2, B)."""
+    """Write the maximum sizes of angles of shape (C, B) up to a range: those of `steepest_angles`,
+    shape (2, B).
+    """
     law = law_of(laws, ZERO)
     for b in range(alpha.shape[1]):
-        steepest[0, b], steepest[1, b] = steepest_angles(alpha[0, b], across_of(alpha, b, law), farthest, law)
+        steepest[0, b], steepest[1, b] = steepest_angles(
+            alpha[0, b], across_of(alpha, b, law), farthest, law
+        )

@@ -1,8 +1,10 @@
-"""Sections of a window of labels, in the coordinates (V, Pi) of its middle: the set of them is convex on the window.
+"""Sections of a window of labels, in the coordinates (V, Pi) of its middle: the set of them is
+convex on the window.
 
-The exact band of a measured rate is not convex in (z, V, label). Its direction, that of the predicted miss Pi, is the
-same for all labels in (Pi, V), and there the bands of angles can be replaced by convex ones that are little wider. See
-"With a rate sensor" in docs/guarantee.md. The window of one label is the label itself, with its exact bands.
+The exact band of a measured rate is not convex in (z, V, label). Its direction, that of the
+predicted miss Pi, is the same for all labels in (Pi, V), and there the bands of angles can be
+replaced by convex ones that are little wider. See "With a rate sensor" in docs/guarantee.md. The
+window of one label is the label itself, with its exact bands.
 """
 
 from __future__ import annotations
@@ -17,14 +19,22 @@ from infoset.engine import chains
 from infoset.engine.chains import SectionView
 from infoset.engine.history import IMPULSE, PREDICTION, RATE, LastSight
 from infoset.engine.section_law import SectionLaw
-from infoset.engine.section_life import CUT_SLACK, SUM_SLACK, impulse_doubt, range_of, slope_band, time_to_go
+from infoset.engine.section_life import (
+    CUT_SLACK,
+    SUM_SLACK,
+    impulse_doubt,
+    range_of,
+    slope_band,
+    time_to_go,
+)
 
 
 class Window(NamedTuple):
-    """Labels from `near` to `far`, m, and what the events so far change between them and their middle c.
+    """Labels from `near` to `far`, m, and what the events so far change between them and their
+    middle c.
 
-    A motion with label l and predicted miss Pi is the point Pi + turned (l - c)/e of the section, to within the sum
-    `loose` times half the width of the window over e, by (13).
+    A motion with label l and predicted miss Pi is the point Pi + turned (l - c)/e of the section,
+    to within the sum `loose` times half the width of the window over e, by (13).
 
     Parameters
     ----------
@@ -45,7 +55,8 @@ class Window(NamedTuple):
 
 
 class Stretch(NamedTuple):
-    """Events without a cut, from step `began` on, which are applied at once; times are those since the beginning.
+    """Events without a cut, from step `began` on, which are applied at once; times are those since
+    the beginning.
 
     Parameters
     ----------
@@ -65,7 +76,9 @@ class Stretch(NamedTuple):
 
 
 class Rate(NamedTuple):
-    """A measured rate of the line of sight along one axis, its error bound, rad/s, and the last angle before it."""
+    """A measured rate of the line of sight along one axis, its error bound, rad/s, and the last
+    angle before it.
+    """
 
     omega: float
     error: float
@@ -94,9 +107,17 @@ def new_window(near: float, far: float, law: SectionLaw) -> Window:
 
 @inlined
 def window_after(
-    window: Window, kind: int, value: float, across: float, error: float, elapsed: int, law: SectionLaw
+    window: Window,
+    kind: int,
+    value: float,
+    across: float,
+    error: float,
+    elapsed: int,
+    law: SectionLaw,
 ) -> Window:
-    """Return a window after one more event that applies; `elapsed` is the number of predictions up to it."""
+    """Return a window after one more event that applies; `elapsed` is the number of predictions up
+    to it.
+    """
     near, far, turned, loose, fastest, most = window
     tau = max(time_to_go(far, elapsed, law), 0.0)
     if kind == PREDICTION:
@@ -125,11 +146,18 @@ def new_stretch(began: int) -> Stretch:
 
 @inlined
 def stretch_after(
-    stretch: Stretch, kind: int, value: float, across: float, fastest: float, elapsed: int, law: SectionLaw
+    stretch: Stretch,
+    kind: int,
+    value: float,
+    across: float,
+    fastest: float,
+    elapsed: int,
+    law: SectionLaw,
 ) -> Stretch:
     """Return a stretch after one more event that applies; `fastest` is that of `Window`."""
     began, bounds, moments, turned, impulses = stretch
-    time, bound = law.step * (elapsed - began), 0.0
+    time = law.step * (elapsed - began)
+    bound = 0.0
     if kind == PREDICTION:
         bound = law.half_v + SUM_SLACK * fastest
     elif kind == IMPULSE:
@@ -140,12 +168,17 @@ def stretch_after(
 
 
 @allocation_free
-def apply_stretch(section: SectionView, stretch: Stretch, elapsed: int, law: SectionLaw, points: Floats) -> None:
-    """Move a section over a stretch to step `elapsed`: impulses at once, and the bounds of changes of V at both ends.
+def apply_stretch(
+    section: SectionView, stretch: Stretch, elapsed: int, law: SectionLaw, points: Floats
+) -> None:
+    """Move a section over a stretch to step `elapsed`: impulses at once, and the bounds of changes
+    of V at both ends.
 
-    By Lemma 9a, two segments along the levels of both ends contain those of all changes of V between them.
+    By Lemma 9a, two segments along the levels of both ends contain those of all changes of V
+    between them.
     """
-    before, now = time_to_go(section.label, stretch.began, law), time_to_go(section.label, elapsed, law)
+    before = time_to_go(section.label, stretch.began, law)
+    now = time_to_go(section.label, elapsed, law)
     late = stretch.moments / (before - now) if elapsed > stretch.began else stretch.bounds
     if chains.is_crowded(section):
         chains.reduce_outward(section, before, points)
@@ -159,7 +192,9 @@ def apply_stretch(section: SectionView, stretch: Stretch, elapsed: int, law: Sec
 
 @inlined
 def nearly_tangent(angle: float, up: float, law: SectionLaw) -> float:
-    """Return a slope that is at most the tangent of an angle below 0.5 rad for `up` = 1, at least for `up` = -1."""
+    """Return a slope that is at most the tangent of an angle below 0.5 rad for `up` = 1, at least
+    for `up` = -1.
+    """
     if not law.exact_angles:
         return angle
     return angle + angle * angle * angle * (1.0 / 3.0 if up * angle > 0.0 else 0.4)
@@ -167,22 +202,39 @@ def nearly_tangent(angle: float, up: float, law: SectionLaw) -> float:
 
 @allocation_free
 def measure_in_window(
-    section: SectionView, label: float, elapsed: int, angles: tuple[float, float], window: Window, law: SectionLaw
+    section: SectionView,
+    label: float,
+    elapsed: int,
+    angles: tuple[float, float],
+    window: Window,
+    law: SectionLaw,
 ) -> tuple[bool, float, bool]:
     """Cut the section of a label by a measured angle, with the convex band of its window.
 
-    Return what `chains.cut` does, and whether the band cuts something; if not, the overlap is a lower bound. `angles`
-    are the angles of this axis and of the other one, rad. By (13b), in the form with the smaller last term.
+    Return what `chains.cut` does, and whether the band cuts something; if not, the overlap is a
+    lower bound. `angles` are the angles of this axis and of the other one, rad. By (13b), in the
+    form with the smaller last term.
     """
-    e, half, travelled = law.closing_speed, half_time(window, law), law.closing_speed * (law.step * elapsed)
+    e = law.closing_speed
+    half = half_time(window, law)
+    travelled = law.closing_speed * (law.step * elapsed)
     alpha, across = angles
-    x, near, far, middle = label - travelled, window.near - travelled, window.far - travelled, section.label - travelled
+    x = label - travelled
+    near = window.near - travelled
+    far = window.far - travelled
+    middle = section.label - travelled
     by_speed = half == 0.0 or near <= 0.0 or window.fastest * near <= window.most * e
     scale = x if by_speed else middle
-    room = window.loose * half + (window.fastest * half if by_speed else window.most * (half * e / near))
+    room = window.loose * half + (
+        window.fastest * half if by_speed else window.most * (half * e / near)
+    )
     turn = window.turned * ((label - section.label) / e)
     bound = law.error_at_zero_range + law.error_slope * x
-    slack = CUT_SLACK * (section.label * (abs(alpha) + bound) + section.right.reach * (section.label / e)) + room
+    slack = (
+        CUT_SLACK
+        * (section.label * (abs(alpha) + bound) + section.right.reach * (section.label / e))
+        + room
+    )
     # Most bands cut nothing: a narrower one without tangents shows it in half the time.
     minimum, maximum = chains.heights(section, middle / e)
     if abs(alpha) + bound < 0.5:
@@ -193,8 +245,11 @@ def measure_in_window(
     lower, upper = slope_band(alpha, across, travelled, x if by_speed else near, law)
     if not by_speed:
         lower_far, upper_far = slope_band(alpha, across, travelled, far, law)
-        lower, upper = min(lower, lower_far), max(upper, upper_far)
-    living, overlap = chains.cut(section, middle / e, scale * lower + turn - slack, scale * upper + turn + slack)
+        lower = min(lower, lower_far)
+        upper = max(upper, upper_far)
+    living, overlap = chains.cut(
+        section, middle / e, scale * lower + turn - slack, scale * upper + turn + slack
+    )
     return living, overlap, overlap < maximum - minimum
 
 
@@ -204,15 +259,15 @@ def rate_band(
 ) -> tuple[float, float]:
     """Return the bounds (13a) of the section of a label in a window, m, for a measured rate.
 
-    `widest` is a bound of 1/cos(alpha)^2. The half-width error x^2/e is a convex function of the label: its chord
-    replaces it in the bound that needs a concave function, so that the lower bound is convex and the upper one concave.
+    `widest` is a bound of 1/cos(alpha)^2. The half-width error x^2/e is a convex function of the
+    label: its chord replaces it in the bound that needs a concave function, so that the lower bound
+    is convex and the upper one concave.
     """
-    x, near, far = (
-        range_of(label, elapsed, law),
-        range_of(window.near, elapsed, law),
-        range_of(window.far, elapsed, law),
-    )
-    lower, upper = rate.omega - rate.error, rate.omega + rate.error
+    x = range_of(label, elapsed, law)
+    near = range_of(window.near, elapsed, law)
+    far = range_of(window.far, elapsed, law)
+    lower = rate.omega - rate.error
+    upper = rate.omega + rate.error
     curve = x * x / law.closing_speed
     chord = ((near + far) * x - near * far) / law.closing_speed if far > near else curve
     lower *= widest * chord if lower < 0.0 else curve
@@ -224,10 +279,16 @@ def rate_band(
 
 @allocation_free
 def max_slope(elapsed: int, sight: LastSight, window: Window, law: SectionLaw) -> float:
-    """Return a bound of |z/x| in a window: from the last angle, or the box without one, and the motion since."""
-    e, travelled, ago = law.closing_speed, law.closing_speed * (law.step * elapsed), law.step * sight.steps
-    near, far = window.near - travelled, window.far - travelled
-    near_then, far_then = near + e * ago, far + e * ago
+    """Return a bound of |z/x| in a window: from the last angle, or the box without one, and the
+    motion since.
+    """
+    e = law.closing_speed
+    travelled = law.closing_speed * (law.step * elapsed)
+    ago = law.step * sight.steps
+    near = window.near - travelled
+    far = window.far - travelled
+    near_then = near + e * ago
+    far_then = far + e * ago
     if sight.known:
         lower, upper = slope_band(sight.alpha, sight.across, travelled - e * ago, near_then, law)
         steepest = max(abs(lower), abs(upper))
@@ -245,16 +306,29 @@ def max_slope(elapsed: int, sight: LastSight, window: Window, law: SectionLaw) -
 
 @allocation_free
 def measure_rate_section(
-    section: SectionView, label: float, elapsed: int, rate: Rate, window: Window, law: SectionLaw, points: Floats
+    section: SectionView,
+    label: float,
+    elapsed: int,
+    rate: Rate,
+    window: Window,
+    law: SectionLaw,
+    points: Floats,
 ) -> tuple[bool, float, bool]:
-    """Cut the section of a label by a line-of-sight rate: by (9), a band of the predicted miss omega x^2 / e.
+    """Cut the section of a label by a line-of-sight rate: by (9), a band of the predicted miss
+    omega x^2 / e.
 
-    Return what `chains.cut` does, with the overlap in metres of predicted miss, and whether the band cuts something.
+    Return what `chains.cut` does, with the overlap in metres of predicted miss, and whether the
+    band cuts something.
     """
     middle = section.label
     tau = time_to_go(middle, elapsed, law)
-    slack = CUT_SLACK * (middle * (abs(rate.omega) + rate.error) + section.right.reach) * (middle / law.closing_speed)
-    # The section already contains the first half of the next step's disturbance, which does not commute with the cut.
+    slack = (
+        CUT_SLACK
+        * (middle * (abs(rate.omega) + rate.error) + section.right.reach)
+        * (middle / law.closing_speed)
+    )
+    # The section already contains the first half of the next step's disturbance, which does not
+    # commute with the cut.
     slack += tau * law.half_v_at_start
     # Most bands cut nothing even without the factor 1/cos^2, which takes longer than the rest.
     lower, upper = rate_band(label, elapsed, rate, 1.0, window, law)

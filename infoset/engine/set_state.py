@@ -1,4 +1,6 @@
-"""State of a batch of information sets: stored sections, history, limits of the labels, and status."""
+"""State of a batch of information sets: stored sections, history, limits of the labels, and
+status.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,9 @@ class SetStatus(Enum):
     TRACKING = 0
     """The set contains states above the range threshold."""
     EMPTY = 1
-    """No state agrees with the data, no section has passed below the threshold, and the set was not recovered."""
+    """No state agrees with the data, no section has passed below the threshold, and the set was not
+    recovered.
+    """
     FINISHED = 2
     """All sections have passed below the range threshold."""
     REFUTED = 3
@@ -36,7 +40,8 @@ class SetStatus(Enum):
 
 
 class SetState:
-    """State of B information sets, updated in place. A set and its read-only views share one object.
+    """State of B information sets, updated in place. A set and its read-only views share one
+    object.
 
     Attributes
     ----------
@@ -67,15 +72,19 @@ class SetState:
         minimum, maximum = model.label_limits_m
         labels = np.full((batch, max(model.sections, 2 * model.fewest_sections + 1)), maximum)
         labels[:, : model.sections] = (
-            np.linspace(minimum, maximum, model.sections) if model.sections > 1 else 0.5 * (minimum + maximum)
+            np.linspace(minimum, maximum, model.sections)
+            if model.sections > 1
+            else 0.5 * (minimum + maximum)
         )
         used = np.full(batch, model.sections)
         self.sections = section_passes.room_for_sections(len(self.laws), labels, used)
         self.history = History(len(self.laws), batch)
-        self.lower_label, self.upper_label = np.full(batch, minimum), np.full(batch, maximum)
+        self.lower_label = np.full(batch, minimum)
+        self.upper_label = np.full(batch, maximum)
         self.status = np.full(batch, SetStatus.TRACKING.value, dtype=np.int64)
         self.some_left = np.zeros(batch, dtype=bool)
-        self.lost_step, self.lost_label = np.full(batch, -1, dtype=np.int64), np.zeros(batch)
+        self.lost_step = np.full(batch, -1, dtype=np.int64)
+        self.lost_label = np.zeros(batch)
         has_phi = guarantee and model.is_guaranteed
         self.phi = GuaranteedMiss(self.laws[0], batch, model.speed_error) if has_phi else None
         self._none, self._no_angles = np.zeros(batch, dtype=bool), np.empty((len(self.laws), 0))
@@ -123,13 +132,17 @@ class SetState:
 
     @property
     def summaries(self) -> Floats:
-        """Summaries of the living sections, shape (C, B, S, columns). The columns of z may be out of date."""
+        """Summaries of the living sections, shape (C, B, S, columns). The columns of z may be out
+        of date.
+        """
         if some(self.sections.stale):
             self._update(SUMMARISED)
         return self.sections.summaries
 
     def extreme_angles(self) -> Floats:
-        """Return the extreme angles of the living sections in the format of `section_passes.extreme_angles_all`."""
+        """Return the extreme angles of the living sections in the format of
+        `section_passes.extreme_angles_all`.
+        """
         # The predicted misses are usually needed next: one pass computes both.
         self._update(WITH_HEIGHTS)
         extremes = np.zeros((4, len(self.laws), self.batch))
@@ -142,35 +155,48 @@ class SetState:
             self._update(MOVED)
 
     def _update(self, wanted: int) -> None:
-        section_passes.step_all(self._none, self._no_angles, NO_EVENT, self.elapsed, wanted, self.sections, self.table)
+        section_passes.step_all(
+            self._none, self._no_angles, NO_EVENT, self.elapsed, wanted, self.sections, self.table
+        )
 
     def _make_room(self, active: Flags) -> None:
         """Give each living section room for the vertices that one step adds.
 
-        Only the active engagements change, but the others may use their room later without another count.
+        Only the active engagements change, but the others may use their room later without another
+        count.
         """
         self._spare -= chains.MAX_ADDED
         if self._spare >= 0:
             return
-        points, added = chain_storage.working_room(), chain_storage.ROOM_AHEAD
+        points = chain_storage.working_room()
+        added = chain_storage.ROOM_AHEAD
         make_room = section_passes.make_room_all
-        floats, spare = make_room(active, added, self.elapsed, self.sections, self.table, points, False)
+        floats, spare = make_room(
+            active, added, self.elapsed, self.sections, self.table, points, False
+        )
         if floats or spare < chains.MAX_ADDED:
             self._add_room(floats)
-            _, spare = make_room(active, added, self.elapsed, self.sections, self.table, points, True)
+            _, spare = make_room(
+                active, added, self.elapsed, self.sections, self.table, points, True
+            )
         self._spare = spare - chains.MAX_ADDED
 
     def _add_room(self, floats: int) -> None:
         """Allocate `floats` more floats of the rings."""
         records, rings = self.sections.chains
-        self.sections = self.sections._replace(chains=Chains(records, chain_storage.with_room(rings, floats)))
+        self.sections = self.sections._replace(
+            chains=Chains(records, chain_storage.with_room(rings, floats))
+        )
 
     def refine(self, wanted: Flags, number: int) -> None:
-        """Replace the sections of the wanted engagements by a grid over their living labels, found by replay."""
+        """Replace the sections of the wanted engagements by a grid over their living labels, found
+        by replay.
+        """
         self._catch_up()
         new = number * int(np.count_nonzero(wanted)) * len(self.laws)
         self._add_room(2 * (2 * chains.CAPACITY + chain_storage.LINE) * new)
-        limits, past = (self.lower_label, self.upper_label), past_of(self.history, self.table, self.labels.shape[1])
+        limits = (self.lower_label, self.upper_label)
+        past = past_of(self.history, self.table, self.labels.shape[1])
         self._spare = min(self._spare, refine_all(wanted, number, limits, past, self.sections))
         self.min_label = self._min_label()
 
@@ -178,7 +204,9 @@ class SetState:
         return float(np.where(self.living, self.labels, np.inf).min())
 
     def measure_rate(self, error: float) -> int:
-        """Cut the living sections by the rates of the latest event; return the number of labels that became empty."""
+        """Cut the living sections by the rates of the latest event; return the number of labels
+        that became empty.
+        """
         history = self.history
         self._catch_up()
         self._make_room(history.applies[history.events - 1])
@@ -197,7 +225,8 @@ class SetState:
     def predict(self, active: Flags) -> None:
         """Move the living sections one step.
 
-        The move is postponed to the next measurement or query, so that one pass over the memory does both.
+        The move is postponed to the next measurement or query, so that one pass over the memory
+        does both.
         """
         self._catch_up()
         self._make_room(active)
@@ -206,26 +235,35 @@ class SetState:
         self.sections.stale[active] = True
 
     def keep_labels(self, active: Flags) -> tuple[Flags, int]:
-        """Remove the living sections with labels beyond the limits; return a mask of them and their number."""
+        """Remove the living sections with labels beyond the limits; return a mask of them and their
+        number.
+        """
         removed = np.zeros(self.labels.shape, dtype=bool)
-        lower, upper = self.lower_label, self.upper_label
+        lower = self.lower_label
+        upper = self.upper_label
         return removed, section_passes.keep_labels_all(active, lower, upper, self.sections, removed)
 
     def widest(self, pending: Sequence[tuple[float, Floats]] = ()) -> tuple[Flags, Floats]:
-        """Return the predicted-miss interval of each engagement in the format of `section_passes.widest_all`.
+        """Return the predicted-miss interval of each engagement in the format of
+        `section_passes.widest_all`.
 
-        `pending` are later impulses that count as given: time from now, s, and impulse, m/s, shape (C, B).
+        `pending` are later impulses that count as given: time from now, s, and impulse, m/s, shape
+        (C, B).
         """
-        exists, ends = np.zeros(self.batch, dtype=bool), np.zeros((len(self.laws), self.batch, 2, 4))
+        exists = np.zeros(self.batch, dtype=bool)
+        ends = np.zeros((len(self.laws), self.batch, 2, 4))
         sections = self.sections._replace(summaries=self._summaries_after(pending))
         section_passes.widest_all(self.elapsed, sections, self.table, exists, ends)
         return exists, ends
 
     def _summaries_after(self, pending: Sequence[tuple[float, Floats]]) -> Floats:
-        """Return the summaries with the predicted misses after later impulses, as `shift` would change them."""
+        """Return the summaries with the predicted misses after later impulses, as `shift` would
+        change them.
+        """
         if not pending:
             return self.summaries
-        summaries, to_go = self.summaries.copy(), self.ranges / self.law.closing_speed
+        summaries = self.summaries.copy()
+        to_go = self.ranges / self.law.closing_speed
         for time_s, impulse in pending:
             lever = np.maximum(to_go - time_s, 0.0)
             doubt = np.stack([impulse_doubts(impulse, law) for law in self.laws])
@@ -240,9 +278,13 @@ class SetState:
         return self.outline(self.sections.chains, row, float(self.labels[engagement, slot]))
 
     def outline(self, sections: Chains, row: int, label: float) -> Floats:
-        """Return the vertices (V, z) of a section at the present step, counter-clockwise, shape (n, 2)."""
+        """Return the vertices (V, z) of a section at the present step, counter-clockwise, shape (n,
+        2).
+        """
         points = chain_storage.working_room()
-        time_to_go = (label - self.law.closing_speed * (self.law.step * self.elapsed)) / self.law.closing_speed
+        time_to_go = (
+            label - self.law.closing_speed * (self.law.step * self.elapsed)
+        ) / self.law.closing_speed
         return points[: section_passes.write_outline(sections, row, time_to_go, points)].copy()
 
     def copy(self) -> SetState:
@@ -252,7 +294,11 @@ class SetState:
             if isinstance(value, np.ndarray | History | GuaranteedMiss):
                 setattr(twin, name, value.copy())
         records, rings = self.sections.chains
-        arrays = {name: array.copy() for name, array in self.sections._asdict().items() if name != "chains"}
+        arrays = {
+            name: array.copy()
+            for name, array in self.sections._asdict().items()
+            if name != "chains"
+        }
         own = Chains(records.copy(), chain_storage.copy_of_rings(rings, rings.size))
         twin.sections = Sections(**arrays, chains=own)
         return twin

@@ -1,4 +1,6 @@
-"""Checks of the arguments of operations on sets: each message has the name of the argument and what is possible."""
+"""Checks of the arguments of operations on sets: each message has the name of the argument and what
+is possible.
+"""
 
 from __future__ import annotations
 
@@ -24,8 +26,8 @@ def need_finite(name: str, values: Floats) -> None:
 def finite_values(name: str, value: ArrayLike, *shape: str | int) -> Floats:
     """Return finite numbers of a shape; an empty list is an array without rows.
 
-    `shape` has the sizes of the axes. A letter is any size, of the axes n and m at least 1; "..." is any number of
-    axes.
+    `shape` has the sizes of the axes. A letter is any size, of the axes n and m at least 1; "..."
+    is any number of axes.
     """
     values = real_values(name, value)
     last = shape[1:] if shape[:1] == ("...",) else shape
@@ -48,23 +50,33 @@ def bound_values(name: str, value: ArrayLike, *shapes: tuple[int, ...]) -> Float
     if math.isnan(np.vdot(bounds, bounds)):
         raise ValueError(f"{name} must be a number, not NaN: got {shown(value)}")
     if shapes and bounds.shape not in shapes:
-        raise ValueError(f"{name} must have the shape {' or '.join(map(str, shapes))}: got {bounds.shape}")
+        raise ValueError(
+            f"{name} must have the shape {' or '.join(map(str, shapes))}: got {bounds.shape}"
+        )
     return bounds
 
 
-def constraint_values(names: tuple[str, str], rows: ArrayLike, limits: ArrayLike, *shape: str | int) -> Any:
-    """Return rows of a shape (..., k, n) and their limits, shape (..., k), which may be infinite."""
-    normals, ends = finite_values(names[0], rows, *shape), real_values(names[1], limits)
+def constraint_values(
+    names: tuple[str, str], rows: ArrayLike, limits: ArrayLike, *shape: str | int
+) -> Any:
+    """Return rows of a shape (..., k, n) and their limits, shape (..., k), which may be
+    infinite.
+    """
+    normals = finite_values(names[0], rows, *shape)
+    ends = real_values(names[1], limits)
     if (ends.ndim != 1 and shape[0] != "...") or ends.shape[-1:] != normals.shape[-2:-1]:
         raise ValueError(
-            f"{names[0]} and {names[1]} must have as many rows: got the shapes {normals.shape} and {ends.shape}"
+            f"{names[0]} and {names[1]} must have as many rows: got the shapes {normals.shape} and "
+            f"{ends.shape}"
         )
     need_finite(names[1], np.where(np.isinf(ends), 0.0, ends))
     return normals, ends
 
 
 def offset_values(offset: ArrayLike, *shape: Any) -> Floats:
-    """Return offsets of a shape (..., n), from such an array or from one number for all coordinates."""
+    """Return offsets of a shape (..., n), from such an array or from one number for all
+    coordinates.
+    """
     values = real_values("offset", offset)
     return finite_values("offset", values if values.ndim else np.full(shape[-1], values), *shape)
 
@@ -76,7 +88,8 @@ def box_ends(lower: ArrayLike, upper: ArrayLike, *shape: str | int) -> tuple[Flo
     minimum, most = np.broadcast_arrays(minimum, most)
     if (minimum > most).any():
         raise ValueError(
-            f"the box is reversed: its lower end exceeds the upper one by {float((minimum - most).max()):g}"
+            "the box is reversed: its lower end exceeds the upper one by "
+            f"{float((minimum - most).max()):g}"
         )
     return minimum, most
 
@@ -95,8 +108,8 @@ def axis_numbers(axes: ArrayLike, space: int, most: int) -> list[int]:
     listed = [int(number) for number in numbers.flat if number in range(space)]
     if numbers.ndim > 1 or not 0 < len(set(listed)) == numbers.size <= most:
         raise ValueError(
-            f"axes must be one or more different numbers from 0 to {space - 1}{', not all' if most < space else ''}: "
-            f"got {shown(axes)}"
+            "axes must be one or more different numbers from 0 to "
+            f"{space - 1}{', not all' if most < space else ''}: got {shown(axes)}"
         )
     return listed
 

@@ -1,7 +1,9 @@
-"""Conversion of convex sets of the plane: shapely geometries, and the vertices of polytopes, to rings of vertices.
+"""Conversion of convex sets of the plane: shapely geometries, and the vertices of polytopes, to
+rings of vertices.
 
-A ring is an array of shape (k, 2) with the vertices counter-clockwise: one of a point, two of a segment, none of the
-empty set. The methods of `ConvexPolygons` and `Polytope` with the same purpose call these functions.
+A ring is an array of shape (k, 2) with the vertices counter-clockwise: one of a point, two of a
+segment, none of the empty set. The methods of `ConvexPolygons` and `Polytope` with the same purpose
+call these functions.
 """
 
 from __future__ import annotations
@@ -23,7 +25,8 @@ AREA_ROUNDING = 64.0 * float(np.finfo(np.float64).eps)
 
 
 def ring_of_points(points: Floats) -> Floats:
-    """Return the ring of the convex hull of points, shape (n, 2). O(n) for sorted points, O(n^2) at worst.
+    """Return the ring of the convex hull of points, shape (n, 2). O(n) for sorted points, O(n^2) at
+    worst.
 
     Exact: vertices are points, and rounding does not decide which.
     """
@@ -35,7 +38,8 @@ def ring_of_points(points: Floats) -> Floats:
 
 
 def ring_of_geometry(geometry: BaseGeometry) -> Floats:
-    """Return the ring of a convex shapely Point, LineString or Polygon, without vertices along a side. O(n).
+    """Return the ring of a convex shapely Point, LineString or Polygon, without vertices along a
+    side. O(n).
 
     Raises
     ------
@@ -55,12 +59,16 @@ def ring_of_geometry(geometry: BaseGeometry) -> Floats:
     rounding = AREA_ROUNDING * np.abs(points).max(axis=0) @ np.ptp(points, axis=0)[::-1]
     missing = abs(geometry.convex_hull.area - geometry.area)
     if missing > rounding:
-        raise ValueError(f"the {kind} is not convex: its area and that of its hull differ by {missing:g}")
+        raise ValueError(
+            f"the {kind} is not convex: its area and that of its hull differ by {missing:g}"
+        )
     return ring
 
 
 def geometry_of_ring(ring: Floats) -> BaseGeometry:
-    """Return a ring as a shapely Point, LineString or Polygon; without vertices it is an empty Polygon."""
+    """Return a ring as a shapely Point, LineString or Polygon; without vertices it is an empty
+    Polygon.
+    """
     from shapely import LineString, Point, Polygon
 
     if len(ring) == 1:

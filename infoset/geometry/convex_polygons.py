@@ -44,9 +44,10 @@ class ConvexPolygons(ConvexSet):
     Parameters
     ----------
     vertices : array_like, shape (..., V, 2)
-        The polygon is the convex hull of the first `counts` rows; the others are padding. As an attribute, these rows
-        are the vertices counter-clockwise: one for a point, two for a segment, none for the empty set. `polygon`
-        returns those of a single polygon without padding.
+        The polygon is the convex hull of the first `counts` rows; the others are padding. As an
+        attribute, these rows are the vertices counter-clockwise: one for a point, two for a
+        segment, none for the empty set. `polygon` returns those of a single polygon without
+        padding.
     counts : array_like of int, shape (...)
         Number of points; as an attribute, of vertices.
 
@@ -57,21 +58,23 @@ class ConvexPolygons(ConvexSet):
 
     Notes
     -----
-    Operations return new objects. Their arguments are broadcast over the batch. A single polygon is broadcast to the
-    shape of the other polygons, and of several points or directions: `contains` of a polygon takes any number of
-    points. The cost of an operation is for one polygon of n vertices. All arguments are
-    checked: numbers are finite (TypeError if they are not real numbers), and shapes fit (ValueError).
+    Operations return new objects. Their arguments are broadcast over the batch. A single polygon is
+    broadcast to the shape of the other polygons, and of several points or directions: `contains` of
+    a polygon takes any number of points. The cost of an operation is for one polygon of n vertices.
+    All arguments are checked: numbers are finite (TypeError if they are not real numbers), and
+    shapes fit (ValueError).
 
-    An empty member of a batch does not affect the others: sets made from it are empty, its support function is -inf,
-    its distance from any set is inf, and points such as its centroid are masked (`numpy.ma.MaskedArray`). A single
-    empty set has no such points; then a ValueError is raised.
+    An empty member of a batch does not affect the others: sets made from it are empty, its support
+    function is -inf, its distance from any set is inf, and points such as its centroid are masked
+    (`numpy.ma.MaskedArray`). A single empty set has no such points; then a ValueError is raised.
 
-    An operation of a single polygon with a `Polytope` of the plane, in either order, is that of two polytopes: a set
-    that it gives is a `Polytope`, and it is exact only to rounding. `ConvexPolygons.from_points(polytope.vertices)`
-    converts the other one.
+    An operation of a single polygon with a `Polytope` of the plane, in either order, is that of two
+    polytopes: a set that it gives is a `Polytope`, and it is exact only to rounding.
+    `ConvexPolygons.from_points(polytope.vertices)` converts the other one.
 
-    Operators: `P & Q` (intersection), `P + Q` (Minkowski sum), `P + vector` (translation), `A @ P` (linear map),
-    `point in P`, `P <= Q` (subset). `P == Q` compares objects; `equals` compares sets.
+    Operators: `P & Q` (intersection), `P + Q` (Minkowski sum), `P + vector` (translation), `A @ P`
+    (linear map), `point in P`, `P <= Q` (subset). `P == Q` compares objects; `equals` compares
+    sets.
     """
 
     vertices: Floats
@@ -87,7 +90,9 @@ class ConvexPolygons(ConvexSet):
                 f"got {points.shape} and {numbers.shape}"
             )
         if not ((numbers >= 0) & (numbers <= room) & (numbers == np.floor(numbers))).all():
-            raise ValueError(f"counts must be whole numbers from 0 to {room}, the room for vertices")
+            raise ValueError(
+                f"counts must be whole numbers from 0 to {room}, the room for vertices"
+            )
 
         given = self.unchecked(points, numbers.astype(np.int64))
         need_finite("vertices", points[given._used()])
@@ -97,7 +102,9 @@ class ConvexPolygons(ConvexSet):
 
     @classmethod
     def unchecked(cls, vertices: Floats, counts: Integers) -> Self:
-        """Return polygons of arrays `vertices` and `counts`, counter-clockwise, without checks and without a copy."""
+        """Return polygons of arrays `vertices` and `counts`, counter-clockwise, without checks and
+        without a copy.
+        """
         self = cls.__new__(cls)
         self.vertices = vertices
         self.counts = counts
@@ -105,16 +112,17 @@ class ConvexPolygons(ConvexSet):
 
     @classmethod
     def from_vertices(cls, rings: ArrayLike) -> Self:
-        """Return the polygons with rings of vertices, shape (..., V, 2), in either order around the polygon. O(n).
+        """Return the polygons with rings of vertices, shape (..., V, 2), in either order around the
+        polygon. O(n).
 
-        A ring may repeat vertices, also its first at the end, and have vertices along a side. `stack` makes a batch of
-        polygons from rings of different lengths.
+        A ring may repeat vertices, also its first at the end, and have vertices along a side.
+        `stack` makes a batch of polygons from rings of different lengths.
 
         Raises
         ------
         ValueError
-            If a ring is not convex; the message has the first reflex vertex. This is decided exactly. `from_points`
-            takes the convex hull of any points instead.
+            If a ring is not convex; the message has the first reflex vertex. This is decided
+            exactly. `from_points` takes the convex hull of any points instead.
         """
         vertices = finite_values("rings", rings, "...", "k", 2)
         polygons = cls.unchecked(vertices.copy(), np.full(vertices.shape[:-2], vertices.shape[-2]))
@@ -128,25 +136,34 @@ class ConvexPolygons(ConvexSet):
             of_member = f" of polygon {index}" if index else ""
             vertex = reflex[tuple(index)]
             x, y = polygons.vertices[*index, vertex]
-            raise ValueError(f"the ring is not convex: vertex {vertex}{of_member}, ({x:.17g}, {y:.17g}), is reflex")
+            raise ValueError(
+                f"the ring is not convex: vertex {vertex}{of_member}, ({x:.17g}, {y:.17g}), is "
+                "reflex"
+            )
 
         return polygons._make(0, kernels.hull)
 
     @classmethod
     def from_points(cls, points: ArrayLike) -> Self:
-        """Return the convex hull of points, shape (n, 2) or (..., n, 2); no points give the empty set.
+        """Return the convex hull of points, shape (n, 2) or (..., n, 2); no points give the empty
+        set.
 
-        O(n) for sorted points, O(n^2) at worst. Exact: vertices are points, and rounding does not decide which.
+        O(n) for sorted points, O(n^2) at worst. Exact: vertices are points, and rounding does not
+        decide which.
         """
         array = finite_values("points", points, "...", "k", 2)
-        return cls.unchecked(array, np.full(array.shape[:-2], array.shape[-2]))._make(0, kernels.hull)
+        return cls.unchecked(array, np.full(array.shape[:-2], array.shape[-2]))._make(
+            0, kernels.hull
+        )
 
     @classmethod
     def from_constraints(cls, normals: ArrayLike, offsets: ArrayLike) -> Self:
-        """Return {p: normals p <= offsets}, with normals of shape (..., k, 2), of any length, and offsets (..., k).
+        """Return {p: normals p <= offsets}, with normals of shape (..., k, 2), of any length, and
+        offsets (..., k).
 
-        Infinite offsets are no limit. O(k^2). Exact: which constraints are redundant, and whether the set is empty, is
-        decided without rounding, and each coordinate is within a few ulp of itself.
+        Infinite offsets are no limit. O(k^2). Exact: which constraints are redundant, and whether
+        the set is empty, is decided without rounding, and each coordinate is within a few ulp of
+        itself.
 
         Raises
         ------
@@ -171,7 +188,9 @@ class ConvexPolygons(ConvexSet):
 
     @classmethod
     def from_box(cls, lower: ArrayLike, upper: ArrayLike) -> Self:
-        """Return {p: lower <= p <= upper}, of shapes (2,) or (..., 2). Exact; equal ends give a segment or a point."""
+        """Return {p: lower <= p <= upper}, of shapes (2,) or (..., 2). Exact; equal ends give a
+        segment or a point.
+        """
         minimum, most = box_ends(lower, upper, "...", 2)
         corners = np.stack([minimum, minimum, most, most], axis=-2)
         corners[..., 1, 0] = most[..., 0]
@@ -183,11 +202,14 @@ class ConvexPolygons(ConvexSet):
         return cls.unchecked(corners, counts)
 
     @classmethod
-    def from_ball(cls, centre: ArrayLike, radius: ArrayLike, sides: int = 16, *, outer: bool = True) -> Self:
-        """Return regular polygons around discs with `centre`, shape (..., 2), and `radius`, shape (...), or in them.
+    def from_ball(
+        cls, centre: ArrayLike, radius: ArrayLike, sides: int = 16, *, outer: bool = True
+    ) -> Self:
+        """Return regular polygons around discs with `centre`, shape (..., 2), and `radius`, shape
+        (...), or in them.
 
-        An `outer` polygon contains the disc and exceeds it by the factor 1 / cos(pi / sides); an inner one is
-        contained in it. Both to rounding: a few ulp. O(sides), at least three.
+        An `outer` polygon contains the disc and exceeds it by the factor 1 / cos(pi / sides); an
+        inner one is contained in it. Both to rounding: a few ulp. O(sides), at least three.
         """
         Limits(minimum=3, whole=True).need("sides", sides)
         middle = finite_values("centre", centre, "...", 2)
@@ -201,7 +223,8 @@ class ConvexPolygons(ConvexSet):
 
     @classmethod
     def from_zonotope(cls, zonotope: ZonotopeArrays) -> Self:
-        """Return a `Zonotope` of R^2 as a single polygon. O(g^2) for g generators; coordinates are rounded g times.
+        """Return a `Zonotope` of R^2 as a single polygon. O(g^2) for g generators; coordinates are
+        rounded g times.
 
         Raises
         ------
@@ -230,7 +253,9 @@ class ConvexPolygons(ConvexSet):
         return cls.unchecked(ring, np.array(len(ring), dtype=np.int64))
 
     def to_shapely(self) -> BaseGeometry:
-        """Return a single polygon as a shapely Point, LineString or Polygon; the empty set is an empty Polygon."""
+        """Return a single polygon as a shapely Point, LineString or Polygon; the empty set is an
+        empty Polygon.
+        """
         return conversion.geometry_of_ring(self.polygon())
 
     @classmethod
@@ -291,11 +316,14 @@ class ConvexPolygons(ConvexSet):
             If this is a batch.
         """
         if self.shape:
-            raise ValueError(f"this is a batch of shape {self.shape}: choose one with an index first")
+            raise ValueError(
+                f"this is a batch of shape {self.shape}: choose one with an index first"
+            )
         return np.array(self.vertices[: int(self.counts)])
 
     def broadcast_to(self, shape: tuple[int, ...]) -> Self:
-        """Return the batch repeated along new axes to another shape; the vertices are shared, not copied.
+        """Return the batch repeated along new axes to another shape; the vertices are shared, not
+        copied.
 
         Raises
         ------
@@ -306,13 +334,16 @@ class ConvexPolygons(ConvexSet):
             return self
 
         counts = np.broadcast_to(self.counts, shape)
-        return self.unchecked(np.broadcast_to(self.vertices, (*shape, *self.vertices.shape[-2:])), counts)
+        return self.unchecked(
+            np.broadcast_to(self.vertices, (*shape, *self.vertices.shape[-2:])), counts
+        )
 
     def __repr__(self) -> str:
         return f"ConvexPolygons(shape={self.shape}, counts={self.counts.tolist()})"
 
     def polytope(self) -> Polytope:
-        """Return a single polygon as a `Polytope`; `ConvexPolygons.from_points(polytope.vertices)` is the reverse.
+        """Return a single polygon as a `Polytope`; `ConvexPolygons.from_points(polytope.vertices)`
+        is the reverse.
 
         Raises
         ------
@@ -323,23 +354,30 @@ class ConvexPolygons(ConvexSet):
 
         if self.shape:
             raise ValueError(
-                f"a batch of shape {self.shape} is no Polytope: choose one with an index first, or convert the "
-                f"Polytope of an operation with ConvexPolygons.from_points(polytope.vertices)"
+                f"a batch of shape {self.shape} is no Polytope: choose one with an index first, or "
+                "convert the Polytope of an operation with "
+                "ConvexPolygons.from_points(polytope.vertices)"
             )
         ring = self.polygon()
         return Polytope.from_vertices(ring) if len(ring) else Polytope.empty(2)
 
     def cut(
-        self, normal: ArrayLike, lower: ArrayLike = -np.inf, upper: ArrayLike = np.inf, *, slack_ulp: float = 0.0
+        self,
+        normal: ArrayLike,
+        lower: ArrayLike = -np.inf,
+        upper: ArrayLike = np.inf,
+        *,
+        slack_ulp: float = 0.0,
     ) -> ConvexPolygons:
         """Return the intersection with the strip lower <= normal . p <= upper.
 
-        `normal` has the shape (2,) or (..., 2), and any length. The bounds have the shape () or (...); infinite ones
-        give half-planes, and lower > upper gives the empty set. The strip is wider on both sides by `slack_ulp` ulp of
-        the products in normal . p: a point that satisfies the bounds up to rounding is not lost.
+        `normal` has the shape (2,) or (..., 2), and any length. The bounds have the shape () or
+        (...); infinite ones give half-planes, and lower > upper gives the empty set. The strip is
+        wider on both sides by `slack_ulp` ulp of the products in normal . p: a point that satisfies
+        the bounds up to rounding is not lost.
 
-        O(n). Vertices inside do not change; new ones are within a few ulp of the coordinates. A vertex on a border is
-        inside.
+        O(n). Vertices inside do not change; new ones are within a few ulp of the coordinates. A
+        vertex on a border is inside.
 
         Raises
         ------
@@ -355,14 +393,17 @@ class ConvexPolygons(ConvexSet):
         return self._make(2, kernels.cut, normals, bounds, float(slack_ulp))
 
     def linear_map(self, matrix: ArrayLike) -> ConvexPolygons:
-        """Return the image under a matrix, shape (2, 2) or (..., 2, 2); a singular one gives segments or points.
+        """Return the image under a matrix, shape (2, 2) or (..., 2, 2); a singular one gives
+        segments or points.
 
-        O(n). Each coordinate of a vertex is rounded three times. `affine_map` maps to other dimensions.
+        O(n). Each coordinate of a vertex is rounded three times. `affine_map` maps to other
+        dimensions.
         """
         return self._make(0, kernels.linear_map, self._each("matrix", matrix, 2, 2))
 
     def affine_map(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> Any:
-        """Return {matrix p + offset}; a matrix of shape (m, 2), m not 2, maps a single polygon to a `Polytope` in R^m.
+        """Return {matrix p + offset}; a matrix of shape (m, 2), m not 2, maps a single polygon to a
+        `Polytope` in R^m.
 
         `offset` has the shape (2,), (..., 2) or (m,), or is 0. O(n), as `linear_map`.
         """
@@ -373,15 +414,19 @@ class ConvexPolygons(ConvexSet):
         return self.polytope().affine_map(rows, offset)
 
     def translate(self, offset: ArrayLike) -> ConvexPolygons:
-        """Return the polygons moved by an offset, shape (2,) or (..., 2). O(n); each coordinate is rounded once."""
+        """Return the polygons moved by an offset, shape (2,) or (..., 2). O(n); each coordinate is
+        rounded once.
+        """
         moved = self.vertices + self._each("offset", offset, 2).reshape(*self.shape, 1, 2)
         return ConvexPolygons.unchecked(moved, self.counts)
 
     def preimage(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> Any:
-        """Return {p: matrix p + offset in the set}; a matrix of shape (2, m), m not 2, gives a `Polytope` in R^m.
+        """Return {p: matrix p + offset in the set}; a matrix of shape (2, m), m not 2, gives a
+        `Polytope` in R^m.
 
-        O(n). The vertices are mapped by the inverse matrix, whose entries are within a few ulp of themselves. If the
-        matrix is singular, the preimage is unbounded or empty, which is decided exactly.
+        O(n). The vertices are mapped by the inverse matrix, whose entries are within a few ulp of
+        themselves. If the matrix is singular, the preimage is unbounded or empty, which is decided
+        exactly.
 
         Raises
         ------
@@ -402,7 +447,10 @@ class ConvexPolygons(ConvexSet):
             return mapped
 
         singular = ~is_regular.reshape(self.shape)
-        meets = self._measure(kernels.range_meets, matrices, self._each("offset", start, 2))[..., 0] > 0.0
+        meets = (
+            self._measure(kernels.range_meets, matrices, self._each("offset", start, 2))[..., 0]
+            > 0.0
+        )
         unbounded = singular & meets
         if unbounded.any():
             index = np.argwhere(unbounded)[0].tolist()
@@ -428,14 +476,16 @@ class ConvexPolygons(ConvexSet):
     def minkowski_difference(self, other: PolygonsOrPolytope) -> PolygonsOrPolytope:
         """Return the Pontryagin difference {p: p + q in the set for all q in the other}.
 
-        A member of a batch without a bounded difference, because only the other set is empty, gives the empty set.
-        O(n (n + m)). Exact: which sides remain, and whether the difference is empty, is decided without rounding, also
-        for sets that fit in one place only; vertices are within 4 ulp of the coordinates.
+        A member of a batch without a bounded difference, because only the other set is empty, gives
+        the empty set. O(n (n + m)). Exact: which sides remain, and whether the difference is empty,
+        is decided without rounding, also for sets that fit in one place only; vertices are within 4
+        ulp of the coordinates.
 
         Raises
         ------
         ValueError
-            If the other set is empty and this one is not, both single: every point satisfies the condition.
+            If the other set is empty and this one is not, both single: every point satisfies the
+            condition.
         """
         if not isinstance(other, ConvexPolygons):
             return self._polytope_with(other).minkowski_difference(other)
@@ -452,8 +502,8 @@ class ConvexPolygons(ConvexSet):
     def intersection(self, other: PolygonsOrPolytope) -> PolygonsOrPolytope:
         """Return the intersection.
 
-        O(n m). Exact: which vertices are kept, which sides cross, and whether the sets touch, is decided without
-        rounding; crossings are within 4 ulp of the coordinates.
+        O(n m). Exact: which vertices are kept, which sides cross, and whether the sets touch, is
+        decided without rounding; crossings are within 4 ulp of the coordinates.
         """
         if not isinstance(other, ConvexPolygons):
             return self._polytope_with(other).intersection(other)
@@ -462,7 +512,9 @@ class ConvexPolygons(ConvexSet):
         return one._make(two.vertices.shape[-2], kernels.intersect, *two._flat())
 
     def convex_hull(self, other: PolygonsOrPolytope) -> PolygonsOrPolytope:
-        """Return the convex hull of the union. O((n + m)^2) at worst; exact, the vertices are vertices of the sets."""
+        """Return the convex hull of the union. O((n + m)^2) at worst; exact, the vertices are
+        vertices of the sets.
+        """
         if not isinstance(other, ConvexPolygons):
             return self._polytope_with(other).convex_hull(other)
 
@@ -476,10 +528,11 @@ class ConvexPolygons(ConvexSet):
         return ConvexPolygons.unchecked(points, one.counts + two.counts)._make(0, kernels.hull)
 
     def project(self, axes: ArrayLike) -> Any:
-        """Return the projection on an axis (0 or 1) as intervals: minimum and maximum values, shape (...).
+        """Return the projection on an axis (0 or 1) as intervals: minimum and maximum values, shape
+        (...).
 
-        `axes` is an integer or a sequence of integers; both axes give the polygons, their coordinates in this order.
-        O(n), exact.
+        `axes` is an integer or a sequence of integers; both axes give the polygons, their
+        coordinates in this order. O(n), exact.
         """
         numbers = axis_numbers(axes, 2, 2)
         if len(numbers) > 1:
@@ -489,10 +542,11 @@ class ConvexPolygons(ConvexSet):
         return lower[..., numbers[0]], upper[..., numbers[0]]
 
     def slice(self, axes: ArrayLike, values: ArrayLike) -> tuple[Floats, Floats]:
-        """Return the interval of the other coordinate where a coordinate (0 or 1) has a value: shape (...).
+        """Return the interval of the other coordinate where a coordinate (0 or 1) has a value:
+        shape (...).
 
-        `axes` is an integer, or a sequence of one; `values` has the shape () or (...). O(n), within a few ulp of
-        the coordinates; masked where the line misses a member of a batch.
+        `axes` is an integer, or a sequence of one; `values` has the shape () or (...). O(n), within
+        a few ulp of the coordinates; masked where the line misses a member of a batch.
 
         Raises
         ------
@@ -502,13 +556,16 @@ class ConvexPolygons(ConvexSet):
         (axis,) = axis_numbers(axes, 2, 1)
         section = self.cut(np.eye(2)[axis], values, values)
         if not self.shape and section.is_empty:
-            raise ValueError(f"the line where coordinate {axis} is {shown(values)} does not meet the polygon")
+            raise ValueError(
+                f"the line where coordinate {axis} is {shown(values)} does not meet the polygon"
+            )
 
         intervals: tuple[Floats, Floats] = section.project(1 - axis)
         return intervals
 
     def reduce_outward(self, cap: int) -> ConvexPolygons:
-        """Polygons of at most `cap` (>= 4) vertices that contain these, by removing sides with minimum added area.
+        """Polygons of at most `cap` (>= 4) vertices that contain these, by removing sides with
+        minimum added area.
 
         O(n) for each side; new vertices are rounded.
         """
@@ -516,11 +573,11 @@ class ConvexPolygons(ConvexSet):
         return self._make(0, kernels.reduce_outward, np.int64(cap))
 
     def constraints(self) -> tuple[Floats, Floats]:
-        """Return normals, shape (..., k, 2), of unit length, and offsets, shape (..., k): the set is normals p <=
-        offsets.
+        """Return normals, shape (..., k, 2), of unit length, and offsets, shape (..., k): the set
+        is normals p <= offsets.
 
-        There is one for each side, and four for a segment or a point. Unused rows of a batch are 0 p <= 0; an empty
-        set has the row 0 p <= -1. O(n^2); directions and offsets are rounded.
+        There is one for each side, and four for a segment or a point. Unused rows of a batch are 0
+        p <= 0; an empty set has the row 0 p <= -1. O(n^2); directions and offsets are rounded.
         """
         vertices, counts = self._flat()
         room = max(4, vertices.shape[1])
@@ -536,22 +593,28 @@ class ConvexPolygons(ConvexSet):
         return normals, offsets
 
     def support_function(self, direction: ArrayLike) -> Floats:
-        """Return max(direction . p), shape (...); -inf for the empty set. O(n); rounded as one scalar product."""
+        """Return max(direction . p), shape (...); -inf for the empty set. O(n); rounded as one
+        scalar product.
+        """
         return self._measure_at(kernels.support, "direction", direction)[..., 0]
 
     def support_vector(self, direction: ArrayLike) -> Floats:
         """Return a vertex farthest along a direction, shape (..., 2). O(n)."""
-        return self._known(self._measure_at(kernels.support, "direction", direction)[..., 1:], "support vector")
+        return self._known(
+            self._measure_at(kernels.support, "direction", direction)[..., 1:], "support vector"
+        )
 
     def margin(self, point: ArrayLike) -> Floats:
-        """Return the signed distance of a point, shape (2,) or (..., 2), from the boundary, positive inside.
+        """Return the signed distance of a point, shape (2,) or (..., 2), from the boundary,
+        positive inside.
 
         -inf for the empty set. O(n), within rounding of the coordinates.
         """
         return self._measure_at(kernels.margin, "point", point)[..., 0]
 
     def contains(self, point: ArrayLike, tolerance: float = 0.0) -> Flags:
-        """Return whether a point, shape (2,) or (..., 2), is inside, on the boundary, or within a distance of the set.
+        """Return whether a point, shape (2,) or (..., 2), is inside, on the boundary, or within a
+        distance of the set.
 
         O(n). Exact for a tolerance of 0: rounding does not affect the answer.
         """
@@ -559,10 +622,11 @@ class ConvexPolygons(ConvexSet):
         return np.asarray(distance <= not_negative("tolerance", tolerance))
 
     def is_subset(self, other: ConvexPolygons | Polytope, tolerance: float = 0.0) -> Flags:
-        """Return whether all points of the set are in the other one, or within a distance of it, shape (...).
+        """Return whether all points of the set are in the other one, or within a distance of it,
+        shape (...).
 
-        O(n m). Exact for a tolerance of 0: rounding does not affect the answer. Sets that were computed are subsets
-        only up to rounding in general.
+        O(n m). Exact for a tolerance of 0: rounding does not affect the answer. Sets that were
+        computed are subsets only up to rounding in general.
         """
         if not isinstance(other, ConvexPolygons):
             return np.asarray(self._polytope_with(other).is_subset(other, tolerance))
@@ -570,7 +634,9 @@ class ConvexPolygons(ConvexSet):
         return np.asarray(self._excess(other) <= not_negative("tolerance", tolerance))
 
     def _excess(self, other: ConvexPolygons) -> Floats:
-        """Return the maximum distance of a point of the set from the other one, shape (...); 0 only for a subset."""
+        """Return the maximum distance of a point of the set from the other one, shape (...); 0 only
+        for a subset.
+        """
         one, two = self._with(other)
         return one._measure(kernels.excess, *two._flat())[..., 0]
 
@@ -581,11 +647,14 @@ class ConvexPolygons(ConvexSet):
     volume = area
 
     def centroid(self) -> Floats:
-        """Return the centroid, shape (..., 2); the middle of a segment. O(n); it is in the set, to rounding."""
+        """Return the centroid, shape (..., 2); the middle of a segment. O(n); it is in the set, to
+        rounding.
+        """
         return self._known(self._measure(kernels.moments)[..., 1:], "centroid")
 
     def chebyshev_centre(self) -> tuple[Floats, Floats]:
-        """Return the centres, shape (..., 2), and the radii, shape (...), of largest discs in the polygons.
+        """Return the centres, shape (..., 2), and the radii, shape (...), of largest discs in the
+        polygons.
 
         O(n^2), within rounding of the coordinates. Of several centres it is the middle one.
         """
@@ -593,14 +662,18 @@ class ConvexPolygons(ConvexSet):
         return values[..., :2], values[..., 2]
 
     def bounding_box(self) -> tuple[Floats, Floats]:
-        """Return the minimum and the maximum coordinates, two arrays of shape (..., 2). O(n), exact."""
+        """Return the minimum and the maximum coordinates, two arrays of shape (..., 2). O(n),
+        exact.
+        """
         used = self._used()[..., None]
         lower = np.min(self.vertices, axis=-2, where=used, initial=np.inf)
         upper = np.max(self.vertices, axis=-2, where=used, initial=-np.inf)
         return self._known(lower, "bounding box"), self._known(upper, "bounding box")
 
     def diameter(self) -> Floats:
-        """Return the maximum distance between two points, shape (...); 0 for the empty set. O(n^2), rounded."""
+        """Return the maximum distance between two points, shape (...); 0 for the empty set. O(n^2),
+        rounded.
+        """
         return self._measure(kernels.diameter)[..., 0]
 
     def distance(self, other: ConvexPolygons | Polytope | ArrayLike) -> Floats:
@@ -612,7 +685,9 @@ class ConvexPolygons(ConvexSet):
             return np.asarray(self._polytope_with(other).distance(other))
         if not isinstance(other, ConvexPolygons):
             points = finite_values("other", self._without_mask(other, 2), "...", 2)
-            other = ConvexPolygons.unchecked(points[..., None, :], np.ones(points.shape[:-1], dtype=np.int64))
+            other = ConvexPolygons.unchecked(
+                points[..., None, :], np.ones(points.shape[:-1], dtype=np.int64)
+            )
 
         one, two = self._with(other)
         return one._measure(kernels.gap, *two._flat())[..., 0]
@@ -625,11 +700,17 @@ class ConvexPolygons(ConvexSet):
         return np.asarray(self.distance(other) > 0.0)
 
     def closest_point(self, point: ArrayLike) -> Floats:
-        """Return the point of the set nearest to a point, shape (2,) or (..., 2): itself if inside. O(n), rounded."""
-        return self._known(self._measure_at(kernels.nearest, "point", point)[..., :2], "closest point")
+        """Return the point of the set nearest to a point, shape (2,) or (..., 2): itself if inside.
+        O(n), rounded.
+        """
+        return self._known(
+            self._measure_at(kernels.nearest, "point", point)[..., :2], "closest point"
+        )
 
     def hausdorff_distance(self, other: ConvexPolygons | Polytope) -> Floats:
-        """Return the Hausdorff distance, shape (...); inf between an empty and a nonempty set. O(n m), rounded."""
+        """Return the Hausdorff distance, shape (...); inf between an empty and a nonempty set. O(n
+        m), rounded.
+        """
         if not isinstance(other, ConvexPolygons):
             return np.asarray(self._polytope_with(other).hausdorff_distance(other))
 
@@ -647,11 +728,12 @@ class ConvexPolygons(ConvexSet):
         return self._known(out.reshape(*self.shape, count, 2), "points")
 
     def plot(self, ax: Any = None, **style: Any) -> list[Any]:
-        """Draw the polygons on matplotlib axes (default: the present ones of pyplot), and return the artists.
+        """Draw the polygons on matplotlib axes (default: the present ones of pyplot), and return
+        the artists.
 
-        There is one for each polygon that is not empty, in the order of the batch. `style` has the options of
-        matplotlib's `fill`, and of `scatter` for a point. Edges have the colour of the face, unless the style has
-        another: segments and thin sets are visible.
+        There is one for each polygon that is not empty, in the order of the batch. `style` has the
+        options of matplotlib's `fill`, and of `scatter` for a point. Edges have the colour of the
+        face, unless the style has another: segments and thin sets are visible.
         """
         rings = [self.vertices[index][: self.counts[index]] for index in np.ndindex(self.shape)]
         return draw_polygons(ax, rings, style)
@@ -672,7 +754,9 @@ class ConvexPolygons(ConvexSet):
         return np.ma.masked_array(values, np.broadcast_to(empty.reshape(shape), values.shape))
 
     def _measure_at(self, kernel: Callable[..., None], name: str, value: ArrayLike) -> Floats:
-        """Apply a kernel that measures at a vector for each polygon; a single polygon is measured at all vectors."""
+        """Apply a kernel that measures at a vector for each polygon; a single polygon is measured
+        at all vectors.
+        """
         polygons = self
         if not self.shape:
             polygons = self.broadcast_to(real_values(name, value).shape[:-1])
@@ -681,8 +765,8 @@ class ConvexPolygons(ConvexSet):
     def _without_mask(self, value: ArrayLike, *last: int) -> ArrayLike:
         """Return values for each polygon, of shape (..., *last), without a mask.
 
-        Values may be masked for empty polygons, as results of a batch are: ones replace them, which are a normal too.
-        Another mask stays.
+        Values may be masked for empty polygons, as results of a batch are: ones replace them, which
+        are a normal too. Another mask stays.
         """
         if not isinstance(value, np.ma.MaskedArray) or value.shape != (*self.shape, *last):
             return value
@@ -692,7 +776,8 @@ class ConvexPolygons(ConvexSet):
         return np.asarray(value.filled(1.0))
 
     def _each(self, name: str, value: ArrayLike, *last: int) -> Floats:
-        """Return a value for each polygon, shape (B, *last), from such values or from one of the shape `last`.
+        """Return a value for each polygon, shape (B, *last), from such values or from one of the
+        shape `last`.
 
         Numbers, whose shape is (), may be infinite.
         """
@@ -704,7 +789,8 @@ class ConvexPolygons(ConvexSet):
                 values = np.broadcast_to(values, shape)
             except ValueError:
                 raise ValueError(
-                    f"{name} must have the shape {last}, or one that can be broadcast to {shape}: got {values.shape}"
+                    f"{name} must have the shape {last}, or one that can be broadcast to {shape}: "
+                    f"got {values.shape}"
                 ) from None
         return _plain(values.reshape(self.counts.size, *last))
 

@@ -13,9 +13,11 @@ from infoset.limits import shown
 
 
 class ConvexSet:
-    """What `ConvexPolygons`, `Polytope` and `Zonotope` share: operators and equality in terms of their methods.
+    """What `ConvexPolygons`, `Polytope` and `Zonotope` share: operators and equality in terms of
+    their methods.
 
-    An operation of sets of two classes is that of `Polytope` for both: each class has the method `polytope`.
+    An operation of sets of two classes is that of `Polytope` for both: each class has the method
+    `polytope`.
     """
 
     __array_ufunc__ = None  # so that NumPy leaves `array + set` and `array @ set` to the set
@@ -34,7 +36,9 @@ class ConvexSet:
         return int(self.vertices.shape[-1])
 
     def equals(self, other: ConvexSet, tolerance: float = 0.0) -> Any:
-        """Return whether each set is a subset of the other one, with the tolerance of `is_subset`."""
+        """Return whether each set is a subset of the other one, with the tolerance of
+        `is_subset`.
+        """
         return self.is_subset(other, tolerance) & other.is_subset(self, tolerance)
 
     def linear_map(self, matrix: ArrayLike) -> Self:
@@ -44,10 +48,13 @@ class ConvexSet:
 
     def translate(self, offset: ArrayLike) -> Self:
         """Return the set moved by an offset, shape (n,), at the cost of `affine_map`."""
-        moved: Self = self.affine_map(np.eye(self.space), finite_values("offset", offset, self.space))
+        moved: Self = self.affine_map(
+            np.eye(self.space), finite_values("offset", offset, self.space)
+        )
         return moved
 
-    # The second signatures are those of sets of two classes: mypy looks only at this class, where `Self` is any set.
+    # The second signatures are those of sets of two classes: mypy looks only at this class, where
+    # `Self` is any set.
     @overload
     def __and__(self, other: Self) -> Self: ...
     @overload
@@ -90,5 +97,7 @@ class ConvexSet:
 def need_convex_set(name: str, value: object) -> ConvexSet:
     """Return an argument that is a set of any class, or raise a TypeError."""
     if not isinstance(value, ConvexSet):
-        raise TypeError(f"{name} must be a set (ConvexPolygons, Polytope or Zonotope): got {shown(value)}")
+        raise TypeError(
+            f"{name} must be a set (ConvexPolygons, Polytope or Zonotope): got {shown(value)}"
+        )
     return value

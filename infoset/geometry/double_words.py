@@ -1,4 +1,6 @@
-"""Sums and products with their rounding errors, compiled: one float more holds what was rounded away."""
+"""Sums and products with their rounding errors, compiled: one float more holds what was rounded
+away.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ _kernels = Kernels()  # without fast-math: reordered sums would lose the errors
 
 
 def _multiply_add(_: Any, _a: Any, _b: Any, _c: Any) -> Any:
-    """Return the type and the code of a b + c, rounded once: an instruction of processors, which Numba lacks."""
+    """Return the type and the code of a b + c, rounded once: an instruction of processors, which
+    Numba lacks.
+    """
 
     def code(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         return builder.fma(*arguments)
@@ -45,8 +49,11 @@ def two_product(a: float, b: float) -> tuple[float, float]:
 
 @_kernels.allocation_free
 def precise_dot(a: Floats, b: Floats, start: float) -> tuple[float, float]:
-    """Return start + a . b as the sum of two numbers, as exact as with doubled digits (Ogita, Rump and Oishi)."""
-    high, low = start, 0.0
+    """Return start + a . b as the sum of two numbers, as exact as with doubled digits (Ogita, Rump
+    and Oishi).
+    """
+    high = start
+    low = 0.0
     for i in range(len(b)):
         product, rounded = two_product(a[i], b[i])
         high, lost = two_sum(high, product)
@@ -56,8 +63,11 @@ def precise_dot(a: Floats, b: Floats, start: float) -> tuple[float, float]:
 
 @_kernels.compiled
 def affine_image(points: Floats, matrix: Floats, shift: Floats) -> tuple[Floats, Floats]:
-    """Return matrix x + shift of points, shape (k, m), rounded once, and the maximum rounding errors, shape (m,)."""
-    image, errors = np.empty((len(points), len(matrix))), np.zeros(len(matrix))
+    """Return matrix x + shift of points, shape (k, m), rounded once, and the maximum rounding
+    errors, shape (m,).
+    """
+    image = np.empty((len(points), len(matrix)))
+    errors = np.zeros(len(matrix))
     for j in range(len(matrix)):
         for i in range(len(points)):
             image[i, j], low = precise_dot(matrix[j], points[i], shift[j])
@@ -67,7 +77,9 @@ def affine_image(points: Floats, matrix: Floats, shift: Floats) -> tuple[Floats,
 
 @_kernels.compiled
 def supports(points: Floats, normals: Floats) -> Floats:
-    """Return max normal . point of each normal, shape (f,), rounded up from nearly exact products."""
+    """Return max normal . point of each normal, shape (f,), rounded up from nearly exact
+    products.
+    """
     result = np.full(len(normals), -np.inf)
     for f in range(len(normals)):
         for i in range(len(points)):

@@ -1,4 +1,6 @@
-"""Drawing of convex sets of the plane and of space on axes of matplotlib, which is imported only for them."""
+"""Drawing of convex sets of the plane and of space on axes of matplotlib, which is imported only
+for them.
+"""
 
 from __future__ import annotations
 
@@ -12,20 +14,29 @@ from infoset.arrays import Floats, Integers
 from infoset.limits import shown
 
 FACE_OPACITY = 0.3
-"""Opacity of the facets of a set of space, unless the style has another: the edges behind them stay visible."""
+"""Opacity of the facets of a set of space, unless the style has another: the edges behind them stay
+visible.
+"""
 EDGE_NAMES = {"edgecolor", "ec", "color"}
 """Names of matplotlib for the colour of the edges of patches."""
-COLLECTION_NAMES = {"edgecolor": "edgecolors", "ec": "edgecolors", "facecolor": "facecolors", "fc": "facecolors"}
+COLLECTION_NAMES = {
+    "edgecolor": "edgecolors",
+    "ec": "edgecolors",
+    "facecolor": "facecolors",
+    "fc": "facecolors",
+}
 """Other names of the colours of collections; with `shade` only these two are taken."""
 OF_PATCHES = {"closed", "fill"}
 """Options that matplotlib's patches have, and its collections do not."""
 
 
 def draw_polygons(ax: Any, rings: Sequence[Floats], style: dict[str, Any]) -> list[Any]:
-    """Draw polygons with rings of vertices, shape (k, 2), on 2-D axes; return an artist for each that has vertices.
+    """Draw polygons with rings of vertices, shape (k, 2), on 2-D axes; return an artist for each
+    that has vertices.
 
-    The edges have the colour of the face, unless the style has another, so that a segment and a set that is thinner
-    than a pixel are visible; a point is a dot. `style` has the options of matplotlib's `fill`.
+    The edges have the colour of the face, unless the style has another, so that a segment and a set
+    that is thinner than a pixel are visible; a point is a dot. `style` has the options of
+    matplotlib's `fill`.
     """
     axes = axes_of(ax, 2)
     artists = []
@@ -41,11 +52,12 @@ def draw_polygons(ax: Any, rings: Sequence[Floats], style: dict[str, Any]) -> li
 
 
 def draw_facets(ax: Any, rings: Sequence[Floats], style: dict[str, Any]) -> list[Any]:
-    """Draw polygons with rings of vertices, shape (k, 3), on 3-D axes; return one artist, or none without polygons.
+    """Draw polygons with rings of vertices, shape (k, 3), on 3-D axes; return one artist, or none
+    without polygons.
 
-    A ring may be a segment; a single ring of one vertex is a dot. `style` has the options of matplotlib's
-    `Poly3DCollection`. `color`, or the next colour of the axes, is that of the edges and of transparent faces, unless
-    `alpha`, `facecolor` or `edgecolor` are given.
+    A ring may be a segment; a single ring of one vertex is a dot. `style` has the options of
+    matplotlib's `Poly3DCollection`. `color`, or the next colour of the axes, is that of the edges
+    and of transparent faces, unless `alpha`, `facecolor` or `edgecolor` are given.
     """
     axes = axes_of(ax, 3)
     if not rings:
@@ -71,8 +83,11 @@ def draw_facets(ax: Any, rings: Sequence[Floats], style: dict[str, Any]) -> list
 
 
 def limits_of(axes: Any, dimensions: int) -> tuple[Floats, Floats]:
-    """Return the minimum and the maximum coordinates of axes, each of shape (2,) or (3,), and keep them as they are."""
-    lower, upper = np.empty(dimensions), np.empty(dimensions)
+    """Return the minimum and the maximum coordinates of axes, each of shape (2,) or (3,), and keep
+    them as they are.
+    """
+    lower = np.empty(dimensions)
+    upper = np.empty(dimensions)
     for k, axis in enumerate("xyz"[:dimensions]):
         ends = getattr(axes, f"get_{axis}lim")()
         getattr(axes, f"set_{axis}lim")(ends)
@@ -81,17 +96,22 @@ def limits_of(axes: Any, dimensions: int) -> tuple[Floats, Floats]:
 
 
 def ring_order(points: Floats) -> Integers:
-    """Return the order around it of the vertices, shape (k, n), of a convex polygon, a segment or a point of R^n."""
+    """Return the order around it of the vertices, shape (k, n), of a convex polygon, a segment or a
+    point of R^n.
+    """
     if len(points) < 3:
         return np.arange(len(points))
-    # In these coordinates the polygon is as wide as it is long; the order is the same under any affine map.
+    # In these coordinates the polygon is as wide as it is long; the order is the same under any
+    # affine map.
     steps = points - points.mean(axis=0)
     coordinates = np.linalg.svd(steps, full_matrices=False)[0]
     return np.argsort(np.arctan2(coordinates[:, 1], coordinates[:, 0]))
 
 
 def _colour_edges_as_face(patch: Any) -> None:
-    """Give the edges of a patch the colour of its face, but not its hatching, which has that of the edges."""
+    """Give the edges of a patch the colour of its face, but not its hatching, which has that of the
+    edges.
+    """
     hatching = patch.get_hatchcolor()
     patch.set_edgecolor(patch.get_facecolor())
     patch.set_hatchcolor(hatching)
@@ -113,7 +133,8 @@ def _next_colour(axes: Any) -> Any:
 
 
 def axes_of(ax: Any, space: int) -> Any:
-    """Return axes for sets of R^2 or R^3: those given, the present ones of pyplot, or new ones if these do not fit.
+    """Return axes for sets of R^2 or R^3: those given, the present ones of pyplot, or new ones if
+    these do not fit.
 
     Raises
     ------
@@ -124,7 +145,9 @@ def axes_of(ax: Any, space: int) -> Any:
         if not isinstance(ax, import_module("matplotlib.axes").Axes):
             raise TypeError(f"ax must be axes of matplotlib: got {shown(ax)}")
         if _dimensions(ax) != space:
-            raise ValueError(f"a set of R^{space} is drawn on axes of {space} dimensions: got {shown(ax)}")
+            raise ValueError(
+                f"a set of R^{space} is drawn on axes of {space} dimensions: got {shown(ax)}"
+            )
         return ax
 
     pyplot = import_module("matplotlib.pyplot")

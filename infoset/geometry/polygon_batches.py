@@ -1,6 +1,8 @@
-"""Compiled loops over batches of polygons: arrays `vertices`, shape (B, V, 2), and `counts`, shape (B,).
+"""Compiled loops over batches of polygons: arrays `vertices`, shape (B, V, 2), and `counts`, shape
+(B,).
 
-Kernels that make polygons write to `out` and `made`; kernels that measure write up to three numbers for each polygon.
+Kernels that make polygons write to `out` and `made`; kernels that measure write up to three numbers
+for each polygon.
 """
 
 from __future__ import annotations
@@ -11,7 +13,14 @@ import numpy as np
 
 from infoset._compile import compiled
 from infoset.arrays import Floats, Integers
-from infoset.geometry import polygon, polygon_distance, polygon_exact, polygon_lines, polygon_reduction, polygon_sum
+from infoset.geometry import (
+    polygon,
+    polygon_distance,
+    polygon_exact,
+    polygon_lines,
+    polygon_reduction,
+    polygon_sum,
+)
 
 
 @compiled
@@ -45,25 +54,38 @@ def cut(
     bounds: Floats,
     slack: float,
 ) -> None:
-    """Cuts by bands with `bounds` of shape (B, 2), widened by `slack` units of rounding of the vertices' heights."""
+    """Cuts by bands with `bounds` of shape (B, 2), widened by `slack` units of rounding of the
+    vertices' heights.
+    """
     for i in range(counts.size):
         polygon.copy(vertices[i], counts[i], out[i])
         wider = 0.0
         if slack > 0.0:
             for j in range(counts[i]):
-                wider = max(wider, abs(normal[i, 0] * out[i, j, 0]) + abs(normal[i, 1] * out[i, j, 1]))
+                wider = max(
+                    wider, abs(normal[i, 0] * out[i, j, 0]) + abs(normal[i, 1] * out[i, j, 1])
+                )
             wider *= slack * 2.0**-52
         made[i], _ = polygon.clip_to_band(
-            out[i], counts[i], normal[i, 0], normal[i, 1], bounds[i, 0] - wider, bounds[i, 1] + wider
+            out[i],
+            counts[i],
+            normal[i, 0],
+            normal[i, 1],
+            bounds[i, 0] - wider,
+            bounds[i, 1] + wider,
         )
 
 
 @compiled
-def linear_map(vertices: Floats, counts: Integers, out: Floats, made: Integers, matrix: Floats) -> None:
+def linear_map(
+    vertices: Floats, counts: Integers, out: Floats, made: Integers, matrix: Floats
+) -> None:
     """Images under matrices."""
     for i in range(counts.size):
         m = matrix[i]
-        made[i] = polygon.map_linearly(vertices[i], counts[i], m[0, 0], m[0, 1], m[1, 0], m[1, 1], out[i])
+        made[i] = polygon.map_linearly(
+            vertices[i], counts[i], m[0, 0], m[0, 1], m[1, 0], m[1, 1], out[i]
+        )
 
 
 @compiled
@@ -78,13 +100,17 @@ def invert(matrix: Floats, out: Floats) -> None:
 
 
 @compiled
-def range_meets(vertices: Floats, counts: Integers, out: Floats, matrix: Floats, offset: Floats) -> None:
-    """Whether {m p + o}, with singular matrices m and offsets o, meets the polygons, exactly decided: 1 or 0.
+def range_meets(
+    vertices: Floats, counts: Integers, out: Floats, matrix: Floats, offset: Floats
+) -> None:
+    """Whether {m p + o}, with singular matrices m and offsets o, meets the polygons, exactly
+    decided: 1 or 0.
 
     The range is the line through o along the longer column of m, or o itself if m is zero.
     """
     for i in range(counts.size):
-        first, second = matrix[i, :, 0], matrix[i, :, 1]
+        first = matrix[i, :, 0]
+        second = matrix[i, :, 1]
         along = first if np.abs(first).max() >= np.abs(second).max() else second
         if along[0] == 0.0 and along[1] == 0.0:
             points, n = polygon_exact.tidy(vertices[i], counts[i])
@@ -99,8 +125,12 @@ def range_meets(vertices: Floats, counts: Integers, out: Floats, matrix: Floats,
 
 
 @compiled
-def add_segments(vertices: Floats, counts: Integers, out: Floats, made: Integers, halves: Floats) -> None:
-    """Minkowski sums with segments from -half to +half, any number for each polygon: `halves` has shape (B, g, 2)."""
+def add_segments(
+    vertices: Floats, counts: Integers, out: Floats, made: Integers, halves: Floats
+) -> None:
+    """Minkowski sums with segments from -half to +half, any number for each polygon: `halves` has
+    shape (B, g, 2).
+    """
     for i in range(counts.size):
         polygon.copy(vertices[i], counts[i], out[i])
         made[i] = counts[i]
@@ -110,7 +140,12 @@ def add_segments(vertices: Floats, counts: Integers, out: Floats, made: Integers
 
 @compiled
 def add_polygon(
-    vertices: Floats, counts: Integers, out: Floats, made: Integers, other: Floats, other_counts: Integers
+    vertices: Floats,
+    counts: Integers,
+    out: Floats,
+    made: Integers,
+    other: Floats,
+    other_counts: Integers,
 ) -> None:
     """Minkowski sums."""
     for i in range(counts.size):
@@ -119,17 +154,29 @@ def add_polygon(
 
 @compiled
 def difference(
-    vertices: Floats, counts: Integers, out: Floats, made: Integers, other: Floats, other_counts: Integers
+    vertices: Floats,
+    counts: Integers,
+    out: Floats,
+    made: Integers,
+    other: Floats,
+    other_counts: Integers,
 ) -> None:
     """Minkowski differences; the other polygons are not empty."""
     for i in range(counts.size):
         if counts[i] > 0:
-            made[i] = polygon_lines.difference(vertices[i], counts[i], other[i], other_counts[i], out[i])
+            made[i] = polygon_lines.difference(
+                vertices[i], counts[i], other[i], other_counts[i], out[i]
+            )
 
 
 @compiled
 def intersect(
-    vertices: Floats, counts: Integers, out: Floats, made: Integers, other: Floats, other_counts: Integers
+    vertices: Floats,
+    counts: Integers,
+    out: Floats,
+    made: Integers,
+    other: Floats,
+    other_counts: Integers,
 ) -> None:
     """Intersections."""
     for i in range(counts.size):
@@ -137,14 +184,20 @@ def intersect(
 
 
 @compiled
-def intersect_lines(vertices: Floats, counts: Integers, out: Floats, made: Integers, lines: Floats) -> None:
-    """Intersections of half-planes, shape (B, k, 3, 1), of any number in place of these polygons."""
+def intersect_lines(
+    vertices: Floats, counts: Integers, out: Floats, made: Integers, lines: Floats
+) -> None:
+    """Intersections of half-planes, shape (B, k, 3, 1), of any number in place of these
+    polygons.
+    """
     for i in range(counts.size):
         made[i] = polygon_lines.intersect_lines(lines[i], out[i])
 
 
 @compiled
-def reduce_outward(vertices: Floats, counts: Integers, out: Floats, made: Integers, cap: int) -> None:
+def reduce_outward(
+    vertices: Floats, counts: Integers, out: Floats, made: Integers, cap: int
+) -> None:
     """Outer polygons of few vertices."""
     for i in range(counts.size):
         polygon.copy(vertices[i], counts[i], out[i])
@@ -153,7 +206,9 @@ def reduce_outward(vertices: Floats, counts: Integers, out: Floats, made: Intege
 
 @compiled
 def constraints(vertices: Floats, counts: Integers, normals: Floats, offsets: Floats) -> None:
-    """Half-planes with unit normals, shape (B, k, 2): one for each side; four for a segment and a point."""
+    """Half-planes with unit normals, shape (B, k, 2): one for each side; four for a segment and a
+    point.
+    """
     for i in range(counts.size):
         points, n = polygon_exact.tidy(vertices[i], counts[i])
         if n == 0:
@@ -161,19 +216,29 @@ def constraints(vertices: Floats, counts: Integers, normals: Floats, offsets: Fl
         for j in range(n if n > 2 else min(4 * n, 4)):
             x, y = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[j] if n < 3 else (0.0, 0.0)
             if n > 1:
-                first, last = points[j if n > 2 else 0], points[(j + 1) % n if n > 2 else 1]
-                along_x, along_y = last[0] - first[0], last[1] - first[1]
+                first = points[j if n > 2 else 0]
+                last = points[(j + 1) % n if n > 2 else 1]
+                along_x = last[0] - first[0]
+                along_y = last[1] - first[1]
                 length = math.hypot(along_x, along_y)
                 # Vertices of a tidy polygon differ, but their distance may underflow.
-                along_x, along_y = along_x / max(length, 1e-300), along_y / max(length, 1e-300)
-                x, y = (along_y, -along_x) if n > 2 else (x * along_y + y * along_x, y * along_y - x * along_x)
-            normals[i, j, 0], normals[i, j, 1] = x, y
+                along_x = along_x / max(length, 1e-300)
+                along_y = along_y / max(length, 1e-300)
+                x, y = (
+                    (along_y, -along_x)
+                    if n > 2
+                    else (x * along_y + y * along_x, y * along_y - x * along_x)
+                )
+            normals[i, j, 0] = x
+            normals[i, j, 1] = y
             at = polygon.support_index(points, n, x, y)
             offsets[i, j] = x * points[at, 0] + y * points[at, 1]
 
 
 @compiled
-def excess(vertices: Floats, counts: Integers, out: Floats, other: Floats, other_counts: Integers) -> None:
+def excess(
+    vertices: Floats, counts: Integers, out: Floats, other: Floats, other_counts: Integers
+) -> None:
     """Maximum distances of a vertex from the other polygons, 0 only for subsets."""
     for i in range(counts.size):
         points, count = polygon_exact.tidy(other[i], other_counts[i])
@@ -183,7 +248,9 @@ def excess(vertices: Floats, counts: Integers, out: Floats, other: Floats, other
 
 
 @compiled
-def gap(vertices: Floats, counts: Integers, out: Floats, other: Floats, other_counts: Integers) -> None:
+def gap(
+    vertices: Floats, counts: Integers, out: Floats, other: Floats, other_counts: Integers
+) -> None:
     """Distances between polygons: 0 only if they intersect, infinite if one is empty."""
     common = np.empty((vertices.shape[1] + other.shape[1], 2))
     for i in range(counts.size):
@@ -206,7 +273,9 @@ def nearest(vertices: Floats, counts: Integers, out: Floats, point: Floats) -> N
         out[i, 2] = np.inf
         if counts[i] > 0:
             points, count = polygon_exact.tidy(vertices[i], counts[i])
-            out[i, 0], out[i, 1], out[i, 2] = polygon_distance.nearest(points, count, point[i, 0], point[i, 1])
+            out[i, 0], out[i, 1], out[i, 2] = polygon_distance.nearest(
+                points, count, point[i, 0], point[i, 1]
+            )
 
 
 @compiled
@@ -257,18 +326,22 @@ def max_disc(vertices: Floats, counts: Integers, out: Floats) -> None:
 def sample(vertices: Floats, counts: Integers, uniform: Floats, out: Floats) -> None:
     """Points distributed uniformly, from uniform numbers of shape (B, k, 3)."""
     for i in range(counts.size):
-        n, points = counts[i], vertices[i]
+        n = counts[i]
+        points = vertices[i]
         if n == 0:
             continue
         whole = 2.0 * polygon.moments(points, n)[0]
         for j in range(uniform.shape[1]):
-            rest, one, two = uniform[i, j, 0] * whole, uniform[i, j, 1], uniform[i, j, 2]
+            rest = uniform[i, j, 0] * whole
+            one = uniform[i, j, 1]
+            two = uniform[i, j, 2]
             k = 1
             while k < n - 2 and rest > polygon.fan_area(points, k):
                 rest -= polygon.fan_area(points, k)
                 k += 1
             if one + two > 1.0 and n > 2:
-                one, two = 1.0 - one, 1.0 - two
+                one = 1.0 - one
+                two = 1.0 - two
             for axis in range(2):
                 start = points[0, axis]
                 out[i, j, axis] = start + (one * (points[k, axis] - start) if n > 1 else 0.0)

@@ -13,30 +13,43 @@ from infoset.geometry.polygon_exact import holds, tidy
 
 @compiled
 def nearest(points: Points, count: int, x: float, y: float) -> tuple[float, float, float]:
-    """Return the nearest point (x, y) of a nonempty, strictly convex polygon, and its distance; 0 only inside.
+    """Return the nearest point (x, y) of a nonempty, strictly convex polygon, and its distance; 0
+    only inside.
 
     O(count).
     """
     if holds(points, count, x, y):
         return x, y, 0.0
-    minimum, best_x, best_y = np.inf, x, y
+    minimum = np.inf
+    best_x = x
+    best_y = y
     j = count - 1
     for i in range(count):
-        along_x, along_y = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1]
-        from_x, from_y = x - points[j, 0], y - points[j, 1]
+        along_x = points[i, 0] - points[j, 0]
+        along_y = points[i, 1] - points[j, 1]
+        from_x = x - points[j, 0]
+        from_y = y - points[j, 1]
         squared = along_x * along_x + along_y * along_y
-        part = min(1.0, max(0.0, (from_x * along_x + from_y * along_y) / squared)) if squared > 0.0 else 0.0
+        part = (
+            min(1.0, max(0.0, (from_x * along_x + from_y * along_y) / squared))
+            if squared > 0.0
+            else 0.0
+        )
         # From the nearer end, so that an end is met exactly.
         if part > 0.5:
             away = (x - points[i, 0]) * along_x + (y - points[i, 1]) * along_y
             part = min(0.0, away / squared)
-            near_x, near_y = points[i, 0] + part * along_x, points[i, 1] + part * along_y
+            near_x = points[i, 0] + part * along_x
+            near_y = points[i, 1] + part * along_y
         else:
-            near_x, near_y = points[j, 0] + part * along_x, points[j, 1] + part * along_y
+            near_x = points[j, 0] + part * along_x
+            near_y = points[j, 1] + part * along_y
         if max(abs(x - near_x), abs(y - near_y)) < minimum:
             distance = math.hypot(x - near_x, y - near_y)
             if distance < minimum:
-                minimum, best_x, best_y = distance, near_x, near_y
+                minimum = distance
+                best_x = near_x
+                best_y = near_y
         j = i
     return best_x, best_y, max(minimum, MINIMUM)
 
@@ -45,16 +58,18 @@ def nearest(points: Points, count: int, x: float, y: float) -> tuple[float, floa
 def max_disc(points: Points, count: int) -> tuple[float, float, float]:
     """Return the centre (x, y) and the radius of a largest disc in a nonempty polygon. O(count^2).
 
-    The sides move inward at the same speed, and a side whose length becomes zero is removed, until no area is left. The
-    centre is the middle of the segment that remains.
+    The sides move inward at the same speed, and a side whose length becomes zero is removed, until
+    no area is left. The centre is the middle of the segment that remains.
     """
     a, n = tidy(points, count)
     a = a[:n].copy()
-    origin_x, origin_y = a[0, 0], a[0, 1]
+    origin_x = a[0, 0]
+    origin_y = a[0, 1]
     normals = np.empty((n, 2))
     for i in range(n if n > 2 else 0):
         j = (i + 1) % n
-        along_x, along_y = a[j, 0] - a[i, 0], a[j, 1] - a[i, 1]
+        along_x = a[j, 0] - a[i, 0]
+        along_y = a[j, 1] - a[i, 1]
         length = math.hypot(along_x, along_y)
         normals[i, 0], normals[i, 1] = -along_y / length, along_x / length
     a[:, 0] -= origin_x  # after the normals: a short side may vanish here
@@ -77,11 +92,13 @@ def max_disc(points: Points, count: int) -> tuple[float, float, float]:
             break
         for i in range(n):
             j = (i + 1) % n
-            along_x, along_y = normals[i, 1], -normals[i, 0]
+            along_x = normals[i, 1]
+            along_y = -normals[i, 0]
             length = (a[j, 0] - a[i, 0]) * along_x + (a[j, 1] - a[i, 1]) * along_y
             closing = (speed[i, 0] - speed[j, 0]) * along_x + (speed[i, 1] - speed[j, 1]) * along_y
             if length < minimum * closing:
-                minimum, chosen = max(0.0, length) / closing, i
+                minimum = max(0.0, length) / closing
+                chosen = i
         if chosen < 0:
             break
         radius += minimum
@@ -92,4 +109,8 @@ def max_disc(points: Points, count: int) -> tuple[float, float, float]:
             a[i, 0], a[i, 1] = a[i + 1, 0], a[i + 1, 1]
         n -= 1
     _, first, last = farthest_pair(a, n)
-    return origin_x + 0.5 * (a[first, 0] + a[last, 0]), origin_y + 0.5 * (a[first, 1] + a[last, 1]), radius
+    return (
+        origin_x + 0.5 * (a[first, 0] + a[last, 0]),
+        origin_y + 0.5 * (a[first, 1] + a[last, 1]),
+        radius,
+    )

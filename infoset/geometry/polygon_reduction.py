@@ -1,4 +1,6 @@
-"""Compiled outer approximations of polygons and of paths by fewer vertices, stored as in `polygon`."""
+"""Compiled outer approximations of polygons and of paths by fewer vertices, stored as in
+`polygon`.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +8,24 @@ import numpy as np
 
 from infoset._compile import allocation_free, compiled, inlined
 from infoset.arrays import Floats
-from infoset.geometry.polygon import ROUNDING, Points, append, close, cross, farthest_pair, move, put
+from infoset.geometry.polygon import (
+    ROUNDING,
+    Points,
+    append,
+    close,
+    cross,
+    farthest_pair,
+    move,
+    put,
+)
 from infoset.geometry.polygon_exact import hull
 
 
 @allocation_free
 def drop_turned(out: Points, made: int, x: float, y: float) -> int:
-    """Remove last vertices, down to one, at which the path to (x, y) does not turn left; return the new count."""
+    """Remove last vertices, down to one, at which the path to (x, y) does not turn left; return the
+    new count.
+    """
     while made > 1:
         along_x = out[made - 1, 0] - out[made - 2, 0]
         along_y = out[made - 1, 1] - out[made - 2, 1]
@@ -24,12 +37,13 @@ def drop_turned(out: Points, made: int, x: float, y: float) -> int:
 
 @compiled
 def reduce_outward(points: Points, count: int, cap: int) -> int:
-    """Remove edges, in place, until at most `cap` vertices are left; the result contains the polygon; return its size.
+    """Remove edges, in place, until at most `cap` vertices are left; the result contains the
+    polygon; return its size.
 
-    The cap is at least 4, because a convex polygon of five vertices always has an edge that can be removed. An edge is
-    removed by extending its neighbours to their intersection; the edge that adds the minimum area is removed first, at
-    O(count) per edge. If rounding has given an edge a wrong direction, the hull is taken first; a rectangle replaces a
-    hull that is too thin.
+    The cap is at least 4, because a convex polygon of five vertices always has an edge that can be
+    removed. An edge is removed by extending its neighbours to their intersection; the edge that
+    adds the minimum area is removed first, at O(count) per edge. If rounding has given an edge a
+    wrong direction, the hull is taken first; a rectangle replaces a hull that is too thin.
     """
     is_hull = False
     while count > cap:
@@ -51,7 +65,9 @@ def reduce_outward(points: Points, count: int, cap: int) -> int:
 
 @allocation_free
 def cheapest_edge(points: Points, count: int) -> tuple[int, float, float]:
-    """Return the edge whose removal adds the minimum area, and where its neighbours meet; -1 if not convex."""
+    """Return the edge whose removal adds the minimum area, and where its neighbours meet; -1 if not
+    convex.
+    """
     minimum = np.inf
     chosen = -1
     chosen_x = chosen_y = 0.0
@@ -71,8 +87,11 @@ def cheapest_edge(points: Points, count: int) -> tuple[int, float, float]:
 
 
 @inlined
-def removed_edge(points: Points, before: int, i: int, j: int, after: int) -> tuple[float, float, float]:
-    """Return twice the area that the removal of the edge from vertex i to j adds, and where its neighbours meet.
+def removed_edge(
+    points: Points, before: int, i: int, j: int, after: int
+) -> tuple[float, float, float]:
+    """Return twice the area that the removal of the edge from vertex i to j adds, and where its
+    neighbours meet.
 
     The area is infinite if the edge cannot be removed, and -1 if the path is not convex there.
     """
@@ -98,28 +117,35 @@ def removed_edge(points: Points, before: int, i: int, j: int, after: int) -> tup
 
 @allocation_free
 def drop_inner_edges(points: Points, count: int, fewest: int, work: Points) -> tuple[int, bool]:
-    """Remove edges inside a path, in place, until `fewest` vertices are left; the path moves outward only.
+    """Remove edges inside a path, in place, until `fewest` vertices are left; the path moves
+    outward only.
 
-    The edge that adds the minimum area is removed first, of equal ones the first. Return the new number of vertices,
-    and False if no edge can be removed before that. O(count + removed log(count)). `work` is a working array of twice
-    as many rows as the minimum power of two from `count`. Its first column is a tree: the leaves are the areas that the
-    removal of the edge after each vertex adds, the other nodes are the lesser of two children. Its second column has
-    the numbers of the next and, from `leaves`, of the previous vertex.
+    The edge that adds the minimum area is removed first, of equal ones the first. Return the new
+    number of vertices, and False if no edge can be removed before that. O(count + removed
+    log(count)). `work` is a working array of twice as many rows as the minimum power of two from
+    `count`. Its first column is a tree: the leaves are the areas that the removal of the edge after
+    each vertex adds, the other nodes are the lesser of two children. Its second column has the
+    numbers of the next and, from `leaves`, of the previous vertex.
     """
     leaves = 1
     while leaves < count:
         leaves *= 2
-    tree, links, last = work[:, 0], work[:, 1], count - 1
+    tree = work[:, 0]
+    links = work[:, 1]
+    last = count - 1
     for i in range(leaves):
         links[i], links[leaves + i] = min(i + 1, last), max(i - 1, 0)
-        tree[leaves + i] = removed_edge(points, i - 1, i, i + 1, i + 2)[0] if 0 < i < last - 1 else np.inf
+        tree[leaves + i] = (
+            removed_edge(points, i - 1, i, i + 1, i + 2)[0] if 0 < i < last - 1 else np.inf
+        )
     update_nodes(tree, leaves, 2 * leaves - 1)
     while count > fewest and 0.0 <= tree[1] < np.inf:
         at = 1
         while at < leaves:
             at = 2 * at + (tree[2 * at] > tree[1])
         i = at - leaves
-        before, j = int(links[leaves + i]), int(links[i])
+        before = int(links[leaves + i])
+        j = int(links[i])
         after = int(links[j])
         _, points[i, 0], points[i, 1] = removed_edge(points, before, i, j, after)
         links[i], links[leaves + after], tree[leaves + j] = after, i, np.inf
@@ -127,7 +153,9 @@ def drop_inner_edges(points: Points, count: int, fewest: int, work: Points) -> t
         # The removal changes the areas of four edges.
         first = i = int(links[leaves + before])
         for _ in range(4):
-            before, at, j = int(links[leaves + i]), i, int(links[i])
+            before = int(links[leaves + i])
+            at = i
+            j = int(links[i])
             after = int(links[j])
             inside = before < i < j < after
             tree[leaves + i] = removed_edge(points, before, i, j, after)[0] if inside else np.inf
@@ -144,25 +172,31 @@ def drop_inner_edges(points: Points, count: int, fewest: int, work: Points) -> t
 def update_nodes(tree: Floats, first: int, last: int) -> None:
     """Compute the nodes above the leaves from `first` to `last`."""
     while first > 1:
-        first, last = first >> 1, last >> 1
+        first = first >> 1
+        last = last >> 1
         for node in range(first, last + 1):
             tree[node] = min(tree[2 * node], tree[2 * node + 1])
 
 
 @allocation_free
 def box_around(points: Points, count: int, sign: float, slope: float) -> int:
-    """Replace a path by three sides of a box, in place: from its ends along a slope to its outermost vertex.
+    """Replace a path by three sides of a box, in place: from its ends along a slope to its
+    outermost vertex.
 
     `sign` is 1 if greater x is outward, else -1.
     """
-    first_x, first_y, last_x, last_y = points[0, 0], points[0, 1], points[count - 1, 0], points[count - 1, 1]
+    first_x = points[0, 0]
+    first_y = points[0, 1]
+    last_x = points[count - 1, 0]
+    last_y = points[count - 1, 1]
     outermost = sign * first_x
     for i in range(count):
         outermost = max(outermost, sign * points[i, 0])
     out = sign * (outermost - min(sign * first_x, sign * last_x))
     points[1, 0], points[1, 1] = first_x + out, first_y + out * slope
     points[2, 0], points[2, 1] = last_x + out, last_y + out * slope
-    points[3, 0], points[3, 1] = last_x, last_y
+    points[3, 0] = last_x
+    points[3, 1] = last_y
     return 4
 
 
@@ -172,11 +206,18 @@ def make_rectangle(points: Points, count: int) -> int:
     length, i, j = farthest_pair(points, count)
     x, y = 1.0, 0.0
     if length > 0.0:
-        x, y = (points[i, 0] - points[j, 0]) / length, (points[i, 1] - points[j, 1]) / length
-    origin_x, origin_y = points[0, 0], points[0, 1]
-    from_x, from_y = points[:count, 0] - origin_x, points[:count, 1] - origin_y
-    along, height = x * from_x + y * from_y, x * from_y - y * from_x
-    left, right, low, high = along.min(), along.max(), height.min(), height.max()
+        x = (points[i, 0] - points[j, 0]) / length
+        y = (points[i, 1] - points[j, 1]) / length
+    origin_x = points[0, 0]
+    origin_y = points[0, 1]
+    from_x = points[:count, 0] - origin_x
+    from_y = points[:count, 1] - origin_y
+    along = x * from_x + y * from_y
+    height = x * from_y - y * from_x
+    left = along.min()
+    right = along.max()
+    low = height.min()
+    high = height.max()
     made = 0
     for a, h in ((left, low), (right, low), (right, high), (left, high)):
         made = append(points, made, origin_x + a * x - h * y, origin_y + a * y + h * x)

@@ -1,45 +1,67 @@
-"""Compiled Minkowski sums of convex polygons, stored as in `polygon`, with segments and with polygons."""
+"""Compiled Minkowski sums of convex polygons, stored as in `polygon`, with segments and with
+polygons.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from infoset._compile import compiled, inlined
-from infoset.geometry.polygon import ROUNDING, Points, append, close, copy, cross, extremes, put, unsigned
+from infoset.geometry.polygon import (
+    ROUNDING,
+    Points,
+    append,
+    close,
+    copy,
+    cross,
+    extremes,
+    put,
+    unsigned,
+)
 from infoset.geometry.polygon_exact import tidy
 
 
 @compiled
 def add_segment(points: Points, count: int, half_x: float, half_y: float) -> int:
-    """Minkowski sum with the segment from -half to +half, in place; return the number of vertices, at most count + 2.
+    """Minkowski sum with the segment from -half to +half, in place; return the number of vertices,
+    at most count + 2.
 
-    O(count), in two passes. The boundary is divided at its extremes across the segment; the part to the right of the
-    segment's direction moves by +half, the rest by -half. A division at extremes, and not at sign changes of edges, is
-    correct for tiny edges with a wrong direction. If rounding could hide an extreme (an edge along the segment, a set
-    thin across it, a point), the edges are merged as in `add_polygon`.
+    O(count), in two passes. The boundary is divided at its extremes across the segment; the part to
+    the right of the segment's direction moves by +half, the rest by -half. A division at extremes,
+    and not at sign changes of edges, is correct for tiny edges with a wrong direction. If rounding
+    could hide an extreme (an edge along the segment, a set thin across it, a point), the edges are
+    merged as in `add_polygon`.
     """
     if count == 0 or (half_x == 0.0 and half_y == 0.0):
         return count
     bottom, top = extremes(points, count, -half_y, half_x)
-    if not (is_lowest(points, count, bottom, half_x, half_y) and is_lowest(points, count, top, -half_x, -half_y)):
-        segment, out = np.empty((2, 2)), np.empty((count + 2, 2))
+    if not (
+        is_lowest(points, count, bottom, half_x, half_y)
+        and is_lowest(points, count, top, -half_x, -half_y)
+    ):
+        segment = np.empty((2, 2))
+        out = np.empty((count + 2, 2))
         put(segment, 0, -half_x, -half_y)
         put(segment, 1, half_x, half_y)
         made = add_polygon(points, count, segment, 2, out)
         copy(out, made, points)
         return made
     if bottom < top:
-        half_x, half_y = -half_x, -half_y
-    # Unsigned indices avoid the test for negative ones, which takes as long as the rest of this loop.
+        half_x = -half_x
+        half_y = -half_y
+    # Unsigned indices avoid the test for negative ones, which takes as long as the rest of this
+    # loop.
     turns = unsigned(bottom), unsigned(top)
     target = unsigned(count + 2)
     for k in range(count):
         i = unsigned(count - 1 - k)
-        x, y = points[i, 0], points[i, 1]
+        x = points[i, 0]
+        y = points[i, 1]
         target -= unsigned(1)
         put(points, target, x + half_x, y + half_y)
         if i in turns:
-            half_x, half_y = -half_x, -half_y
+            half_x = -half_x
+            half_y = -half_y
             target -= unsigned(1)
             put(points, target, x + half_x, y + half_y)
     return count + 2
@@ -51,7 +73,10 @@ def is_lowest(points: Points, count: int, i: int, x: float, y: float) -> bool:
     before = i - 1 if i > 0 else count - 1
     after = i + 1 if i + 1 < count else 0
     height = cross(x, y, points[i, 0], points[i, 1])
-    rise = min(cross(x, y, points[before, 0], points[before, 1]), cross(x, y, points[after, 0], points[after, 1]))
+    rise = min(
+        cross(x, y, points[before, 0], points[before, 1]),
+        cross(x, y, points[after, 0], points[after, 1]),
+    )
     reach_x = max(abs(points[i, 0]), abs(points[before, 0]), abs(points[after, 0]))
     reach_y = max(abs(points[i, 1]), abs(points[before, 1]), abs(points[after, 1]))
     return bool(rise - height > ROUNDING * (abs(x) * reach_y + abs(y) * reach_x))
@@ -62,19 +87,23 @@ def lowest_index(points: Points, count: int) -> int:
     """Index of the lowest vertex; of equally low ones the leftmost."""
     best = 0
     for i in range(1, count):
-        if points[i, 1] < points[best, 1] or (points[i, 1] == points[best, 1] and points[i, 0] < points[best, 0]):
+        if points[i, 1] < points[best, 1] or (
+            points[i, 1] == points[best, 1] and points[i, 0] < points[best, 0]
+        ):
             best = i
     return best
 
 
 @compiled
 def add_polygon(points: Points, count: int, other: Points, other_count: int, out: Points) -> int:
-    """Write the Minkowski sum of two convex polygons by merging their edges in order of direction; return its size.
+    """Write the Minkowski sum of two convex polygons by merging their edges in order of direction;
+    return its size.
 
-    The result has at most count + other_count vertices; none if either polygon is empty. O(count + other_count). If
-    rounding has given an edge a wrong direction, the hull is taken first, which costs more: the merge needs edges in
-    order. Each vertex of the sum is one addition of two vertices, so that rounding errors do not accumulate. Rounding
-    may exchange two edges that are nearly parallel, which moves a vertex by less than that.
+    The result has at most count + other_count vertices; none if either polygon is empty. O(count +
+    other_count). If rounding has given an edge a wrong direction, the hull is taken first, which
+    costs more: the merge needs edges in order. Each vertex of the sum is one addition of two
+    vertices, so that rounding errors do not accumulate. Rounding may exchange two edges that are
+    nearly parallel, which moves a vertex by less than that.
     """
     if count == 0 or other_count == 0:
         return 0
@@ -109,7 +138,9 @@ def add_polygon(points: Points, count: int, other: Points, other_count: int, out
 
 @compiled
 def direction_order(ax: float, ay: float, bx: float, by: float) -> int:
-    """Return 1 if direction a is before b, counter-clockwise from +x, -1 if it is after, and 0 if they are equal."""
+    """Return 1 if direction a is before b, counter-clockwise from +x, -1 if it is after, and 0 if
+    they are equal.
+    """
     a_returns = ay < 0.0 or (ay == 0.0 and ax < 0.0)
     b_returns = by < 0.0 or (by == 0.0 and bx < 0.0)
     if a_returns != b_returns:

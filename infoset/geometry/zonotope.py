@@ -1,4 +1,6 @@
-"""Zonotopes: boxes, disturbances and initial sets of observers, and sets whose generators are carried."""
+"""Zonotopes: boxes, disturbances and initial sets of observers, and sets whose generators are
+carried.
+"""
 
 from __future__ import annotations
 
@@ -38,8 +40,9 @@ _SUBSETS_AT_ONCE = 20_000
 class Zonotope(ZonotopeArrays, ConvexSet):
     """The set of centre + t_1 g_1 + ... + t_m g_m with all -1 <= t_i <= 1.
 
-    The generators are the set: sums and maps take O(m n) steps in any dimension, where a `Polytope` has O(m^(n - 1))
-    facets. It is also an argument of `LinearObserver`. It may be flat, a segment or a point, and is never empty.
+    The generators are the set: sums and maps take O(m n) steps in any dimension, where a `Polytope`
+    has O(m^(n - 1)) facets. It is also an argument of `LinearObserver`. It may be flat, a segment
+    or a point, and is never empty.
 
     Parameters
     ----------
@@ -55,31 +58,38 @@ class Zonotope(ZonotopeArrays, ConvexSet):
 
     Notes
     -----
-    Operations return new objects and have the names of those of `Polytope`. Sums, maps, projections and multiples of
-    zonotopes are zonotopes, whose centre and generators are rounded once, to nearest. `reduce_outward`, `cut` and
-    `bounding_box` are rounded outward: they contain the set of the stored numbers, or its part. What is not a zonotope
-    is computed by `polytope()`, which is rounded outward too, and may take long in more than three dimensions:
-    intersection, hull, difference, `margin`, `is_subset` and `equals`. Then the other set is a zonotope or a polytope.
+    Operations return new objects and have the names of those of `Polytope`. Sums, maps, projections
+    and multiples of zonotopes are zonotopes, whose centre and generators are rounded once, to
+    nearest. `reduce_outward`, `cut` and `bounding_box` are rounded outward: they contain the set of
+    the stored numbers, or its part. What is not a zonotope is computed by `polytope()`, which is
+    rounded outward too, and may take long in more than three dimensions: intersection, hull,
+    difference, `margin`, `is_subset` and `equals`. Then the other set is a zonotope or a polytope.
 
-    Operators: `Z + Y` (Minkowski sum), `Z + vector` (translation), `A @ Z` (linear map), `2 * Z`, `-Z`, `point in Z`,
-    `Z & Y` (a `Polytope`), `Z <= Y` (subset, to rounding). `Z == Y` compares objects; `equals` compares sets.
+    Operators: `Z + Y` (Minkowski sum), `Z + vector` (translation), `A @ Z` (linear map), `2 * Z`,
+    `-Z`, `point in Z`, `Z & Y` (a `Polytope`), `Z <= Y` (subset, to rounding). `Z == Y` compares
+    objects; `equals` compares sets.
     """
 
-    # Sets -----------------------------------------------------------------------------------------------------------
+    # Sets
+    # ----------------------------------------------------------------------------------------------
 
     def affine_map(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> Zonotope:
-        """Return {matrix x + offset}, with a matrix of shape (k, n), singular or not, and an offset of shape (k,) or 0.
+        """Return {matrix x + offset}, with a matrix of shape (k, n), singular or not, and an offset
+        of shape (k,) or 0.
 
         O(m n k); centre and generators are rounded once.
         """
-        rows = finite_values("matrix", matrix, "m", self.space).copy()  # kernels are compiled once, for such arrays
+        rows = finite_values(
+            "matrix", matrix, "m", self.space
+        ).copy()  # kernels are compiled once, for such arrays
         moved = offset_values(offset, len(rows)).copy()
         centre, _ = affine_image(self.centre[None].copy(), rows, moved)
         generators, _ = affine_image(self.generators.copy(), rows, np.zeros(len(rows)))
         return Zonotope(centre[0], generators)
 
     def minkowski_sum(self, other: ConvexSet) -> Any:
-        """Return {x + y: x in the set, y in the other}: a zonotope with all generators of both, O(m n).
+        """Return {x + y: x in the set, y in the other}: a zonotope with all generators of both, O(m
+        n).
 
         With a set of another class it is a `Polytope`, by `polytope()`.
 
@@ -95,14 +105,18 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         return Zonotope(self.centre + other.centre, np.vstack([self.generators, other.generators]))
 
     def add_segment(self, half: ArrayLike) -> Zonotope:
-        """Return the Minkowski sum with the segment from -half to +half, shape (n,): one more generator. Exact."""
+        """Return the Minkowski sum with the segment from -half to +half, shape (n,): one more
+        generator. Exact.
+        """
         along = finite_values("half", half, self.space)
         if not along.any():
             return self
         return Zonotope(self.centre, np.vstack([self.generators, along]))
 
     def enlarged(self, by: ArrayLike) -> Zonotope:
-        """Return {x + e: |e_i| <= by_i}, with `by` of the shape (n,): up to n more generators. Exact."""
+        """Return {x + e: |e_i| <= by_i}, with `by` of the shape (n,): up to n more generators.
+        Exact.
+        """
         margin = finite_values("by", by, self.space)
         not_negative("by", float(margin.min()))
         if not margin.any():
@@ -110,7 +124,8 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         return Zonotope(self.centre, np.vstack([self.generators, box_generators(margin)]))
 
     def project(self, axes: ArrayLike) -> Zonotope:
-        """Return the projection on `axes`, an integer or a sequence of integers, as a set of as many dimensions.
+        """Return the projection on `axes`, an integer or a sequence of integers, as a set of as
+        many dimensions.
 
         Exact; generators that become zero go.
         """
@@ -121,8 +136,8 @@ class Zonotope(ZonotopeArrays, ConvexSet):
     def reduce_outward(self, order: float) -> Zonotope:
         """Return a zonotope with at most `order` n generators (`order` >= 1) that contains the set.
 
-        The longest generators stay. The others, those with the least |g|_1 - |g|_inf in units of the widths of the
-        set, become a box around their sum. O(m n).
+        The longest generators stay. The others, those with the least |g|_1 - |g|_inf in units of
+        the widths of the set, become a box around their sum. O(m n).
 
         References
         ----------
@@ -141,31 +156,35 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         *,
         slack_ulp: float = 0.0,
     ) -> Zonotope:
-        """Return an outer set: a zonotope that contains the part in strips lower <= normals x <= upper.
+        """Return an outer set: a zonotope that contains the part in strips lower <= normals x <=
+        upper.
 
-        The part itself, which is no zonotope, is that of `polytope().cut`. The result need not be inside the strips,
-        nor inside this set; it is the one with the smallest sum of squares of the generators that a linear correction
-        by the strips gives. It is this set if the strips contain it.
+        The part itself, which is no zonotope, is that of `polytope().cut`. The result need not be
+        inside the strips, nor inside this set; it is the one with the smallest sum of squares of
+        the generators that a linear correction by the strips gives. It is this set if the strips
+        contain it.
 
-        `normals`, shape (n,) or (k, n), have any length. The bounds have the shape () or (k,); infinite ones give
-        half-spaces. Each strip is wider on both sides by `slack_ulp` ulp of the products in normals x. A strip has one
-        more generator, and rounding up to n: see `reduce_outward`. O((m + n) n k + k^3) for k strips.
+        `normals`, shape (n,) or (k, n), have any length. The bounds have the shape () or (k,);
+        infinite ones give half-spaces. Each strip is wider on both sides by `slack_ulp` ulp of the
+        products in normals x. A strip has one more generator, and rounding up to n: see
+        `reduce_outward`. O((m + n) n k + k^3) for k strips.
 
         Raises
         ------
         EmptyPolytopeError
-            If a strip is empty or certainly misses the set. Of several strips that only together miss it, nothing is
-            known.
+            If a strip is empty or certainly misses the set. Of several strips that only together
+            miss it, nothing is known.
 
         Notes
         -----
-        x = c + G t and y = C x + v with |v| <= V give x in c + K (y - C c) + (I - K C) G [-1, 1]^m + K diag(V)
-        [-1, 1]^k for every matrix K; K = P C' (C P C' + diag V^2)^-1 with P = G G' has the smallest sum of squares.
+        x = c + G t and y = C x + v with |v| <= V give x in c + K (y - C c) + (I - K C) G [-1, 1]^m
+        + K diag(V) [-1, 1]^k for every matrix K; K = P C' (C P C' + diag V^2)^-1 with P = G G' has
+        the smallest sum of squares.
 
         References
         ----------
-        T. Alamo, J. M. Bravo and E. F. Camacho, Guaranteed state estimation by zonotopes, Automatica 41 (2005).
-        C. Combastel, Zonotopes and Kalman observers, Automatica 55 (2015).
+        T. Alamo, J. M. Bravo and E. F. Camacho, Guaranteed state estimation by zonotopes,
+        Automatica 41 (2005). C. Combastel, Zonotopes and Kalman observers, Automatica 55 (2015).
         """
         rows = real_values("normals", normals)
         rows = np.atleast_2d(finite_values("normals", rows, *["m"] * (rows.ndim > 1), self.space))
@@ -182,12 +201,20 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         high = np.minimum(most + wider, middles + reach)
         if (low > high).any():
             worst = int(np.argmax(low - high))
-            least, greatest = (np.broadcast_to(bound, len(rows))[worst] for bound in (minimum, most))
-            raise EmptyPolytopeError(f"no point of the zonotope is in strip {worst}, from {least:g} to {greatest:g}")
+            least, greatest = (
+                np.broadcast_to(bound, len(rows))[worst] for bound in (minimum, most)
+            )
+            raise EmptyPolytopeError(
+                f"no point of the zonotope is in strip {worst}, from {least:g} to {greatest:g}"
+            )
         is_cut = (low > middles - reach) | (high < middles + reach)
         if not is_cut.any():
             return self
-        return Zonotope(*corrected_by_strips(self.centre, self.generators, rows[is_cut], low[is_cut], high[is_cut]))
+        return Zonotope(
+            *corrected_by_strips(
+                self.centre, self.generators, rows[is_cut], low[is_cut], high[is_cut]
+            )
+        )
 
     @property
     def _operations(self) -> int:
@@ -217,14 +244,19 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         return self.polytope().intersection(*others)
 
     def convex_hull(self, *others: ConvexSet) -> Polytope:
-        """Return the convex hull of the union with one or more sets of any class, by `polytope()`."""
+        """Return the convex hull of the union with one or more sets of any class, by
+        `polytope()`.
+        """
         return self.polytope().convex_hull(*others)
 
     def minkowski_difference(self, other: ConvexSet) -> Polytope:
-        """Return the Pontryagin difference {x: x + y in the set for all y in the other}, by `polytope()`."""
+        """Return the Pontryagin difference {x: x + y in the set for all y in the other}, by
+        `polytope()`.
+        """
         return self.polytope().minkowski_difference(other)
 
-    # Measures ---------------------------------------------------------------------------------------------------------
+    # Measures
+    # ----------------------------------------------------------------------------------------------
 
     @property
     def dimension(self) -> int:
@@ -250,14 +282,17 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         """Return a vertex farthest along a `direction`, both of shape (n,). O(m n)."""
         row = finite_values("direction", direction, self.space)
         heights = self.generators @ row
-        # A generator across the direction counts by its first coordinate that is not zero: the point is a vertex.
+        # A generator across the direction counts by its first coordinate that is not zero: the
+        # point is a vertex.
         first = (self.generators != 0.0).argmax(axis=1)
         leading = np.take_along_axis(self.generators, first[:, None], axis=1)[:, 0]
         signs = np.sign(np.where(heights != 0.0, heights, leading))
         return np.asarray(self.centre + signs @ self.generators)
 
     def bounding_box(self) -> tuple[Floats, Floats]:
-        """Return the minimum and the maximum coordinates, each of shape (n,), rounded outward. O(m n)."""
+        """Return the minimum and the maximum coordinates, each of shape (n,), rounded outward. O(m
+        n).
+        """
         ones = np.ones((1, len(self.generators)))
         rows = np.ascontiguousarray(np.abs(self.generators).T)
         upper, high = affine_image(ones, rows, self.centre.copy())
@@ -268,19 +303,21 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         )
 
     def margin(self, points: ArrayLike) -> Floats:
-        """Return the minimum distance of `points`, shape (..., n), from the facets; `Polytope.margin` of `polytope()`.
+        """Return the minimum distance of `points`, shape (..., n), from the facets;
+        `Polytope.margin` of `polytope()`.
 
         `contains` needs no facets.
         """
         return self.polytope().margin(points)
 
     def contains(self, points: ArrayLike, tolerance: float = 0.0) -> Flags:
-        """Return whether `points`, shape (..., n), are in the set, to rounding, or within a `tolerance` on each axis.
+        """Return whether `points`, shape (..., n), are in the set, to rounding, or within a
+        `tolerance` on each axis.
 
-        In the plane it is decided by the sides. In more dimensions, a point that is not decided by the bounding box or
-        by coefficients of least squares needs a linear program (HiGHS, about 2 ms). It only proposes coefficients, or a
-        plane between the point and the set; a point is outside if the plane holds to rounding. The facets are not
-        needed.
+        In the plane it is decided by the sides. In more dimensions, a point that is not decided by
+        the bounding box or by coefficients of least squares needs a linear program (HiGHS, about 2
+        ms). It only proposes coefficients, or a plane between the point and the set; a point is
+        outside if the plane holds to rounding. The facets are not needed.
         """
         x = finite_values("points", points, "...", self.space)
         if not_negative("tolerance", tolerance):
@@ -307,14 +344,16 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         return np.asarray(found.reshape(x.shape[:-1]))
 
     def is_subset(self, other: ConvexSet, tolerance: float = 0.0) -> bool:
-        """Return whether all vertices are in the other set, to rounding, or within a `tolerance` of its facets."""
+        """Return whether all vertices are in the other set, to rounding, or within a `tolerance` of
+        its facets.
+        """
         return self.polytope().is_subset(other, tolerance)
 
     def volume(self) -> float:
         """Return the volume within the affine hull, of its dimension d; 1 for a point.
 
-        It is 2^d times the sum of the determinants, without signs, of all d generators out of m; of the polytope if
-        these are over 1e6.
+        It is 2^d times the sum of the determinants, without signs, of all d generators out of m; of
+        the polytope if these are over 1e6.
         """
         span = self._span
         space = self.dimension
@@ -322,7 +361,8 @@ class Zonotope(ZonotopeArrays, ConvexSet):
             return 1.0
         if comb(len(self.generators), space) > _MAX_SUBSETS:
             return self.polytope().volume()
-        # In coordinates along the basis a determinant is exact to rounding of the volume, also of a thin set.
+        # In coordinates along the basis a determinant is exact to rounding of the volume, also of a
+        # thin set.
         total = 0.0
         subsets = combinations(range(len(self.generators)), space)
         while chosen := list(islice(subsets, _SUBSETS_AT_ONCE)):
@@ -332,7 +372,9 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         return float(2.0**space * total * exact_determinant(span.base) * stretch)
 
     def area(self) -> float:
-        """Return the area of a set of R^2; 0 for a segment or a point. `volume` is for any space."""
+        """Return the area of a set of R^2; 0 for a segment or a point. `volume` is for any
+        space.
+        """
         return self.polytope().area()
 
     def centroid(self) -> Floats:
@@ -340,7 +382,9 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         return self.centre.copy()
 
     def plot(self, ax: Any = None, **style: Any) -> list[Any]:
-        """Draw a set of R^2 or R^3 on matplotlib axes, and return the artists: `Polytope.plot` of `polytope()`."""
+        """Draw a set of R^2 or R^3 on matplotlib axes, and return the artists: `Polytope.plot` of
+        `polytope()`.
+        """
         return self.polytope().plot(ax, **style)
 
     def __and__(self, other: Any) -> Any:

@@ -23,7 +23,9 @@ class ZonotopeArrays:
     def __init__(self, centre: ArrayLike, generators: ArrayLike) -> None:
         middle = finite_values("centre", centre, "n")
         object.__setattr__(self, "centre", middle)
-        object.__setattr__(self, "generators", finite_values("generators", generators, "g", len(middle)))
+        object.__setattr__(
+            self, "generators", finite_values("generators", generators, "g", len(middle))
+        )
 
     @classmethod
     def box(cls, lower: ArrayLike, upper: ArrayLike) -> Self:
@@ -44,7 +46,9 @@ class ZonotopeArrays:
 
 
 def box_generators(half: Floats) -> Floats:
-    """Return the generators of a box with half-widths, shape (n,): one for each that is not zero."""
+    """Return the generators of a box with half-widths, shape (n,): one for each that is not
+    zero.
+    """
     return np.asarray(np.diag(half)[half > 0.0])
 
 

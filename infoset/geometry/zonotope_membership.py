@@ -11,17 +11,23 @@ from infoset.geometry.polytope.errors import SolverError
 from infoset.geometry.tolerances import EPS
 
 _REACH = 2.0
-"""Multiple of a point up to which the program searches: all beyond one are inside, and two is clearly beyond."""
+"""Multiple of a point up to which the program searches: all beyond one are inside, and two is
+clearly beyond.
+"""
 _DEPENDENT = 1e-6
-"""Distance of a unit vector from a span, below which it gives no new direction: far above rounding, and rare."""
+"""Distance of a unit vector from a span, below which it gives no new direction: far above rounding,
+and rare.
+"""
 
 
 def are_inside(points: Floats, generators: Floats, basis: Integers, rounding: Floats) -> Flags:
-    """Return which points, shape (k, d), are in the zonotope of generators, shape (m, d), around zero, or near it.
+    """Return which points, shape (k, d), are in the zonotope of generators, shape (m, d), around
+    zero, or near it.
 
-    A point counts as inside if a box of the half-widths `rounding`, shape (k, d), around it meets the zonotope. The
-    generators with the numbers `basis`, shape (d,), are the unit vectors, or opposite ones. Most points are decided by
-    the bounding box, or by coefficients of least squares; each of the others needs a linear program.
+    A point counts as inside if a box of the half-widths `rounding`, shape (k, d), around it meets
+    the zonotope. The generators with the numbers `basis`, shape (d,), are the unit vectors, or
+    opposite ones. Most points are decided by the bounding box, or by coefficients of least squares;
+    each of the others needs a linear program.
     """
     radius = np.abs(generators).sum(axis=0)
     found = (np.abs(points) <= radius + rounding).all(axis=1)
@@ -36,16 +42,18 @@ def are_inside(points: Floats, generators: Floats, basis: Integers, rounding: Fl
 def _is_inside(point: Floats, generators: Floats, basis: Integers, rounding: Floats) -> bool:
     """Return whether a point is in the zonotope, from the largest multiple of it that is.
 
-    Coefficients up to one that give the point prove that it is inside, a plane between the point and the zonotope
-    that it is not. If the solver finds neither, the point is closer to the boundary than its tolerance, 1e-10 of the
-    size; it counts as inside.
+    Coefficients up to one that give the point prove that it is inside, a plane between the point
+    and the zonotope that it is not. If the solver finds neither, the point is closer to the
+    boundary than its tolerance, 1e-10 of the size; it counts as inside.
     """
     count, space = generators.shape
     cost = np.zeros(count + 1)
     cost[-1] = -1.0
     equations = np.column_stack([generators.T, -point])
     bounds = np.array([[-1.0, 1.0]] * count + [[0.0, _REACH]])
-    optimum = linprog(cost, A_eq=equations, b_eq=np.zeros(space), bounds=bounds, method="highs-ds", options=HIGHS)
+    optimum = linprog(
+        cost, A_eq=equations, b_eq=np.zeros(space), bounds=bounds, method="highs-ds", options=HIGHS
+    )
     if optimum.status != 0:
         raise SolverError(f"the linear program of membership was not solved: {optimum.message}")
 
@@ -63,7 +71,9 @@ def _is_inside(point: Floats, generators: Floats, basis: Integers, rounding: Flo
 
 
 def _separates(normal: Floats, point: Floats, generators: Floats, rounding: Floats) -> bool:
-    """Return whether a plane with some normal divides a point, with its rounding, from the zonotope."""
+    """Return whether a plane with some normal divides a point, with its rounding, from the
+    zonotope.
+    """
     reach = np.abs(generators @ normal).sum()
     terms = np.abs(normal) @ (np.abs(generators).sum(axis=0) + np.abs(point))
     unsure = np.abs(normal) @ rounding + (sum(generators.shape) + 4) * EPS * terms
@@ -71,7 +81,8 @@ def _separates(normal: Floats, point: Floats, generators: Floats, rounding: Floa
 
 
 def _sharpened(normal: Floats, generators: Floats) -> Floats:
-    """Return the normal of the facet that a solver's normal is near: orthogonal to d - 1 of the generators.
+    """Return the normal of the facet that a solver's normal is near: orthogonal to d - 1 of the
+    generators.
 
     They are those that are the most orthogonal to it, and independent.
     """

@@ -23,10 +23,11 @@ class CentreAndGenerators(NamedTuple):
 
 
 def fewer_generators(generators: Floats, count: int) -> Floats:
-    """Return at most `count` >= n generators, whose zonotope contains the one of the given ones, shape (m, n).
+    """Return at most `count` >= n generators, whose zonotope contains the one of the given ones,
+    shape (m, n).
 
-    The longest generators stay. The others, those with the least |g|_1 - |g|_inf in units of the widths of the set,
-    become a box around their sum. O(m n).
+    The longest generators stay. The others, those with the least |g|_1 - |g|_inf in units of the
+    widths of the set, become a box around their sum. O(m n).
 
     References
     ----------
@@ -47,11 +48,12 @@ def fewer_generators(generators: Floats, count: int) -> Floats:
 def corrected_by_strips(
     centre: Floats, generators: Floats, rows: Floats, low: Floats, high: Floats
 ) -> CentreAndGenerators:
-    """Return a zonotope that contains the part of another one in strips low <= rows x <= high, shape (k, n).
+    """Return a zonotope that contains the part of another one in strips low <= rows x <= high,
+    shape (k, n).
 
-    x = x + K (y - C x - v) holds for each x of the part, with y the middles of the strips and |v| at most half of
-    their widths, and for every matrix K. The gain that is used has the smallest sum of squares of the generators
-    (`Zonotope.cut`). Rounding is added as a box. O((m + n) n k + k^3).
+    x = x + K (y - C x - v) holds for each x of the part, with y the middles of the strips and |v|
+    at most half of their widths, and for every matrix K. The gain that is used has the smallest sum
+    of squares of the generators (`Zonotope.cut`). Rounding is added as a box. O((m + n) n k + k^3).
     """
     y = 0.5 * low + 0.5 * high
     # Rounding of the middle must not lose an end.
@@ -71,7 +73,9 @@ def corrected_by_strips(
     sizes = np.abs(centre) + np.abs(generators).sum(axis=0)
     terms = sizes + np.abs(gain) @ (np.abs(rows) @ sizes + np.abs(y) + half)
     box = box_generators(operations * EPS * terms)
-    return CentreAndGenerators(centre + gain @ (y - rows @ centre), np.vstack([corrected[corrected.any(axis=1)], box]))
+    return CentreAndGenerators(
+        centre + gain @ (y - rows @ centre), np.vstack([corrected[corrected.any(axis=1)], box])
+    )
 
 
 def _inverse(matrix: Floats) -> Floats:
@@ -83,5 +87,7 @@ def _inverse(matrix: Floats) -> Floats:
 
 def _sums_up(sizes: Floats) -> Floats:
     """Return the sums of nonnegative numbers in each column, rounded up."""
-    sums, lost = affine_image(np.ones((1, len(sizes))), np.ascontiguousarray(sizes.T), np.zeros(sizes.shape[1]))
+    sums, lost = affine_image(
+        np.ones((1, len(sizes))), np.ascontiguousarray(sizes.T), np.zeros(sizes.shape[1])
+    )
     return np.asarray(np.where(lost > 0.0, np.nextafter(sums[0], np.inf), sums[0]))

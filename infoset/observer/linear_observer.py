@@ -1,4 +1,6 @@
-"""Observers of linear systems: the exact sets of states that agree with measurements, inputs and bounded errors."""
+"""Observers of linear systems: the exact sets of states that agree with measurements, inputs and
+bounded errors.
+"""
 
 from __future__ import annotations
 
@@ -23,30 +25,35 @@ from infoset.observer.steps import Strips
 from infoset.observer.window import WINDOW, Windows, exact_hull
 
 MAX_POLYTOPE_STATES = 4
-"""Number of states up to which the sets are polytopes: of more, programs give tighter bounds than reduced polytopes."""
+"""Number of states up to which the sets are polytopes: of more, programs give tighter bounds than
+reduced polytopes.
+"""
 Known = TypeVar("Known")
 
 MAX_RECORD = 20_000
-"""Number of steps and measurements up to which they are kept, so that the memory of an observer is bounded."""
+"""Number of steps and measurements up to which they are kept, so that the memory of an observer is
+bounded.
+"""
 _OUTLINE_SIDES = 32
 """Sides of a polygon around a projection: around an ellipse it has 0.3 % more area."""
 
 
 @dataclass(frozen=True, eq=False)
 class Inconsistency:
-    """Where the measurements contradict the model; arrays of the shape () for a single run, or (B,).
+    """Where the measurements contradict the model; arrays of the shape () for a single run, or
+    (B,).
 
     Parameters
     ----------
     step : ndarray of int
         Step whose measurement made the set empty; -1 if the set is not empty.
     output : ndarray of int
-        Output whose bounds made it empty, from 0, after the outputs before it. For noise in a set, the row of
-        the normals of the polytope (of a polygon V, `V.polytope().normals`), or of its projection on the measured
-        outputs. 0 if the set is not empty.
+        Output whose bounds made it empty, from 0, after the outputs before it. For noise in a set,
+        the row of the normals of the polytope (of a polygon V, `V.polytope().normals`), or of its
+        projection on the measured outputs. 0 if the set is not empty.
     excess : ndarray
-        Minimum enlargement of these bounds, all others unchanged, for which a state exists, in the unit of the output;
-        0 if the set is not empty.
+        Minimum enlargement of these bounds, all others unchanged, for which a state exists, in the
+        unit of the output; 0 if the set is not empty.
     """
 
     step: Integers
@@ -56,9 +63,11 @@ class Inconsistency:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Estimate:
-    """The sets of possible states of all runs at a step; with `single` there is one run, without an axis of runs.
+    """The sets of possible states of all runs at a step; with `single` there is one run, without an
+    axis of runs.
 
-    They result from the `initial` set and the first `count` of the `events`, steps and measurements.
+    They result from the `initial` set and the first `count` of the `events`, steps and
+    measurements.
     """
 
     step: int
@@ -70,9 +79,13 @@ class Estimate:
     count: int
 
     def __repr__(self) -> str:
-        head, ends = f"<estimate of {self.states} states at step {self.step}:", np.stack(self._hull, axis=-1)
+        head = f"<estimate of {self.states} states at step {self.step}:"
+        ends = np.stack(self._hull, axis=-1)
         if not self.single:
-            return f"{head} {len(ends)} runs, {int(self.is_empty.sum())} of them without a possible state>"
+            return (
+                f"{head} {len(ends)} runs, {int(self.is_empty.sum())} of them without a possible "
+                "state>"
+            )
         bounds = ", ".join(f"{low:.6g} to {high:.6g}" for low, high in ends)
         return f"{head} {'no state is possible' if self.is_empty else bounds}>"
 
@@ -83,18 +96,20 @@ class Estimate:
 
     @property
     def reduced(self) -> Flags:
-        """Whether the set is larger than the exact one: of a bounded number of facets, or of the last steps only.
+        """Whether the set is larger than the exact one: of a bounded number of facets, or of the
+        last steps only.
 
         Shape () or (B,). Polygons of two states are exact up to 512 vertices, and not counted here.
         """
         return np.asarray(self._runs(self.sets.reduced))
 
     def excess_widths(self) -> Floats:
-        """Return by how much the width of the set along each state exceeds the exact one, shape (n,) or (B, n).
+        """Return by how much the width of the set along each state exceeds the exact one, shape
+        (n,) or (B, n).
 
-        2 n linear programs over the whole record for each reduced run; the exact widths are at most 1e-7 of a state
-        smaller than those that they find. 0 for other runs, and NaN for the empty set and where a program has no
-        solution.
+        2 n linear programs over the whole record for each reduced run; the exact widths are at most
+        1e-7 of a state smaller than those that they find. 0 for other runs, and NaN for the empty
+        set and where a program has no solution.
 
         Raises
         ------
@@ -105,14 +120,17 @@ class Estimate:
         excess = np.where(np.isnan(lower), np.nan, 0.0)
         for run in np.flatnonzero(np.atleast_1d(self.reduced) & ~np.atleast_1d(self.is_empty)):
             if len(self.events) < self.count:
-                raise ValueError(f"exact widths are known for {MAX_RECORD} steps and measurements, not more")
+                raise ValueError(
+                    f"exact widths are known for {MAX_RECORD} steps and measurements, not more"
+                )
             hull = exact_hull(self.initial, self.events[: self.count], int(run), self.step)
             excess[run] = np.maximum(upper[run] - lower[run] - (hull[1] - hull[0]), 0.0)
         return self._runs(excess)
 
     @property
     def polygons(self) -> ConvexPolygons:
-        """The sets of two states; rows of `vertices` after the `counts` of a run, which only a batch has, are NaN.
+        """The sets of two states; rows of `vertices` after the `counts` of a run, which only a
+        batch has, are NaN.
 
         Raises
         ------
@@ -120,7 +138,11 @@ class Estimate:
             If the system has another number of states.
         """
         if not isinstance(self.sets, Polygons):
-            instead = ".polytopes" if isinstance(self.sets, Polytopes) else ".lower, .upper or .output_hull"
+            instead = (
+                ".polytopes"
+                if isinstance(self.sets, Polytopes)
+                else ".lower, .upper or .output_hull"
+            )
             raise ValueError(f"the set has {self.states} states, not two: use {instead}")
         counts = self.sets.counts
         used = np.arange(counts.max(initial=0)) < counts[:, None]
@@ -141,11 +163,14 @@ class Estimate:
             return tuple(member.polytope for member in self.sets.members)
         if not isinstance(self.sets, Polygons):
             raise ValueError(
-                f"sets of {self.states} states have too many facets for a polytope, at most {MAX_POLYTOPE_STATES} "
-                "states are possible: use .lower, .upper or .output_hull"
+                f"sets of {self.states} states have too many facets for a polytope, at most "
+                f"{MAX_POLYTOPE_STATES} states are possible: use .lower, .upper or .output_hull"
             )
         pairs = zip(self.sets.vertices, self.sets.counts, strict=True)
-        return tuple(Polytope.from_vertices(points[:count]) if count else Polytope.empty(2) for points, count in pairs)
+        return tuple(
+            Polytope.from_vertices(points[:count]) if count else Polytope.empty(2)
+            for points, count in pairs
+        )
 
     @property
     def lower(self) -> Floats:
@@ -158,7 +183,8 @@ class Estimate:
         return self._hull[1]
 
     def chebyshev_centre(self) -> Floats:
-        """Return the centre of a largest ball in the set, shape (n,) or (B, n); NaN for the empty set.
+        """Return the centre of a largest ball in the set, shape (n,) or (B, n); NaN for the empty
+        set.
 
         Raises
         ------
@@ -168,7 +194,8 @@ class Estimate:
         return self._runs(self.sets.chebyshev_centres())
 
     def output_hull(self, matrix: ArrayLike) -> tuple[Floats, Floats]:
-        """Return the minimum and the maximum values of matrix x, each of shape (m,) or (B, m); NaN for the empty set.
+        """Return the minimum and the maximum values of matrix x, each of shape (m,) or (B, m); NaN
+        for the empty set.
 
         Raises
         ------
@@ -183,14 +210,17 @@ class Estimate:
     def to_dict(self) -> dict[str, Any]:
         """Return step, bounds and, up to four states, the vertices, as Python numbers and lists.
 
-        The keys are `step`, `is_empty`, `lower`, `upper` and `vertices`. The bounds of the empty set are None, and its
-        vertices are an empty list. In a batch all values but the step are lists with a member for each run.
+        The keys are `step`, `is_empty`, `lower`, `upper` and `vertices`. The bounds of the empty
+        set are None, and its vertices are an empty list. In a batch all values but the step are
+        lists with a member for each run.
         """
         lower = np.atleast_2d(self.lower)
         is_empty: Flags = np.asarray(np.isnan(lower).any(axis=1))
         columns: dict[str, list[Any]] = {"is_empty": is_empty.tolist()}
         for name, ends in (("lower", lower), ("upper", np.atleast_2d(self.upper))):
-            columns[name] = [None if empty else row.tolist() for row, empty in zip(ends, is_empty, strict=True)]
+            columns[name] = [
+                None if empty else row.tolist() for row, empty in zip(ends, is_empty, strict=True)
+            ]
         if not isinstance(self.sets, Windows):
             columns["vertices"] = [points.tolist() for points in self._vertices()]
         if self.single:
@@ -198,10 +228,11 @@ class Estimate:
         return {"step": self.step, **columns}
 
     def plot(self, ax: Any = None, states: tuple[int, int] = (0, 1), **style: Any) -> list[Any]:
-        """Fill the projections of the sets on the plane of two states; return the artists, one for each set.
+        """Fill the projections of the sets on the plane of two states; return the artists, one for
+        each set.
 
-        Of five and more states the picture is a polygon of 32 sides that contains the projection, from a linear
-        program each. Empty sets have no artist.
+        Of five and more states the picture is a polygon of 32 sides that contains the projection,
+        from a linear program each. Empty sets have no artist.
 
         Parameters
         ----------
@@ -219,7 +250,10 @@ class Estimate:
         """
         numbers = [number for number in np.ravel(states).tolist() if number in range(self.states)]
         if np.shape(states) != (2,) or len(set(numbers)) != 2:
-            raise ValueError(f"states must be two different numbers from 0 to {self.states - 1}: got {shown(states)}")
+            raise ValueError(
+                f"states must be two different numbers from 0 to {self.states - 1}: got "
+                f"{shown(states)}"
+            )
         return draw_polygons(ax, self._outlines(numbers), style)
 
     def _vertices(self) -> list[Floats]:
@@ -233,13 +267,17 @@ class Estimate:
         """Return the polygon of each run in the plane of two states, shape (m, 2)."""
         if not isinstance(self.sets, Windows):
             return [
-                ConvexPolygons.from_points(points[:, numbers]).polygon() if len(points) else np.zeros((0, 2))
+                ConvexPolygons.from_points(points[:, numbers]).polygon()
+                if len(points)
+                else np.zeros((0, 2))
                 for points in self._vertices()
             ]
         lower, upper = (np.atleast_2d(end)[:, numbers] for end in self._hull)
         widths = np.nanmax(np.where(upper > lower, upper - lower, 0.0), axis=0)
         angles = np.linspace(0.0, 2.0 * np.pi, _OUTLINE_SIDES, endpoint=False)
-        normals = np.column_stack([np.cos(angles), np.sin(angles)]) / np.where(widths > 0.0, widths, 1.0)
+        normals = np.column_stack([np.cos(angles), np.sin(angles)]) / np.where(
+            widths > 0.0, widths, 1.0
+        )
         directions = np.zeros((len(normals), self.states))
         directions[:, numbers] = normals
         heights = np.array([self.sets.support(direction) for direction in directions]).T
@@ -262,11 +300,12 @@ class Estimate:
 class LinearObserver:
     """Exact sets of the states of x+ = A x + B u + c + w, y = C x + v, with w in W and v in V.
 
-    Two states: polygons, compiled, batched over runs. One, three and four states: polytopes, each run after the other.
-    A polytope of more than `max_facets` facets is replaced by a larger one with fewer, so that the time of a step is
-    bounded. Five and more states: a zonotope that contains the set is carried, and the bounds of an estimate
-    are those of linear programs over the last `window` steps, solved when they are asked for.
-    `Estimate.reduced` and `excess_widths` give the effect.
+    Two states: polygons, compiled, batched over runs. One, three and four states: polytopes, each
+    run after the other. A polytope of more than `max_facets` facets is replaced by a larger one
+    with fewer, so that the time of a step is bounded. Five and more states: a zonotope that
+    contains the set is carried, and the bounds of an estimate are those of linear programs over the
+    last `window` steps, solved when they are asked for. `Estimate.reduced` and `excess_widths` give
+    the effect.
 
     Parameters
     ----------
@@ -275,10 +314,13 @@ class LinearObserver:
     output_matrix : array_like, shape (q, n) or (K, q, n)
         C.
     initial : ConvexPolygons, Polytope or Zonotope
-        Set of the state at step 0, before its measurement; for two states also one polygon for each run, shape (B,).
-    noise : array_like, shape (), (q,) or (K, q), or ConvexPolygons, Polytope or Zonotope, or a sequence of these sets
+        Set of the state at step 0, before its measurement; for two states also one polygon for each
+        run, shape (B,).
+    noise : array_like, shape (), (q,) or (K, q), or ConvexPolygons, Polytope or Zonotope, or a
+    sequence of these sets
         Half-widths of the box V, those of each step, V, or V of each step.
-    disturbance : ConvexPolygons, Polytope or Zonotope, or a sequence of them, or array_like, shape (n,) or (K, n)
+    disturbance : ConvexPolygons, Polytope or Zonotope, or a sequence of them, or array_like, shape
+    (n,) or (K, n)
         W, W of each step, or half-widths of a box W; without it (optional) the point 0.
     input_matrix : array_like, shape (n, p) or (K, n, p), optional
         B.
@@ -287,29 +329,32 @@ class LinearObserver:
     runs : int, optional
         Number B of runs. Without it there is one run, and its arrays have no axis of runs.
     max_facets : int or None, optional
-        Maximum number of facets of a polytope after a measurement, at least 2n; it then has at most 700 vertices. None
-        keeps the sets exact; a set of more than 5000 vertices is then an ArithmeticError. Not used for more than four
-        states.
+        Maximum number of facets of a polytope after a measurement, at least 2n; it then has at most
+        700 vertices. None keeps the sets exact; a set of more than 5000 vertices is then an
+        ArithmeticError. Not used for more than four states.
     window : int or None, optional
-        Number of steps of the linear programs of five and more states. None is the whole record: bounds are then
-        exact, and their time grows with the record. Not used for fewer states.
+        Number of steps of the linear programs of five and more states. None is the whole record:
+        bounds are then exact, and their time grows with the record. Not used for fewer states.
 
     Raises
     ------
     TypeError, ValueError
-        If a set or a number has a wrong type, shapes do not agree, a number is not finite, or a set is empty.
+        If a set or a number has a wrong type, shapes do not agree, a number is not finite, or a set
+        is empty.
 
     Notes
     -----
-    The computed sets contain the exact ones. Without reduction they are larger by a few ulp (two states), by 1e-11 of
-    the coordinates (polytopes) or by 1e-7 of the widths (programs), so that errors exactly at their bounds do not lose
-    the true state. Polygons of more than 512 vertices are reduced outward.
+    The computed sets contain the exact ones. Without reduction they are larger by a few ulp (two
+    states), by 1e-11 of the coordinates (polytopes) or by 1e-7 of the widths (programs), so that
+    errors exactly at their bounds do not lose the true state. Polygons of more than 512 vertices
+    are reduced outward.
 
-    A bound of five and more states is a sum that is an upper bound for all multipliers of the measurements; the solver
-    (HiGHS) only proposes the multipliers, so that its tolerances enlarge a bound and never make it wrong. Where it
-    fails, the bound is that of the carried zonotope. That no state is possible is proved in the same way, by one
-    program for each estimate that is asked for it: a contradiction that the zonotope does not show is found if
-    `inconsistency`, `is_empty` or a bound is asked for within `window` steps.
+    A bound of five and more states is a sum that is an upper bound for all multipliers of the
+    measurements; the solver (HiGHS) only proposes the multipliers, so that its tolerances enlarge a
+    bound and never make it wrong. Where it fails, the bound is that of the carried zonotope. That
+    no state is possible is proved in the same way, by one program for each estimate that is asked
+    for it: a contradiction that the zonotope does not show is found if `inconsistency`, `is_empty`
+    or a bound is asked for within `window` steps.
 
     Examples
     --------
@@ -339,7 +384,11 @@ class LinearObserver:
         COUNT.need("the number of states", n)
         self._a = _by_step("state_matrix", state_matrix, n, n)
         self._c = _by_step("output_matrix", output_matrix, "q", n)
-        self._b = np.zeros((n, 0)) if input_matrix is None else _by_step("input_matrix", input_matrix, n, "p")
+        self._b = (
+            np.zeros((n, 0))
+            if input_matrix is None
+            else _by_step("input_matrix", input_matrix, n, "p")
+        )
         self._offset = np.zeros(n) if offset is None else _by_step("offset", offset, n)
         self.outputs, self.inputs = self._c.shape[-2], self._b.shape[-1]
         if runs is not None:
@@ -361,7 +410,11 @@ class LinearObserver:
         self._count = 0
         self._sets = self._first_sets()
         self.step = 0
-        self._empty = np.full(self._runs, -1), np.zeros(self._runs, dtype=np.int64), np.zeros(self._runs)
+        self._empty = (
+            np.full(self._runs, -1),
+            np.zeros(self._runs, dtype=np.int64),
+            np.zeros(self._runs),
+        )
 
     def _first_sets(self) -> Sets:
         if self.states == 2:
@@ -391,8 +444,8 @@ class LinearObserver:
         Raises
         ------
         TypeError, ValueError
-            If the inputs have another shape or are not finite, the disturbance is not such a set of n coordinates, or
-            a matrix or a disturbance for this step is missing.
+            If the inputs have another shape or are not finite, the disturbance is not such a set of
+            n coordinates, or a matrix or a disturbance for this step is missing.
         ArithmeticError
             If a polytope has more than 5000 vertices and no `max_facets`.
         """
@@ -410,7 +463,8 @@ class LinearObserver:
         Parameters
         ----------
         measurement : array_like, shape (q,) or (B, q), or a number for one output
-            y; NaN or None is a missing measurement, and None in place of the array that all are missing.
+            y; NaN or None is a missing measurement, and None in place of the array that all are
+            missing.
 
         Raises
         ------
@@ -423,7 +477,9 @@ class LinearObserver:
         for runs, strips in self._noise.at("noise", self.step).strips(matrix, y):
             self._cut(runs, strips)
 
-    def cut(self, normals: ArrayLike, lower: ArrayLike = -np.inf, upper: ArrayLike = np.inf) -> None:
+    def cut(
+        self, normals: ArrayLike, lower: ArrayLike = -np.inf, upper: ArrayLike = np.inf
+    ) -> None:
         """Cut the sets of this step by strips, from what else is known of the states.
 
         Parameters
@@ -442,18 +498,23 @@ class LinearObserver:
         -----
         `Inconsistency.output` is the row of `normals` if these strips make the set empty.
         """
-        rows = finite_values("normals", np.atleast_2d(real_values("normals", normals)), "r", self.states)
+        rows = finite_values(
+            "normals", np.atleast_2d(real_values("normals", normals)), "r", self.states
+        )
         shapes = ((), (len(rows),), (self._runs, len(rows)))
         ends = []
         for name, values in (("lower", lower), ("upper", upper)):
             end = bound_values(name, values, *(shapes[:2] if self._single else shapes))
             ends.append(np.array(np.broadcast_to(end, (self._runs, len(rows)))))
         sizes = [np.where(np.isinf(end), 0.0, np.abs(end)) for end in ends]
-        self._cut(np.ones(self._runs, dtype=bool), Strips(rows, ends[0], ends[1], np.maximum(*sizes)))
+        self._cut(
+            np.ones(self._runs, dtype=bool), Strips(rows, ends[0], ends[1], np.maximum(*sizes))
+        )
 
     def _cut(self, runs: Flags, strips: Strips) -> None:
         exists = runs[:, None] & ~np.isnan(strips.lower)
-        lower, upper = np.where(exists, strips.lower, -np.inf), np.where(exists, strips.upper, np.inf)
+        lower = np.where(exists, strips.lower, -np.inf)
+        upper = np.where(exists, strips.upper, np.inf)
         excess = np.zeros((self._runs, len(strips.normals)))
         before = self._sets.is_known_empty
         strips = Strips(strips.normals, lower, upper, np.where(exists, strips.terms, 0.0))
@@ -480,7 +541,9 @@ class LinearObserver:
 
     @property
     def inconsistency(self) -> Inconsistency:
-        """Where the measurements contradict the model: of five and more states, by programs over the last steps."""
+        """Where the measurements contradict the model: of five and more states, by programs over
+        the last steps.
+        """
         if isinstance(self._sets, Windows):
             step, output, excess = self._empty
             for run in np.flatnonzero(step == -1):
@@ -492,7 +555,9 @@ class LinearObserver:
         parts = [part[0] if self._single else part.copy() for part in self._empty]
         return Inconsistency(*(np.asarray(part) for part in parts))
 
-    def run(self, measurements: ArrayLike | Sequence[Any], inputs: ArrayLike | None = None) -> list[Estimate]:
+    def run(
+        self, measurements: ArrayLike | Sequence[Any], inputs: ArrayLike | None = None
+    ) -> list[Estimate]:
         """Process the measurements of several steps; return the estimate after each of them.
 
         Parameters
@@ -521,12 +586,14 @@ class LinearObserver:
             estimates.append(self.estimate())
         return estimates
 
-    def smooth(self, estimates: Sequence[Estimate], inputs: ArrayLike | None = None) -> list[Estimate]:
+    def smooth(
+        self, estimates: Sequence[Estimate], inputs: ArrayLike | None = None
+    ) -> list[Estimate]:
         """Return the sets of earlier states given also the later measurements.
 
-        The exact backward pass: a state is possible if it is in its own estimate and leads, for some disturbance, to a
-        possible state of the next step. Of five and more states, the programs of a step also have the measurements
-        of the next `window` steps.
+        The exact backward pass: a state is possible if it is in its own estimate and leads, for
+        some disturbance, to a possible state of the next step. Of five and more states, the
+        programs of a step also have the measurements of the next `window` steps.
 
         Parameters
         ----------
@@ -554,10 +621,15 @@ class LinearObserver:
     def _motion(self, step: int, inputs: ArrayLike | None) -> Motion:
         matrix = self._at(self._a, "state_matrix", step)
         offset = self._at(self._offset, "offset", step, 1)[None]
-        w = self._replaced[step] if step in self._replaced else self._disturbance.at("disturbance", step)
+        w = (
+            self._replaced[step]
+            if step in self._replaced
+            else self._disturbance.at("disturbance", step)
+        )
         if inputs is None:
             return Motion(matrix, offset, np.abs(offset), w)
-        u, b = self._rows("inputs", inputs, self.inputs), self._at(self._b, "input_matrix", step)
+        u = self._rows("inputs", inputs, self.inputs)
+        b = self._at(self._b, "input_matrix", step)
         return Motion(matrix, u @ b.T + offset, np.abs(u) @ np.abs(b).T + np.abs(offset), w)
 
     def _rows(self, name: str, values: ArrayLike, size: int, *, missing: bool = False) -> Floats:
@@ -567,9 +639,13 @@ class LinearObserver:
             rows = rows[None]
         shapes = [(size,)] if self._single else [(size,), (self._runs, size)]
         if rows.shape not in shapes:
-            raise ValueError(f"{name} must have the shape {' or '.join(map(str, shapes))}: got {rows.shape}")
+            raise ValueError(
+                f"{name} must have the shape {' or '.join(map(str, shapes))}: got {rows.shape}"
+            )
         if np.isinf(rows).any() or (not missing and np.isnan(rows).any()):
-            raise ValueError(f"{name} must be finite{' or NaN' if missing else ''}: got {shown(values)}")
+            raise ValueError(
+                f"{name} must be finite{' or NaN' if missing else ''}: got {shown(values)}"
+            )
         return np.broadcast_to(rows, (self._runs, size))
 
     def _at(self, values: Floats, name: str, step: int, rank: int = 2) -> Floats:
@@ -617,7 +693,9 @@ class _Noise:
         return cls(np.eye(len(half)), -half, half)
 
     def strips(self, matrix: Floats, y: Floats) -> list[tuple[Flags, Strips]]:
-        """Return the strips of C x = y - v for groups of runs in which the same outputs are measured."""
+        """Return the strips of C x = y - v for groups of runs in which the same outputs are
+        measured.
+        """
         known = ~np.isnan(y)
         if self.polytope is None:
             strips = Strips(matrix, y - self.upper, y - self.lower, np.abs(y) + self.upper)
@@ -626,14 +704,25 @@ class _Noise:
         for pattern in np.unique(known, axis=0):
             runs = (known == pattern).all(axis=1)
             if pattern.all():
-                rows, upper = self.rows, self.upper
+                rows = self.rows
+                upper = self.upper
             elif pattern.any():  # the errors of the measured outputs alone
                 rows, upper = self.polytope.project(np.flatnonzero(pattern).tolist()).constraints()
             else:
                 continue
             heights = y[:, pattern] @ rows.T
             terms = np.abs(np.nan_to_num(y[:, pattern])) @ np.abs(rows).T + np.abs(upper)
-            groups.append((runs, Strips(rows @ matrix[pattern], heights - upper, np.full_like(heights, np.inf), terms)))
+            groups.append(
+                (
+                    runs,
+                    Strips(
+                        rows @ matrix[pattern],
+                        heights - upper,
+                        np.full_like(heights, np.inf),
+                        terms,
+                    ),
+                )
+            )
         return groups
 
 
@@ -641,20 +730,24 @@ def _noises(noise: ArrayLike | Set | Sequence[Set], outputs: int) -> _Schedule[_
     """Return V, or V of each step."""
     sets = _sets_of(noise)
     if sets is not None:
-        return _Schedule(tuple(_Noise.of_set(each, outputs) for each in sets), isinstance(noise, Sequence))
+        return _Schedule(
+            tuple(_Noise.of_set(each, outputs) for each in sets), isinstance(noise, Sequence)
+        )
     values: Any = noise
     half = finite_values("noise", values, "...")
     is_possible = half.shape in ((), (outputs,)) or half.shape[1:] == (outputs,)
     if not is_possible or not half.size or (half < 0.0).any():
         raise ValueError(
-            f"noise must be half-widths of at least 0, a number or of shape ({outputs},) or (K, {outputs}): "
-            f"got {shown(noise)}"
+            f"noise must be half-widths of at least 0, a number or of shape ({outputs},) or (K, "
+            f"{outputs}): got {shown(noise)}"
         )
     rows = np.broadcast_to(half, (len(half) if half.ndim == 2 else 1, outputs))
     return _Schedule(tuple(map(_Noise.of_box, rows)), half.ndim == 2)
 
 
-def _disturbances(disturbance: ArrayLike | Set | Sequence[Set] | None, states: int) -> _Schedule[Set]:
+def _disturbances(
+    disturbance: ArrayLike | Set | Sequence[Set] | None, states: int
+) -> _Schedule[Set]:
     """Return W, or W of each step."""
     if disturbance is None:
         return _Schedule((Zonotope(np.zeros(states), []),), varies=False)
@@ -670,8 +763,8 @@ def _disturbances(disturbance: ArrayLike | Set | Sequence[Set] | None, states: i
     is_possible = half.shape == (states,) or half.shape[1:] == (states,)
     if not is_possible or not half.size or (half < 0.0).any():
         raise ValueError(
-            f"disturbance must be a set, or half-widths of at least 0 of shape ({states},) or (K, {states}): "
-            f"got {shown(disturbance)}"
+            f"disturbance must be a set, or half-widths of at least 0 of shape ({states},) or (K, "
+            f"{states}): got {shown(disturbance)}"
         )
     return _Schedule(tuple(Zonotope.box(-row, row) for row in np.atleast_2d(half)), half.ndim == 2)
 
@@ -698,13 +791,19 @@ def _with_nan(values: Any) -> Any:
 
 def _need_set(name: str, value: object, space: int, shape: tuple[int, ...] = ()) -> None:
     if not isinstance(value, ConvexPolygons | Polytope | Zonotope):
-        raise TypeError(f"{name} must be a ConvexPolygons, a Polytope or a Zonotope: got {type(value).__name__}")
+        raise TypeError(
+            f"{name} must be a ConvexPolygons, a Polytope or a Zonotope: got {type(value).__name__}"
+        )
     found = 2 if isinstance(value, ConvexPolygons) else value.space
     if found != space:
-        raise ValueError(f"{name} must have {space} coordinates, one for each state or output: got {found}")
+        raise ValueError(
+            f"{name} must have {space} coordinates, one for each state or output: got {found}"
+        )
     if isinstance(value, ConvexPolygons) and value.shape not in ((), shape):
         batch = f" or a batch of shape {shape}" if shape else ""
-        raise ValueError(f"{name} must be a single polygon{batch}: got a batch of shape {value.shape}")
+        raise ValueError(
+            f"{name} must be a single polygon{batch}: got a batch of shape {value.shape}"
+        )
     if not isinstance(value, Zonotope) and np.any(value.is_empty):
         raise ValueError(f"{name} must not be empty")
     if isinstance(value, Polytope) and not value.is_bounded:
@@ -715,7 +814,9 @@ def _series(inputs: ArrayLike | None, steps: int) -> Floats | None:
     """Return inputs of at least a number of steps."""
     rows = None if inputs is None else real_values("inputs", inputs)
     if rows is not None and (not rows.ndim or len(rows) < steps):
-        raise ValueError(f"inputs must have a row for each of {steps} steps: got the shape {rows.shape}")
+        raise ValueError(
+            f"inputs must have a row for each of {steps} steps: got the shape {rows.shape}"
+        )
     return rows
 
 

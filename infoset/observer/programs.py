@@ -1,4 +1,6 @@
-"""Bounds of a state over all motions that agree with a record: linear programs, and sums that prove their bounds."""
+"""Bounds of a state over all motions that agree with a record: linear programs, and sums that prove
+their bounds.
+"""
 
 from __future__ import annotations
 
@@ -22,12 +24,16 @@ from infoset.observer.sets import Motion, Set, polytope_of, sizes_of
 EPSILON = float(np.finfo(np.float64).eps)
 """Relative rounding error of an operation, twice the half unit in the last place."""
 BLOCK = 25
-"""Stages after which the state is an unknown, so that long programs stay sparse: more than two windows of 10 steps.
-From 10 to 50, programs of 41 and 400 steps take the same time to 20 %."""
+"""Stages after which the state is an unknown, so that long programs stay sparse: more than two
+windows of 10 steps. From 10 to 50, programs of 41 and 400 steps take the same time to 20 %."""
 _OPTIONS = HIGHS | {"presolve": False}
-"""Options of HiGHS. Presolving finds nothing in dense rows: without it, programs of 20 states take half the time."""
+"""Options of HiGHS. Presolving finds nothing in dense rows: without it, programs of 20 states take
+half the time.
+"""
 _NO_ROW = 128.0 * UNSURE
-"""Length of a row of a strip, relative to its terms, below which it consists of rounding errors of its products."""
+"""Length of a row of a strip, relative to its terms, below which it consists of rounding errors of
+its products.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,14 +66,23 @@ class Stage:
     def at_first(cls, step: int, prior: Set) -> Stage:
         """Return a stage without measurements."""
         none = np.zeros(0)
-        return cls(step, prior, np.zeros((0, len(sizes_of(prior)))), none, none, np.zeros(0, dtype=np.int64))
+        return cls(
+            step,
+            prior,
+            np.zeros((0, len(sizes_of(prior)))),
+            none,
+            none,
+            np.zeros(0, dtype=np.int64),
+        )
 
     @cached_property
     def sizes(self) -> Floats:
         """Maximum coordinates of the prior, shape (n,)."""
         return sizes_of(self.prior)
 
-    def with_strips(self, normals: Floats, lower: Floats, upper: Floats, outputs: Integers) -> Stage:
+    def with_strips(
+        self, normals: Floats, lower: Floats, upper: Floats, outputs: Integers
+    ) -> Stage:
         """Return the stage with more strips."""
         return replace(
             self,
@@ -127,17 +142,21 @@ class _Table:
         """Return the matrix."""
         none = [np.zeros(0)]
         values = np.concatenate([*none, *self._values])
-        where = [np.concatenate([*none, *numbers]).astype(np.int64) for numbers in (self._row, self._column)]
+        where = [
+            np.concatenate([*none, *numbers]).astype(np.int64)
+            for numbers in (self._row, self._column)
+        ]
         return sp.csr_array((values, (where[0], where[1])), shape=(self.rows, columns))
 
 
 class Program:
-    """The motions through successive stages: bounds of the state at one of them, and whether there is a motion.
+    """The motions through successive stages: bounds of the state at one of them, and whether there
+    is a motion.
 
-    The unknowns are coefficients of the generators of the first prior and of the disturbances (of a polytope: of its
-    vertices, with the sum 1), and the states of every `BLOCK`-th stage. The solver only proposes multipliers of the
-    strips: a sum that is an upper bound for all multipliers is what is returned, so that no result depends on the
-    tolerances of the solver.
+    The unknowns are coefficients of the generators of the first prior and of the disturbances (of a
+    polytope: of its vertices, with the sum 1), and the states of every `BLOCK`-th stage. The solver
+    only proposes multipliers of the strips: a sum that is an upper bound for all multipliers is
+    what is returned, so that no result depends on the tolerances of the solver.
 
     Parameters
     ----------
@@ -161,13 +180,17 @@ class Program:
         length = float(np.abs(cost).max(initial=0.0))
         if length == 0.0:
             return self._sum(direction, np.zeros(len(lines.levels)))
-        optimum = linprog(goal / length, None, None, lines.rows, lines.levels, lines.limits, options=_OPTIONS)
+        optimum = linprog(
+            goal / length, None, None, lines.rows, lines.levels, lines.limits, options=_OPTIONS
+        )
         if optimum.status != 0:
             return math.inf
         return self._sum(direction, -length * optimum.eqlin.marginals)
 
     def is_infeasible(self) -> bool:
-        """Whether no motion agrees with the strips: proved by multipliers of the program of the least enlargements."""
+        """Whether no motion agrees with the strips: proved by multipliers of the program of the
+        least enlargements.
+        """
         lines = self._lines
         count = int(sum(len(numbers) for numbers, _ in lines.strips))
         if not count:
@@ -183,11 +206,13 @@ class Program:
         return self._sum(np.zeros(self._states), -optimum.eqlin.marginals) < 0.0
 
     def _sum(self, direction: Floats, marginals: Floats) -> float:
-        """Return an upper bound of direction . x for any multipliers of the rows of the program, by weak duality.
+        """Return an upper bound of direction . x for any multipliers of the rows of the program, by
+        weak duality.
 
-        From the last stage to the first one: p . x is at most (p - C' m) . x + m . ends for multipliers m of strips C,
-        and p . (A x + s + w) is at most (A' p) . x + p . s + the height of W along p. At the stage of the state, its
-        direction is added to p. All rounding errors are relative to terms of bounded states, and are added.
+        From the last stage to the first one: p . x is at most (p - C' m) . x + m . ends for
+        multipliers m of strips C, and p . (A x + s + w) is at most (A' p) . x + p . s + the height
+        of W along p. At the stage of the state, its direction is added to p. All rounding errors
+        are relative to terms of bounded states, and are added.
         """
         multipliers = self._multipliers(marginals)
         parts = list[float]()
@@ -222,7 +247,9 @@ class Program:
         return math.fsum(parts)
 
     def _multipliers(self, marginals: Floats) -> list[Floats]:
-        """Return the multipliers of the strips of each stage, shape (r,), from those of the rows of the program."""
+        """Return the multipliers of the strips of each stage, shape (r,), from those of the rows of
+        the program.
+        """
         multipliers = []
         start = 0
         for stage, rows in zip(self._stages, self._lines.strips, strict=True):
@@ -339,7 +366,9 @@ def _lines_of(stages: Sequence[Stage], at: int) -> _Lines:
 
 
 class _Generators(NamedTuple):
-    """Generators of a set, shape (g, n), the centre, and whether the coefficients are >= 0 with the sum 1."""
+    """Generators of a set, shape (g, n), the centre, and whether the coefficients are >= 0 with the
+    sum 1.
+    """
 
     generators: Floats
     centre: Floats

@@ -1,4 +1,6 @@
-"""The sets of a `LinearObserver`: batches of polygons for two states, polytopes for other numbers of states."""
+"""The sets of a `LinearObserver`: batches of polygons for two states, polytopes for other numbers
+of states.
+"""
 
 from __future__ import annotations
 
@@ -14,13 +16,22 @@ from infoset.geometry.convex_polygons import ConvexPolygons
 from infoset.geometry.polytope import Polytope
 from infoset.geometry.tolerances import REDUCED, SNAP
 from infoset.geometry.zonotope import Zonotope
-from infoset.observer.steps import Batch, Move, Strips, cut_to_preimage, predict_all, support_all, update_all
+from infoset.observer.steps import (
+    Batch,
+    Move,
+    Strips,
+    cut_to_preimage,
+    predict_all,
+    support_all,
+    update_all,
+)
 
 Set = ConvexPolygons | Polytope | Zonotope
 
 POLYTOPE_SLACK = SNAP
-"""Enlargement of polytopes, relative to the terms of normal . x of a measurement, or to the widths of a prediction: the
-distance from a facet within which points are its vertices, so that the tip of a sharp corner may be missing."""
+"""Enlargement of polytopes, relative to the terms of normal . x of a measurement, or to the widths
+of a prediction: the distance from a facet within which points are its vertices, so that the tip of
+a sharp corner may be missing."""
 MAX_POLYTOPE_VERTICES = 5000
 """A polytope with more vertices takes minutes a step."""
 _MAX_VERTICES = 700
@@ -32,8 +43,8 @@ _TINY = float(np.finfo(np.float64).tiny)
 class Motion:
     """A step x+ = matrix x + shift + w, with w in the `disturbance`.
 
-    `shifts`, shape (B, n) or (1, n), are B u + c, and `terms` of the same shape the sums of the sizes of their terms,
-    which determine rounding errors.
+    `shifts`, shape (B, n) or (1, n), are B u + c, and `terms` of the same shape the sums of the
+    sizes of their terms, which determine rounding errors.
     """
 
     matrix: Floats
@@ -48,7 +59,8 @@ class Motion:
         return replace(self, shifts=self.shifts[run : run + 1], terms=self.terms[run : run + 1])
 
     def sums_of_terms(self, sizes: Floats) -> Floats:
-        """Return the sums of the sizes of the terms of a state after the step of one run, shape (n,).
+        """Return the sums of the sizes of the terms of a state after the step of one run, shape
+        (n,).
 
         `sizes`, shape (n,), bound the state before it.
         """
@@ -80,7 +92,9 @@ class Sets(Protocol):
         """Return the sets after a step; raise ArithmeticError if one has too many vertices."""
 
     def cut(self, strips: Strips, excess: Floats) -> Sets:
-        """Return the sets within the strips; `excess`, shape (B, r), receives the distance of a strip from the set."""
+        """Return the sets within the strips; `excess`, shape (B, r), receives the distance of a
+        strip from the set.
+        """
 
     def preimage_cut(self, later: Sets, motion: Motion) -> Sets:
         """Return the states that lead to a state of the later set for some disturbance."""
@@ -100,7 +114,9 @@ class Polygons(Batch):
         """Return the same set for all runs, or the members of a batch of `runs` polygons."""
         polygons = polygon_of(start)
         room = polygons.vertices.shape[-2]
-        vertices = np.array(np.broadcast_to(polygons.vertices, (runs, room, 2)))  # writable, as all sets: one kernel
+        vertices = np.array(
+            np.broadcast_to(polygons.vertices, (runs, room, 2))
+        )  # writable, as all sets: one kernel
         exact = cls(vertices, np.array(np.broadcast_to(polygons.counts, (runs,))))
         still = np.zeros((1, 2))
         # Sums of generators are rounded, as a true state on the boundary is.
@@ -123,18 +139,33 @@ class Polygons(Batch):
 
     def predicted(self, motion: Motion) -> Polygons:
         """Return the sets after a step."""
-        w, none = motion.disturbance, np.zeros((0, 2))
+        w = motion.disturbance
+        none = np.zeros((0, 2))
         if isinstance(w, Zonotope):
-            generators, other, centre = w.generators, none, w.centre
+            generators = w.generators
+            other = none
+            centre = w.centre
         else:
-            generators, other, centre = none, polygon_of(w).polygon(), np.zeros(2)
-        arrays = motion.matrix, motion.shifts + centre, motion.terms + np.abs(centre), generators, other
+            generators = none
+            other = polygon_of(w).polygon()
+            centre = np.zeros(2)
+        arrays = (
+            motion.matrix,
+            motion.shifts + centre,
+            motion.terms + np.abs(centre),
+            generators,
+            other,
+        )
         move = Move(*map(np.ascontiguousarray, arrays))  # kernels are compiled once
         return self._apply(predict_all, 2 * len(generators) + len(other) + 4, move)
 
     def cut(self, strips: Strips, excess: Floats) -> Polygons:
-        """Return the sets within the strips; `excess`, shape (B, r), receives the distance of a strip from the set."""
-        return self._apply(update_all, 2 * len(strips.normals), Strips(*map(np.ascontiguousarray, strips)), excess)
+        """Return the sets within the strips; `excess`, shape (B, r), receives the distance of a
+        strip from the set.
+        """
+        return self._apply(
+            update_all, 2 * len(strips.normals), Strips(*map(np.ascontiguousarray, strips)), excess
+        )
 
     def preimage_cut(self, later: Sets, motion: Motion) -> Polygons:
         """Return the states that lead to a state of the later set for some disturbance."""
@@ -164,7 +195,8 @@ class Polygons(Batch):
 class Member:
     """The set of one run as a polytope, of at most `max_facets` facets; None is no bound.
 
-    `reduced` is whether the set, or one that it was computed from, was replaced by a larger one with fewer facets.
+    `reduced` is whether the set, or one that it was computed from, was replaced by a larger one
+    with fewer facets.
     """
 
     polytope: Polytope
@@ -199,15 +231,16 @@ class Member:
         if self.max_facets is None:
             if vertices > MAX_POLYTOPE_VERTICES:
                 raise ArithmeticError(
-                    f"the exact set has {vertices} vertices, and at most {MAX_POLYTOPE_VERTICES} are possible; give "
-                    "max_facets for a larger set with fewer facets"
+                    f"the exact set has {vertices} vertices, and at most {MAX_POLYTOPE_VERTICES} "
+                    "are possible; give max_facets for a larger set with fewer facets"
                 )
             return self
         smaller = self.polytope.reduce_outward(self.max_facets, _MAX_VERTICES)
         return self if smaller is self.polytope else replace(self, polytope=smaller, reduced=True)
 
     def predicted(self, matrix: Floats, shift: Floats, terms: Floats, disturbance: Set) -> Member:
-        """Return the set of matrix x + shift + w; `terms` are the sums of the sizes of the terms of shift + w.
+        """Return the set of matrix x + shift + w; `terms` are the sums of the sizes of the terms of
+        shift + w.
 
         It is not reduced after the last sum: most of its facets go with the next measurement.
         """
@@ -232,13 +265,19 @@ class Member:
         return replace(moved, polytope=moved.polytope.enlarged(SUM_SLACK * terms + slack * widths))
 
     def cut(self, strips: Strips, run: int = 0) -> tuple[Member, Floats]:
-        """Return the part within strips, and the distances of strips from the set, shape (r,), if the part is empty."""
+        """Return the part within strips, and the distances of strips from the set, shape (r,), if
+        the part is empty.
+        """
         terms = np.abs(strips.normals) @ self.sizes + strips.terms[run]
-        # A row that is short in the units of the states counts like others; normals may have at most 1e60.
+        # A row that is short in the units of the states counts like others; normals may have at
+        # most 1e60.
         unit = np.ldexp(1.0, -np.frexp(np.maximum(terms, 1e-50))[1])
         normals = strips.normals * unit[:, None]
         excess = np.zeros(len(terms))
-        for slack in (POLYTOPE_SLACK, REDUCED):  # a layer that is thicker than rounding, where a flat set is left
+        for slack in (
+            POLYTOPE_SLACK,
+            REDUCED,
+        ):  # a layer that is thicker than rounding, where a flat set is left
             lower = (strips.lower[run] - slack * terms) * unit
             upper = (strips.upper[run] + slack * terms) * unit
             part = self.polytope.cut(normals, lower, upper)
@@ -255,7 +294,9 @@ class Member:
         return found.limited(), excess
 
     def _excess(self, normals: Floats, lower: Floats, upper: Floats) -> Floats:
-        """Return the distance, shape (r,), of the first strip that leaves nothing from what others leave; else 0."""
+        """Return the distance, shape (r,), of the first strip that leaves nothing from what others
+        leave; else 0.
+        """
         excess = np.zeros(len(normals))
         part = self.polytope
         for r, normal in enumerate(normals):
@@ -277,7 +318,14 @@ class Polytopes:
     def of(cls, start: Set, runs: int, max_facets: int | None, sizes: Floats) -> Polytopes:
         """Return the same set for all runs; `sizes`, shape (n,), are those of disturbances."""
         member = Member(polytope_of(start), max_facets).solid(sizes)
-        return cls((replace(member, polytope=member.polytope.enlarged(SUM_SLACK * member.sizes)).limited(),) * runs)
+        return cls(
+            (
+                replace(
+                    member, polytope=member.polytope.enlarged(SUM_SLACK * member.sizes)
+                ).limited(),
+            )
+            * runs
+        )
 
     @property
     def is_empty(self) -> Flags:
@@ -296,16 +344,23 @@ class Polytopes:
 
     def predicted(self, motion: Motion) -> Polytopes:
         """Return the sets after a step; raise ArithmeticError if one has too many vertices."""
-        w, shape = motion.disturbance, (len(self.members), len(motion.matrix))
+        w = motion.disturbance
+        shape = (len(self.members), len(motion.matrix))
         centre = w.centre if isinstance(w, Zonotope) else np.zeros(shape[1])
         shifts = np.broadcast_to(motion.shifts + centre, shape)
         terms = np.broadcast_to(motion.terms + sizes_of(w), shape)
         pairs = zip(self.members, shifts, terms, strict=True)
-        return Polytopes(tuple(member.predicted(motion.matrix, shift, term, w) for member, shift, term in pairs))
+        return Polytopes(
+            tuple(member.predicted(motion.matrix, shift, term, w) for member, shift, term in pairs)
+        )
 
     def cut(self, strips: Strips, excess: Floats) -> Polytopes:
-        """Return the sets within the strips; `excess`, shape (B, r), receives the distance of a strip from the set."""
-        members, distances = zip(*(member.cut(strips, b) for b, member in enumerate(self.members)), strict=True)
+        """Return the sets within the strips; `excess`, shape (B, r), receives the distance of a
+        strip from the set.
+        """
+        members, distances = zip(
+            *(member.cut(strips, b) for b, member in enumerate(self.members)), strict=True
+        )
         excess[:] = distances
         return Polytopes(members)
 
@@ -313,12 +368,16 @@ class Polytopes:
         """Return the states that lead to a state of the later set for some disturbance."""
         assert isinstance(later, Polytopes)
         results = []
-        for start, target in zip(self.members, later.predicted(motion.reversed_sum).members, strict=True):
+        for start, target in zip(
+            self.members, later.predicted(motion.reversed_sum).members, strict=True
+        ):
             rows, limits = target.polytope.constraints()
             # rows @ matrix is rounded, relative to these terms.
             terms = np.abs(rows) @ (np.abs(motion.matrix) @ start.sizes + target.sizes)
             open_ends = np.full((1, len(rows)), -np.inf)
-            member, _ = start.cut(Strips(rows @ motion.matrix, open_ends, limits[None], terms[None]))
+            member, _ = start.cut(
+                Strips(rows @ motion.matrix, open_ends, limits[None], terms[None])
+            )
             results.append(replace(member, reduced=member.reduced or target.reduced))
         return Polytopes(tuple(results))
 
@@ -327,9 +386,13 @@ class Polytopes:
         return np.array([member.polytope.support_function(direction) for member in self.members])
 
     def chebyshev_centres(self) -> Floats:
-        """Return the centres of largest balls, shape (B, n), by a linear program each; NaN for the empty set."""
+        """Return the centres of largest balls, shape (B, n), by a linear program each; NaN for the
+        empty set.
+        """
         polytopes = [member.polytope for member in self.members]
-        return np.array([np.full(p.space, np.nan) if p.is_empty else p.chebyshev_centre()[0] for p in polytopes])
+        return np.array(
+            [np.full(p.space, np.nan) if p.is_empty else p.chebyshev_centre()[0] for p in polytopes]
+        )
 
 
 def polygon_of(shape: Set) -> ConvexPolygons:

@@ -1,7 +1,8 @@
-"""Compiled steps of a `LinearObserver` with two states: prediction and measurement of a batch of polygons.
+"""Compiled steps of a `LinearObserver` with two states: prediction and measurement of a batch of
+polygons.
 
-Every step is outward by a few ulp: the computed set contains the exact one, and a true state that is computed with
-floating-point numbers from errors at their bounds.
+Every step is outward by a few ulp: the computed set contains the exact one, and a true state that
+is computed with floating-point numbers from errors at their bounds.
 
 Kernels write their results to a batch `out` of the same size, with room for more vertices.
 """
@@ -21,7 +22,9 @@ from infoset.geometry.polygon import Points
 MAX_VERTICES = 512
 """Polygons with more vertices are reduced outward."""
 _SHARP = 2.0
-"""Slope of both edges at an extreme vertex, relative to its axis, above which the vertex is divided."""
+"""Slope of both edges at an extreme vertex, relative to its axis, above which the vertex is
+divided.
+"""
 _SHARP_CORNER = 0.5
 """The same for a vertex that is extreme along two axes."""
 
@@ -36,8 +39,9 @@ class Batch(NamedTuple):
 class Move(NamedTuple):
     """A step matrix x + shift + w, with w in the sum of segments and a polygon.
 
-    `shifts`, and the sums `terms` of the sizes of their terms, have the shape (B, 2) or (1, 2). `generators`, shape
-    (g, 2), are half segments; the polygon `other`, shape (m, 2), may have no vertices.
+    `shifts`, and the sums `terms` of the sizes of their terms, have the shape (B, 2) or (1, 2).
+    `generators`, shape (g, 2), are half segments; the polygon `other`, shape (m, 2), may have no
+    vertices.
     """
 
     matrix: Floats
@@ -50,9 +54,9 @@ class Move(NamedTuple):
 class Strips(NamedTuple):
     """The sets {x: lower <= normal . x <= upper} of a batch of runs.
 
-    `normals`, shape (r, n), have any length; a zero one bounds nothing. `lower` and `upper`, shape (B, r), are infinite
-    for a strip that does not exist in this run. `terms`, shape (B, r), are the sums of the sizes of the terms of the
-    bounds, which determine rounding errors.
+    `normals`, shape (r, n), have any length; a zero one bounds nothing. `lower` and `upper`, shape
+    (B, r), are infinite for a strip that does not exist in this run. `terms`, shape (B, r), are the
+    sums of the sizes of the terms of the bounds, which determine rounding errors.
     """
 
     normals: Floats
@@ -73,13 +77,20 @@ def reach(points: Points, count: int) -> tuple[float, float]:
 
 @compiled
 def predict_all(sets: Batch, move: Move, out: Batch) -> None:
-    """Write each polygon after a step, with a box of `SUM_SLACK` times the terms of a coordinate as its half-widths.
+    """Write each polygon after a step, with a box of `SUM_SLACK` times the terms of a coordinate as
+    its half-widths.
 
     A result has at most 2 g + m + 4 vertices more.
     """
-    matrix, other, generators = move.matrix, move.other, move.generators
-    scratch, second = np.empty_like(out.vertices[0]), np.empty_like(out.vertices[0])
-    xx, xy, yx, yy = matrix[0, 0], matrix[0, 1], matrix[1, 0], matrix[1, 1]
+    matrix = move.matrix
+    other = move.other
+    generators = move.generators
+    scratch = np.empty_like(out.vertices[0])
+    second = np.empty_like(out.vertices[0])
+    xx = matrix[0, 0]
+    xy = matrix[0, 1]
+    yx = matrix[1, 0]
+    yy = matrix[1, 1]
     determinant = polygon.scaled_determinant(xx, xy, yx, yy)
     added_x = added_y = 0.0
     for g in range(len(generators)):
@@ -95,13 +106,15 @@ def predict_all(sets: Batch, move: Move, out: Batch) -> None:
             continue
         points = sets.vertices[b]
         row = b if len(move.shifts) > 1 else 0
-        shift_x, shift_y = move.shifts[row, 0], move.shifts[row, 1]
+        shift_x = move.shifts[row, 0]
+        shift_y = move.shifts[row, 1]
         x, y = reach(points, count)
         slack_x = SUM_SLACK * (abs(xx) * x + abs(xy) * y + move.terms[row, 0] + added_x)
         slack_y = SUM_SLACK * (abs(yx) * x + abs(yy) * y + move.terms[row, 1] + added_y)
         if determinant > 0.0:
             for i in range(count):
-                x, y = points[i, 0], points[i, 1]
+                x = points[i, 0]
+                y = points[i, 1]
                 scratch[i, 0], scratch[i, 1] = xx * x + xy * y, yx * x + yy * y
         else:
             count = polygon.map_linearly(points, count, xx, xy, yx, yy, scratch)
@@ -117,26 +130,37 @@ def predict_all(sets: Batch, move: Move, out: Batch) -> None:
 
 @inlined
 def corner(part: int) -> tuple[float, float]:
-    """Signs of the corner of a box that belongs to a part of the boundary: 0 is before the lowest vertex."""
+    """Signs of the corner of a box that belongs to a part of the boundary: 0 is before the lowest
+    vertex.
+    """
     k = part & 3
     return (1.0 if 0 < k < 3 else -1.0), (1.0 if k >= 2 else -1.0)
 
 
 @compiled
 def enlarge(
-    points: Points, count: int, shift_x: float, shift_y: float, half_x: float, half_y: float, out: Points
+    points: Points,
+    count: int,
+    shift_x: float,
+    shift_y: float,
+    half_x: float,
+    half_y: float,
+    out: Points,
 ) -> int:
-    """Write a polygon, not empty, that is moved by (shift_x, shift_y) and contains the sum with a small box.
+    """Write a polygon, not empty, that is moved by (shift_x, shift_y) and contains the sum with a
+    small box.
 
-    Half the widths of the box are (half_x, half_y). Return the number of vertices: the result has `count` vertices for
-    most sets, at most count + 4. O(count). The lowest, rightmost, highest and leftmost vertices divide the boundary
-    into four parts, and each part moves by one corner of the box. A dividing vertex moves so that both of its edges
-    move far enough, by at most five boxes; at a sharp tip it becomes two vertices. The division at extremes is correct
-    for edges of a few ulp with a wrong direction.
+    Half the widths of the box are (half_x, half_y). Return the number of vertices: the result has
+    `count` vertices for most sets, at most count + 4. O(count). The lowest, rightmost, highest and
+    leftmost vertices divide the boundary into four parts, and each part moves by one corner of the
+    box. A dividing vertex moves so that both of its edges move far enough, by at most five boxes;
+    at a sharp tip it becomes two vertices. The division at extremes is correct for edges of a few
+    ulp with a wrong direction.
     """
     low = right = high = left = 0
     for i in range(1, count):
-        x, y = points[i, 0], points[i, 1]
+        x = points[i, 0]
+        y = points[i, 1]
         low = i if y < points[low, 1] else low
         right = i if x > points[right, 0] else right
         high = i if y > points[high, 1] else high
@@ -149,7 +173,8 @@ def enlarge(
     made = 0
     i = low
     for _ in range(count):
-        x, y = points[i, 0] + shift_x, points[i, 1] + shift_y
+        x = points[i, 0] + shift_x
+        y = points[i, 1] + shift_y
         after = part
         while after < last_part and ends[after & 3] == i:
             after += 1
@@ -178,31 +203,49 @@ def enlarge(
 def tip_move(
     points: Points, count: int, i: int, part: int, after: int, half_x: float, half_y: float
 ) -> tuple[float, float]:
-    """Move of an extreme vertex between two parts of the boundary, in boxes; zero if the vertex must be divided."""
+    """Move of an extreme vertex between two parts of the boundary, in boxes; zero if the vertex
+    must be divided.
+    """
     if after - part > 2:
         return 0.0, 0.0
-    before, behind = i - 1 if i > 0 else count - 1, i + 1 if i + 1 < count else 0
-    in_x, in_y = (points[i, 1] - points[before, 1]) * half_x, (points[before, 0] - points[i, 0]) * half_y
-    out_x, out_y = (points[behind, 1] - points[i, 1]) * half_x, (points[i, 0] - points[behind, 0]) * half_y
+    before = i - 1 if i > 0 else count - 1
+    behind = i + 1 if i + 1 < count else 0
+    in_x = (points[i, 1] - points[before, 1]) * half_x
+    in_y = (points[before, 0] - points[i, 0]) * half_y
+    out_x = (points[behind, 1] - points[i, 1]) * half_x
+    out_y = (points[i, 0] - points[behind, 0]) * half_y
     # The axis of the first division, and the next axis counter-clockwise.
     first_x, first_y = corner(part)
     next_x, next_y = corner(part + 1)
-    u_x, u_y = 0.5 * (first_x + next_x), 0.5 * (first_y + next_y)
-    v_x, v_y = -u_y, u_x
-    a, b = in_x * u_x + in_y * u_y, -(in_x * v_x + in_y * v_y)
-    c, d = out_x * u_x + out_y * u_y, out_x * v_x + out_y * v_y
+    u_x = 0.5 * (first_x + next_x)
+    u_y = 0.5 * (first_y + next_y)
+    v_x = -u_y
+    v_y = u_x
+    a = in_x * u_x + in_y * u_y
+    b = -(in_x * v_x + in_y * v_y)
+    c = out_x * u_x + out_y * u_y
+    d = out_x * v_x + out_y * v_y
     if after - part == 1:
         if min(a, b) < 0.0 or min(c, d) < 0.0:
             return 0.0, 0.0
         if d * a <= b * c and d <= _SHARP * c and c > 0.0:
-            far, side = 1.0 + 2.0 * (d / c), -1.0
+            far = 1.0 + 2.0 * (d / c)
+            side = -1.0
         elif b <= _SHARP * a and a > 0.0:
-            far, side = 1.0 + 2.0 * (b / a), 1.0
+            far = 1.0 + 2.0 * (b / a)
+            side = 1.0
         else:
             return 0.0, 0.0
         return far * u_x + side * v_x, far * u_y + side * v_y
     c, d = d, -c
-    if min(a, b) < 0.0 or min(c, d) < 0.0 or b > _SHARP_CORNER * a or d > _SHARP_CORNER * c or a == 0.0 or c == 0.0:
+    if (
+        min(a, b) < 0.0
+        or min(c, d) < 0.0
+        or b > _SHARP_CORNER * a
+        or d > _SHARP_CORNER * c
+        or a == 0.0
+        or c == 0.0
+    ):
         return 0.0, 0.0
     far = max((a + b) / (a - b), (c + d) / (c - d))
     return far * (u_x + v_x), far * (u_y + v_y)
@@ -210,9 +253,17 @@ def tip_move(
 
 @compiled
 def enlarge_carefully(
-    points: Points, count: int, shift_x: float, shift_y: float, half_x: float, half_y: float, out: Points
+    points: Points,
+    count: int,
+    shift_x: float,
+    shift_y: float,
+    half_x: float,
+    half_y: float,
+    out: Points,
 ) -> int:
-    """Write the same as `enlarge` for a set as thin as rounding, whose vertices may be in a wrong order: by a hull."""
+    """Write the same as `enlarge` for a set as thin as rounding, whose vertices may be in a wrong
+    order: by a hull.
+    """
     corners = np.empty((4 * count, 2))
     for i in range(count):
         for k in range(4):
@@ -231,8 +282,9 @@ def enlarge_carefully(
 def update_all(sets: Batch, strips: Strips, excess: Floats, out: Batch) -> None:
     """Write the part of each polygon that is within strips: at most 2 r vertices more.
 
-    The bounds are enlarged by `CUT_SLACK` times their terms and those of normal . x. `excess`, shape (B, r), receives
-    the distance between set and strip, in the unit of the bounds, where the set becomes empty.
+    The bounds are enlarged by `CUT_SLACK` times their terms and those of normal . x. `excess`,
+    shape (B, r), receives the distance between set and strip, in the unit of the bounds, where the
+    set becomes empty.
     """
     normals = strips.normals
     for b in range(sets.counts.size):
@@ -241,16 +293,22 @@ def update_all(sets: Batch, strips: Strips, excess: Floats, out: Batch) -> None:
         polygon.copy(sets.vertices[b], count, points)
         x, y = reach(points, count)
         for r in range(len(normals)):
-            minimum, maximum = strips.lower[b, r], strips.upper[b, r]
+            minimum = strips.lower[b, r]
+            maximum = strips.upper[b, r]
             if count == 0:
                 break
-            more = CUT_SLACK * (abs(normals[r, 0]) * x + abs(normals[r, 1]) * y + strips.terms[b, r])
-            minimum, maximum = minimum - more, maximum + more
+            more = CUT_SLACK * (
+                abs(normals[r, 0]) * x + abs(normals[r, 1]) * y + strips.terms[b, r]
+            )
+            minimum = minimum - more
+            maximum = maximum + more
             if normals[r, 0] == 0.0 and normals[r, 1] == 0.0:
                 overlap = min(maximum, -minimum)
                 count = count if overlap >= 0.0 else 0
             else:
-                count, overlap = polygon.clip_to_band(points, count, normals[r, 0], normals[r, 1], minimum, maximum)
+                count, overlap = polygon.clip_to_band(
+                    points, count, normals[r, 0], normals[r, 1], minimum, maximum
+                )
             if count == 0:
                 excess[b, r] = -overlap
         out.counts[b] = count
@@ -260,17 +318,19 @@ def update_all(sets: Batch, strips: Strips, excess: Floats, out: Batch) -> None:
 def cut_to_preimage(sets: Batch, later: Batch, matrix: Floats, out: Batch) -> None:
     """Write the points x of each polygon for which matrix x is in a later polygon.
 
-    The result has at most four vertices more than both. The half-planes of the later polygon are enlarged by
-    `CUT_SLACK` times the terms of a height. The level of each one is the maximum height of all vertices, so that the
-    half-plane of an edge of a few ulp with a wrong direction contains the set. Half-planes along the axes bound what
-    such edges leave open at sharp tips.
+    The result has at most four vertices more than both. The half-planes of the later polygon are
+    enlarged by `CUT_SLACK` times the terms of a height. The level of each one is the maximum height
+    of all vertices, so that the half-plane of an edge of a few ulp with a wrong direction contains
+    the set. Half-planes along the axes bound what such edges leave open at sharp tips.
     """
     for b in range(sets.counts.size):
         out.counts[b] = 0
-        count, sides = sets.counts[b], later.counts[b]
+        count = sets.counts[b]
+        sides = later.counts[b]
         if count == 0 or sides == 0:
             continue
-        points, other = out.vertices[b], later.vertices[b]
+        points = out.vertices[b]
+        other = later.vertices[b]
         polygon.copy(sets.vertices[b], count, points)
         x, y = reach(points, count)
         other_x, other_y = reach(other, sides)
@@ -282,7 +342,8 @@ def cut_to_preimage(sets: Batch, later: Batch, matrix: Floats, out: Batch) -> No
                 normal_y = (1.0 if i == -3 else -1.0) if i < -2 else 0.0
             else:
                 j = i + 1 if i + 1 < sides else 0
-                normal_x, normal_y = other[j, 1] - other[i, 1], other[i, 0] - other[j, 0]
+                normal_x = other[j, 1] - other[i, 1]
+                normal_y = other[i, 0] - other[j, 0]
             mapped_x = matrix[0, 0] * normal_x + matrix[1, 0] * normal_y
             mapped_y = matrix[0, 1] * normal_x + matrix[1, 1] * normal_y
             top = polygon.support_index(other, sides, normal_x, normal_y)

@@ -1,4 +1,6 @@
-"""Sets of five and more states: a zonotope that is carried, and linear programs over the last steps on demand."""
+"""Sets of five and more states: a zonotope that is carried, and linear programs over the last steps
+on demand.
+"""
 
 from __future__ import annotations
 
@@ -19,14 +21,19 @@ from infoset.observer.sets import Motion, Set, Sets, sizes_of
 from infoset.observer.steps import Strips
 
 ORDER = 5
-"""Generators of a carried zonotope for each state. More are not tighter: on chains of masses, 30 gave wider sets."""
+"""Generators of a carried zonotope for each state. More are not tighter: on chains of masses, 30
+gave wider sets.
+"""
 WINDOW = 10
-"""Steps of a program. For up to 20 states the widths are then within 6 % of those of the whole record in random systems
-and chains of masses, and within 12 % in undamped masses between springs (benchmarks/window_numbers.py)."""
+"""Steps of a program. For up to 20 states the widths are then within 6 % of those of the whole
+record in random systems and chains of masses, and within 12 % in undamped masses between springs
+(benchmarks/window_numbers.py)."""
 
 
 class Contradiction(NamedTuple):
-    """Step and strip that leave no state possible, and the minimum enlargement of the strip for which one exists."""
+    """Step and strip that leave no state possible, and the minimum enlargement of the strip for
+    which one exists.
+    """
 
     step: int
     output: int
@@ -35,7 +42,8 @@ class Contradiction(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Window:
-    """The set of one run at a step: the states that agree with the last steps, and with later ones if it is smoothed.
+    """The set of one run at a step: the states that agree with the last steps, and with later ones
+    if it is smoothed.
 
     Parameters
     ----------
@@ -50,7 +58,8 @@ class Window:
     is_whole : bool
         Whether the stages are the whole record.
     contradiction : Contradiction or None
-        Where the set became empty, if a strip did not meet the carried zonotope or an earlier program showed it.
+        Where the set became empty, if a strip did not meet the carried zonotope or an earlier
+        program showed it.
     """
 
     stages: tuple[Stage, ...]
@@ -86,7 +95,9 @@ class Window:
         return {}
 
     def support(self, direction: Floats) -> float:
-        """Return an upper bound of direction . x, by a linear program the first time; -inf for the empty set."""
+        """Return an upper bound of direction . x, by a linear program the first time; -inf for the
+        empty set.
+        """
         if self.is_empty:
             return -np.inf
         key = direction.tobytes()
@@ -96,7 +107,9 @@ class Window:
         return self._heights[key]
 
     def predicted(self, motion: Motion) -> Window:
-        """Return the window at the next step; the first stage goes if there are more than allowed."""
+        """Return the window at the next step; the first stage goes if there are more than
+        allowed.
+        """
         if self.is_known_empty:
             return self
         image = moved(self.carried, motion)
@@ -147,13 +160,19 @@ class Window:
         if left_out:
             after = after[: self.length]
         stages = (*self.stages[:-1], replace(self.stages[-1], motion=motion), *after)
-        return replace(self, stages=stages, is_whole=self.is_whole and later.is_whole and not left_out)
+        return replace(
+            self, stages=stages, is_whole=self.is_whole and later.is_whole and not left_out
+        )
 
     def located(self) -> Contradiction | None:
-        """Return the first strip after which no state is possible, by linear programs; None if the set is not empty."""
+        """Return the first strip after which no state is possible, by linear programs; None if the
+        set is not empty.
+        """
         if self.contradiction is not None or not self.is_empty:
             return self.contradiction
-        strips = [(k, row) for k, stage in enumerate(self.stages) for row in range(len(stage.normals))]
+        strips = [
+            (k, row) for k, stage in enumerate(self.stages) for row in range(len(stage.normals))
+        ]
         # The first `possible` strips leave a state, the first `impossible` ones leave none.
         possible = 0
         impossible = len(strips)
@@ -169,7 +188,9 @@ class Window:
         program = self._up_to(last, row - 1)
         below = stage.lower[row] - program.bound(normal)
         above = -program.bound(-normal) - stage.upper[row]
-        return Contradiction(stage.step, int(stage.outputs[row]), max(float(below), float(above), 0.0))
+        return Contradiction(
+            stage.step, int(stage.outputs[row]), max(float(below), float(above), 0.0)
+        )
 
     def _up_to(self, last: int, row: int) -> Program:
         """Return the program of the strips up to a row of a stage."""
@@ -178,18 +199,26 @@ class Window:
 
 
 def exact_hull(initial: Set, record: Sequence[Motion | Strips], run: int, step: int) -> Floats:
-    """Return the minimum and the maximum of each state of a `run` at a `step`, shape (2, n); NaN if none is possible.
+    """Return the minimum and the maximum of each state of a `run` at a `step`, shape (2, n); NaN if
+    none is possible.
 
     Linear programs over the whole record. Bounds that the solver does not find are NaN.
     """
     window = Window.of(initial, None)
     for event in record:
-        window = window.predicted(event.of_run(run)) if isinstance(event, Motion) else window.cut(event, run)
+        window = (
+            window.predicted(event.of_run(run))
+            if isinstance(event, Motion)
+            else window.cut(event, run)
+        )
     n = len(window.carried.centre)
     if window.is_known_empty:
         return np.full((2, n), np.nan)
     program = Program(window.stages, step)
-    hull = [[-program.bound(-unit) for unit in np.eye(n)], [program.bound(unit) for unit in np.eye(n)]]
+    hull = [
+        [-program.bound(-unit) for unit in np.eye(n)],
+        [program.bound(unit) for unit in np.eye(n)],
+    ]
     return np.where(np.isinf(hull), np.nan, hull)
 
 
@@ -221,10 +250,14 @@ class Windows:
 
     def predicted(self, motion: Motion) -> Windows:
         """Return the sets after a step."""
-        return Windows(tuple(member.predicted(motion.of_run(run)) for run, member in enumerate(self.members)))
+        return Windows(
+            tuple(member.predicted(motion.of_run(run)) for run, member in enumerate(self.members))
+        )
 
     def cut(self, strips: Strips, excess: Floats) -> Windows:
-        """Return the sets within the strips; `excess`, shape (B, r), receives the distance of a strip from the set."""
+        """Return the sets within the strips; `excess`, shape (B, r), receives the distance of a
+        strip from the set.
+        """
         members = tuple(member.cut(strips, run) for run, member in enumerate(self.members))
         for run, (before, member) in enumerate(zip(self.members, members, strict=True)):
             if member.contradiction is not None and before.contradiction is None:
@@ -235,7 +268,12 @@ class Windows:
         """Return the states that lead to a state of the later set for some disturbance."""
         assert isinstance(later, Windows)
         pairs = zip(self.members, later.members, strict=True)
-        return Windows(tuple(member.before(after, motion.of_run(run)) for run, (member, after) in enumerate(pairs)))
+        return Windows(
+            tuple(
+                member.before(after, motion.of_run(run))
+                for run, (member, after) in enumerate(pairs)
+            )
+        )
 
     def support(self, direction: Floats) -> Floats:
         """Return max direction . x of each set, shape (B,); -inf for the empty set."""
@@ -243,11 +281,16 @@ class Windows:
 
     def chebyshev_centres(self) -> Floats:
         """Refuse with a ValueError: the facets are not known."""
-        raise ValueError("the largest ball of a set of 7 and more states is not known: use the bounds of the states")
+        raise ValueError(
+            "the largest ball of a set of 7 and more states is not known: use the bounds of the "
+            "states"
+        )
 
 
 def moved(one: Zonotope, motion: Motion) -> Zonotope:
-    """Return a zonotope that contains matrix x + shift + w for all x of a zonotope, of at most `ORDER` n generators."""
+    """Return a zonotope that contains matrix x + shift + w for all x of a zonotope, of at most
+    `ORDER` n generators.
+    """
     matrix = motion.matrix
     w = _zonotope_of(motion.disturbance)
     terms = motion.sums_of_terms(sizes_of(one))
@@ -259,7 +302,9 @@ def moved(one: Zonotope, motion: Motion) -> Zonotope:
 
 
 def extent(one: Zonotope, normals: Floats, sizes: Floats) -> tuple[Floats, Floats]:
-    """Return the maximum and the minimum of each normal . x, rounded outward; `sizes` are those of the zonotope."""
+    """Return the maximum and the minimum of each normal . x, rounded outward; `sizes` are those of
+    the zonotope.
+    """
     half = np.abs(normals @ one.generators.T).sum(axis=1)
     middle = normals @ one.centre
     terms = np.abs(normals) @ sizes

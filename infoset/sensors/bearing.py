@@ -1,4 +1,6 @@
-"""Sensors of the line-of-sight angles with bounded errors: one with a linear error bound, and a camera."""
+"""Sensors of the line-of-sight angles with bounded errors: one with a linear error bound, and a
+camera.
+"""
 
 from __future__ import annotations
 
@@ -24,8 +26,8 @@ NEGLIGIBLE_ERROR_RAD = 1e-60
 class Bias(Enum):
     """How the random error of a camera is drawn.
 
-    RANDOM: a new error within the whole bound for each image. CONSTANT: the centroid part is drawn once a run, the
-    pixel part for each image.
+    RANDOM: a new error within the whole bound for each image. CONSTANT: the centroid part is drawn
+    once a run, the pixel part for each image.
     """
 
     RANDOM = "random"
@@ -34,18 +36,19 @@ class Bias(Enum):
 
 @dataclass(frozen=True)
 class BearingSensor(Sensor):
-    """A sensor of the line-of-sight angles atan2(z, x) and, in space, atan2(y, x), each with its own error.
+    """A sensor of the line-of-sight angles atan2(z, x) and, in space, atan2(y, x), each with its
+    own error.
 
-    The error bound of an angle is a constant, a part that is linear in the range, and a part that falls with it; a kind
-    of sensor has one of the latter two.
+    The error bound of an angle is a constant, a part that is linear in the range, and a part that
+    falls with it; a kind of sensor has one of the latter two.
 
     Parameters
     ----------
     period_s : float
         Time between measurements, s; the first is at t = 0.
     first_image_s, last_image_s : float
-        Times before the nominal arrival, s; the images nearest to them are the first and the last one. Images begin at
-        the start for None, and continue until the true arrival for 0.
+        Times before the nominal arrival, s; the images nearest to them are the first and the last
+        one. Images begin at the start for None, and continue until the true arrival for 0.
     miss_probability : float
         Probability that an image is lost, in [0, 1).
 
@@ -69,8 +72,9 @@ class BearingSensor(Sensor):
         check_fields(self)
         if self.first_image_s is not None and self.first_image_s < self.last_image_s:
             raise ValueError(
-                f"{type(self).__name__}: first_image_s must be at least last_image_s, because both are times before "
-                f"the arrival: got {self.first_image_s!r} and {self.last_image_s!r}"
+                f"{type(self).__name__}: first_image_s must be at least last_image_s, because both "
+                f"are times before the arrival: got {self.first_image_s!r} and "
+                f"{self.last_image_s!r}"
             )
 
     @property
@@ -99,12 +103,16 @@ class BearingSensor(Sensor):
         return self != self.axis("z")
 
     def axis(self, name: str) -> BearingSensor:
-        """Return the sensor of one plane angle, "y" or "z"; an error bound of zero becomes negligible."""
+        """Return the sensor of one plane angle, "y" or "z"; an error bound of zero becomes
+        negligible.
+        """
         return self
 
     @abstractmethod
     def error_bound(self, range_m: RangeOrRanges) -> RangeOrRanges:
-        """Return the maximum size of the error at a range (m), rad; in space that of the angle of z."""
+        """Return the maximum size of the error at a range (m), rad; in space that of the angle of
+        z.
+        """
 
     def error_bounds(self, range_m: Floats) -> Floats:
         """Return the maximum size of the error of each angle, rad, at ranges (m) of shape (..., B).
@@ -127,12 +135,18 @@ class BearingSensor(Sensor):
     def measures_at(self, before_arrival_s: float) -> bool:
         """Return whether the image at a time before the nominal arrival, s, is taken.
 
-        Images can be taken every `period_s`. The first and the last one are nearest to `first_image_s` and
-        `last_image_s` (`infoset.clock.steps_between`).
+        Images can be taken every `period_s`. The first and the last one are nearest to
+        `first_image_s` and `last_image_s` (`infoset.clock.steps_between`).
         """
-        if self.first_image_s is not None and steps_between(before_arrival_s, self.first_image_s, self.period_s) > 0:
+        if (
+            self.first_image_s is not None
+            and steps_between(before_arrival_s, self.first_image_s, self.period_s) > 0
+        ):
             return False
-        return self.last_image_s == 0.0 or steps_between(before_arrival_s, self.last_image_s, self.period_s) >= 0
+        return (
+            self.last_image_s == 0.0
+            or steps_between(before_arrival_s, self.last_image_s, self.period_s) >= 0
+        )
 
     def error(self, sight: Geometry, measured: Floats) -> Floats:
         """Return the error of measured angles in units of the bound."""
@@ -142,19 +156,23 @@ class BearingSensor(Sensor):
         """Cut by the angle."""
         sets.measure_angle(measured[self.name], where)
 
-    def band(self, range_m: Floats, closing_speed_m_s: Floats | float, errors: float = 1.0) -> tuple[bool, Floats]:
+    def band(
+        self, range_m: Floats, closing_speed_m_s: Floats | float, errors: float = 1.0
+    ) -> tuple[bool, Floats]:
         """Return a band of z."""
         return False, errors * self.error_bound(range_m) * range_m
 
     def share(self, apart: Apart) -> Floats:
         """Return half of the maximum difference of the angles, in units of the bound, shape (n,).
 
-        An angle changes by at most as much as z/x. The bound may fall with the distance, which is greater than the
-        range. An axis that is measured without error is left out.
+        An angle changes by at most as much as z/x. The bound may fall with the distance, which is
+        greater than the range. An axis that is measured without error is left out.
         """
         angles = np.abs(apart.offset_m) / apart.range_m
         bounds = np.minimum(self.error_bounds(apart.range_m), self.error_bounds(apart.farthest_m))
-        shares = np.where(bounds == 0.0, 0.0, 0.5 * angles / np.maximum(bounds, NEGLIGIBLE_ERROR_RAD))
+        shares = np.where(
+            bounds == 0.0, 0.0, 0.5 * angles / np.maximum(bounds, NEGLIGIBLE_ERROR_RAD)
+        )
         return np.asarray(shares.max(axis=0))
 
 
@@ -165,11 +183,13 @@ class AngleSensor(BearingSensor):
     Parameters
     ----------
     error_at_nominal_range_rad, error_at_zero_range_rad : float
-        Bound a + h(d) at `nominal_range_m` and at zero range, rad, in (0, 1). The same line continues beyond.
+        Bound a + h(d) at `nominal_range_m` and at zero range, rad, in (0, 1). The same line
+        continues beyond.
     nominal_range_m : float
         Range at which the first of the two holds, m.
     error_at_nominal_range_y_rad, error_at_zero_range_y_rad : float or None
-        The same bounds for the angle of the y axis, rad, in [0, 1); None is that of the z axis. For space only.
+        The same bounds for the angle of the y axis, rad, in [0, 1); None is that of the z axis. For
+        space only.
     **others
         Fields of `BearingSensor`.
 
@@ -195,10 +215,14 @@ class AngleSensor(BearingSensor):
     @property
     def error_slope_rad_per_m(self) -> float:
         """Change of the error bound with the range, rad/m."""
-        return (self.error_at_nominal_range_rad - self.error_at_zero_range_rad) / self.nominal_range_m
+        return (
+            self.error_at_nominal_range_rad - self.error_at_zero_range_rad
+        ) / self.nominal_range_m
 
     def axis(self, name: str) -> AngleSensor:
-        """Return the sensor of one plane angle, "y" or "z"; an error bound of zero becomes negligible."""
+        """Return the sensor of one plane angle, "y" or "z"; an error bound of zero becomes
+        negligible.
+        """
         return self._planar[name]
 
     @cached_property
@@ -206,33 +230,48 @@ class AngleSensor(BearingSensor):
         """The sensors of both plane angles, which strategies need at every step."""
         plain = replace(self, error_at_nominal_range_y_rad=None, error_at_zero_range_y_rad=None)
         at_nominal, at_zero = (max(bound, NEGLIGIBLE_ERROR_RAD) for bound in self._bounds_of_y)
-        return {"y": replace(plain, error_at_nominal_range_rad=at_nominal, error_at_zero_range_rad=at_zero), "z": plain}
+        return {
+            "y": replace(
+                plain, error_at_nominal_range_rad=at_nominal, error_at_zero_range_rad=at_zero
+            ),
+            "z": plain,
+        }
 
     @property
     def _bounds_of_y(self) -> tuple[float, float]:
-        """The bounds of the angle of the y axis at the nominal range and at range zero, rad; they may be zero."""
-        at_nominal, at_zero = self.error_at_nominal_range_y_rad, self.error_at_zero_range_y_rad
+        """The bounds of the angle of the y axis at the nominal range and at range zero, rad; they
+        may be zero.
+        """
+        at_nominal = self.error_at_nominal_range_y_rad
+        at_zero = self.error_at_zero_range_y_rad
         return (
             self.error_at_nominal_range_rad if at_nominal is None else at_nominal,
             self.error_at_zero_range_rad if at_zero is None else at_zero,
         )
 
     def error_bound(self, range_m: RangeOrRanges) -> RangeOrRanges:
-        """Return the maximum size of the error at a range (m), rad; in space that of the angle of z."""
+        """Return the maximum size of the error at a range (m), rad; in space that of the angle of
+        z.
+        """
         return self.error_at_zero_range_rad + self.error_slope_rad_per_m * range_m
 
     def error_bounds(self, range_m: Floats) -> Floats:
-        """Return the maximum size of the error of each angle, rad, at ranges (m) of shape (..., B), as they differ."""
+        """Return the maximum size of the error of each angle, rad, at ranges (m) of shape (..., B),
+        as they differ.
+        """
         if self.error_at_nominal_range_y_rad is None and self.error_at_zero_range_y_rad is None:
             return self.error_bound(range_m)
         y, z = np.broadcast_to(range_m, (2, range_m.shape[-1]))
         at_nominal, at_zero = self._bounds_of_y
-        return np.stack([at_zero + (at_nominal - at_zero) / self.nominal_range_m * y, self.error_bound(z)])
+        return np.stack(
+            [at_zero + (at_nominal - at_zero) / self.nominal_range_m * y, self.error_bound(z)]
+        )
 
 
 @dataclass(frozen=True)
 class Camera(BearingSensor):
-    """A sensor of the line-of-sight angles with the error bound pixel_error_rad + centroid_error_m / d at distance d.
+    """A sensor of the line-of-sight angles with the error bound pixel_error_rad + centroid_error_m
+    / d at distance d.
 
     The bound is the same for both axes.
 

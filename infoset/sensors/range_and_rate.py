@@ -48,13 +48,22 @@ class RangeSensor(Checked, Sensor):
 
     def cut(self, sets: Cuttable, measured: Measurements, where: Flags) -> None:
         """Cut by the range; an angle measured in the same step sharpens the cut."""
-        sets.measure_range(measured[self.name], self.relative_error, where, alpha_rad=measured.get(BearingSensor.name))
+        sets.measure_range(
+            measured[self.name],
+            self.relative_error,
+            where,
+            alpha_rad=measured.get(BearingSensor.name),
+        )
 
     def band(self, range_m: Floats, closing_speed_m_s: Floats | float, errors: float = 1.0) -> None:
-        """Return None: a range selects labels, and to first order the distance does not depend on z and V."""
+        """Return None: a range selects labels, and to first order the distance does not depend on z
+        and V.
+        """
 
     def share(self, apart: Apart) -> Floats:
-        """Return half of the maximum difference of the distances, in units of the bound, shape (n,)."""
+        """Return half of the maximum difference of the distances, in units of the bound, shape
+        (n,).
+        """
         difference_m = apart.slope * np.hypot.reduce(apart.offset_m) + apart.shift_m
         return np.asarray(difference_m / (2.0 * self.relative_error * apart.range_m))
 
@@ -103,7 +112,9 @@ class RateSensor(Checked, Sensor):
         """Cut by the rate."""
         sets.measure_rate(measured[self.name], self.error_rad_s, where)
 
-    def band(self, range_m: Floats, closing_speed_m_s: Floats | float, errors: float = 1.0) -> tuple[bool, Floats]:
+    def band(
+        self, range_m: Floats, closing_speed_m_s: Floats | float, errors: float = 1.0
+    ) -> tuple[bool, Floats]:
         """Return a band of the predicted miss, omega x^2/e."""
         return True, errors * self.error_rad_s * range_m * range_m / closing_speed_m_s
 
@@ -113,4 +124,6 @@ class RateSensor(Checked, Sensor):
         The rate is the derivative of z/x times cos^2(alpha), which depends on z.
         """
         change_m = np.abs(apart.predicted_miss_m) + 4.0 * apart.slope**2 * np.abs(apart.offset_m)
-        return np.asarray(change_m.max(axis=0) / self.band(apart.range_m, apart.closing_speed_m_s, 2.0)[1])
+        return np.asarray(
+            change_m.max(axis=0) / self.band(apart.range_m, apart.closing_speed_m_s, 2.0)[1]
+        )

@@ -1,4 +1,6 @@
-"""What a sensor with a bounded error is: the quantity that it measures, its error bound, and its cut of a set."""
+"""What a sensor with a bounded error is: the quantity that it measures, its error bound, and its
+cut of a set.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,9 @@ from numpy.typing import ArrayLike
 from infoset.arrays import Flags, Floats
 
 Measurements = Mapping[str, Floats]
-"""Measured values of a batch by the name of the sensor; a sensor that does not measure in a step is left out."""
+"""Measured values of a batch by the name of the sensor; a sensor that does not measure in a step is
+left out.
+"""
 
 
 class Geometry(Protocol):
@@ -24,7 +28,9 @@ class Geometry(Protocol):
 
     @property
     def alpha_rad(self) -> Floats:
-        """Line-of-sight angles in the planes of x and each lateral axis, atan2(y, x) and atan2(z, x), rad."""
+        """Line-of-sight angles in the planes of x and each lateral axis, atan2(y, x) and atan2(z,
+        x), rad.
+        """
 
     @property
     def omega_rad_s(self) -> Floats:
@@ -42,13 +48,15 @@ class Apart:
     Parameters
     ----------
     offset_m, predicted_miss_m : ndarray, shape (axes, n)
-        Maximum differences of their positions z and of their predicted misses z + V x/e along each lateral axis, m.
+        Maximum differences of their positions z and of their predicted misses z + V x/e along each
+        lateral axis, m.
     shift_m : ndarray, shape (n,)
         Maximum difference of their ranges x, m.
     range_m, farthest_m : ndarray, shape (n,)
         Their minimum range x and maximum distance, m.
     slope : ndarray, shape (n,)
-        Maximum distance from the x axis, and maximum change of it until x = 0, of both, as a share of x.
+        Maximum distance from the x axis, and maximum change of it until x = 0, of both, as a share
+        of x.
     closing_speed_m_s : ndarray, shape (n,)
         Their maximum closing speed e.
     """
@@ -89,9 +97,11 @@ class Sensor(ABC):
     quantity : str
         What it measures, with the unit: ``measured_<quantity>`` is its column in files.
     stream : int
-        Its stream of random numbers: a number below 16 that no other kind and no stream of `infoset.sim.draws` has.
+        Its stream of random numbers: a number below 16 that no other kind and no stream of
+        `infoset.sim.draws` has.
     is_lateral : bool
-        Whether it measures one value for each lateral axis: its arrays have the shape (C, B), otherwise (B,).
+        Whether it measures one value for each lateral axis: its arrays have the shape (C, B),
+        otherwise (B,).
     """
 
     name: ClassVar[str]
@@ -103,11 +113,15 @@ class Sensor(ABC):
 
     @abstractmethod
     def true_value(self, sight: Geometry) -> Floats:
-        """Return the measured quantity without error, shape (C, B), or (B,) if it is not lateral."""
+        """Return the measured quantity without error, shape (C, B), or (B,) if it is not
+        lateral.
+        """
 
     @abstractmethod
     def bound(self, sight: Geometry) -> Floats | float:
-        """Return the maximum size of the error, in the unit of the quantity, broadcast against the true value."""
+        """Return the maximum size of the error, in the unit of the quantity, broadcast against the
+        true value.
+        """
 
     @abstractmethod
     def cut(self, sets: Cuttable, measured: Measurements, where: Flags) -> None:
@@ -129,7 +143,8 @@ class Sensor(ABC):
     ) -> tuple[bool, Floats] | None:
         """Return the band of (V, z) that a measurement leaves, for `infoset.lower_bound`.
 
-        The search for two motions uses it. It may neglect terms of second order, because `share` checks what is found.
+        The search for two motions uses it. It may neglect terms of second order, because `share`
+        checks what is found.
 
         Parameters
         ----------
@@ -143,16 +158,18 @@ class Sensor(ABC):
         Returns
         -------
         tuple of (bool, ndarray), or None
-            Whether it is a band of the predicted miss z + V x/e (otherwise of z), and its half-width, m. None if a
-            measurement leaves V and z as they are.
+            Whether it is a band of the predicted miss z + V x/e (otherwise of z), and its
+            half-width, m. None if a measurement leaves V and z as they are.
         """
 
     @abstractmethod
     def share(self, apart: Apart) -> Floats:
-        """Return half of the maximum difference of the measured values of two motions, in units of the bound.
+        """Return half of the maximum difference of the measured values of two motions, in units of
+        the bound.
 
-        Shape (n,). Both can have the same measured value where it is at most 1. The lower bound of the miss is a
-        theorem only if no difference of two motions within `apart` is greater: see Lemma 20 of docs/guarantee.md.
+        Shape (n,). Both can have the same measured value where it is at most 1. The lower bound of
+        the miss is a theorem only if no difference of two motions within `apart` is greater: see
+        Lemma 20 of docs/guarantee.md.
         """
 
     def measures_at(self, before_arrival_s: float) -> bool:
@@ -173,5 +190,6 @@ class Sensor(ABC):
 
     def nearest(self, sight: Geometry, wanted: Floats) -> Floats:
         """Return the possible measurement that is nearest to a wanted one."""
-        true, bound = self.true_value(sight), self.bound(sight)
+        true = self.true_value(sight)
+        bound = self.bound(sight)
         return np.minimum(np.maximum(wanted, true - bound), true + bound)

@@ -1,4 +1,6 @@
-"""Minimum-energy visits to several moving targets: flybys and rendezvous, their times and their order."""
+"""Minimum-energy visits to several moving targets: flybys and rendezvous, their times and their
+order.
+"""
 
 from infoset.rendezvous.multipoint.bounded import bound_path, bound_visits, needed_bound
 from infoset.rendezvous.multipoint.kepler import KeplerTour
@@ -12,7 +14,14 @@ from infoset.rendezvous.multipoint.order import (
 )
 from infoset.rendezvous.multipoint.segments import Nodes, NotSettledError, Path, solve_segments
 from infoset.rendezvous.multipoint.time_grid import Candidate, GridSearch, search_grid
-from infoset.rendezvous.multipoint.times import BestTimes, Effort, Grid, TimeLimits, TimeSearch, optimise_times
+from infoset.rendezvous.multipoint.times import (
+    BestTimes,
+    Effort,
+    Grid,
+    TimeLimits,
+    TimeSearch,
+    optimise_times,
+)
 from infoset.rendezvous.multipoint.tour import Meet, Target, Tour, Visits
 
 __all__ = [

@@ -1,4 +1,6 @@
-"""Paths under the gravity of one point by shooting, continued from the coasting orbit as targets move away from it."""
+"""Paths under the gravity of one point by shooting, continued from the coasting orbit as targets
+move away from it.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ SMALLEST_COSTATE = 1e-300
 """A smaller costate limits no step: it stands for zero in a division."""
 MAX_STEPS = 50_000
 MIN_RADIUS = 0.02
-"""A trajectory nearer to the centre, relative to its initial distance, counts as falling into it."""
+"""A trajectory nearer to the centre, relative to its initial distance, counts as falling into
+it.
+"""
 TOLERANCE = 1e-11
 ON_THE_WAY = 1e-4
 ROUNDING = 1e-8
@@ -35,10 +39,16 @@ _FIRST_STEP = 0.3
 
 
 @allocation_free
-def _rates(_time: float, _y: Floats, z: Floats, _parameters: tuple[()], _dy: Floats, slope: Floats) -> None:
+def _rates(
+    _time: float, _y: Floats, z: Floats, _parameters: tuple[()], _dy: Floats, slope: Floats
+) -> None:
     """Time derivatives of z in column 0, and of its variations in the others."""
-    r0, r1, r2 = z[0, 0], z[1, 0], z[2, 0]
-    l0, l1, l2 = z[9, 0], z[10, 0], z[11, 0]
+    r0 = z[0, 0]
+    r1 = z[1, 0]
+    r2 = z[2, 0]
+    l0 = z[9, 0]
+    l1 = z[10, 0]
+    l2 = z[11, 0]
     squared = r0 * r0 + r1 * r1 + r2 * r2
     third = 1.0 / (squared * np.sqrt(squared))
     fifth = third / squared
@@ -52,14 +62,21 @@ def _rates(_time: float, _y: Floats, z: Floats, _parameters: tuple[()], _dy: Flo
         slope[3 + axis, 0] = -third * z[axis, 0] + z[9 + axis, 0]
         slope[6 + axis, 0] = third * z[9 + axis, 0] - 3.0 * fifth * along * z[axis, 0]
     for column in range(1, z.shape[1]):
-        d0, d1, d2 = z[0, column], z[1, column], z[2, column]
-        e0, e1, e2 = z[9, column], z[10, column], z[11, column]
+        d0 = z[0, column]
+        d1 = z[1, column]
+        d2 = z[2, column]
+        e0 = z[9, column]
+        e1 = z[10, column]
+        e2 = z[11, column]
         out = r0 * d0 + r1 * d1 + r2 * d2
         turned = l0 * d0 + l1 * d1 + l2 * d2
         costate = r0 * e0 + r1 * e1 + r2 * e2
         for axis in range(3):
-            position, primer = z[axis, 0], z[9 + axis, 0]
-            slope[3 + axis, column] = 3.0 * fifth * out * position - third * z[axis, column] + z[9 + axis, column]
+            position = z[axis, 0]
+            primer = z[9 + axis, 0]
+            slope[3 + axis, column] = (
+                3.0 * fifth * out * position - third * z[axis, column] + z[9 + axis, column]
+            )
             second = 3.0 * fifth * (along * z[axis, column] + position * turned + primer * out)
             second -= 15.0 * fifth / squared * along * out * position
             first = 3.0 * fifth * costate * position - third * z[9 + axis, column]
@@ -79,9 +96,10 @@ def column_size(z: Floats, first: int) -> float:
 def longest_step(z: Floats) -> float:
     """Longest step from the state and costate in column 0 of z.
 
-    In one step the circular orbit at the present distance turns by 0.1 radians at most; and neither the speed, nor the
-    control lambda_v at its present size, nor its rate lambda_r moves the craft by more than about 0.1, 0.1^2 / 2 and
-    0.1^3 / 6 of this distance. Relative errors are about 1e-12 a revolution.
+    In one step the circular orbit at the present distance turns by 0.1 radians at most; and neither
+    the speed, nor the control lambda_v at its present size, nor its rate lambda_r moves the craft
+    by more than about 0.1, 0.1^2 / 2 and 0.1^3 / 6 of this distance. Relative errors are about
+    1e-12 a revolution.
     """
     radius = column_size(z, R)
     by_turn_or_speed = radius / max(1.0 / np.sqrt(radius), column_size(z, V))
@@ -92,13 +110,17 @@ def longest_step(z: Floats) -> float:
 
 @compiled
 def propagate(z: Floats, duration: float) -> bool:
-    """Propagate (r, v, lambda_r, lambda_v, energy), in column 0 of z, and its variations in place; z is (13, 1 + m).
+    """Propagate (r, v, lambda_r, lambda_v, energy), in column 0 of z, and its variations in place;
+    z is (13, 1 + m).
 
-    Lengths and times are such that the gravitational parameter is one. Returns whether the trajectory neither falls
-    into the centre nor takes too many steps. The energy is not varied. Steps are those of `longest_step`.
+    Lengths and times are such that the gravitational parameter is one. Returns whether the
+    trajectory neither falls into the centre nor takes too many steps. The energy is not varied.
+    Steps are those of `longest_step`.
     """
-    slopes, z_next = np.zeros((STAGES, *z.shape)), np.zeros(z.shape)
-    no_y, no_slopes = np.zeros(0), np.zeros((STAGES, 0))
+    slopes = np.zeros((STAGES, *z.shape))
+    z_next = np.zeros(z.shape)
+    no_y = np.zeros(0)
+    no_slopes = np.zeros((STAGES, 0))
     left = duration
     for _ in range(MAX_STEPS):
         if not column_size(z, R) > MIN_RADIUS:
@@ -118,7 +140,9 @@ def propagate(z: Floats, duration: float) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Visits up to the next rendezvous, from a known state; `goal`, shape (k, 6), contains the targets' states."""
+    """Visits up to the next rendezvous, from a known state; `goal`, shape (k, 6), contains the
+    targets' states.
+    """
 
     start_s: float
     start_state: Floats
@@ -129,7 +153,9 @@ class Block:
 
     @cached_property
     def units(self) -> tuple[float, float]:
-        """Units of length and time in which mu is one: the distance at the start, and its rate's inverse."""
+        """Units of length and time in which mu is one: the distance at the start, and its rate's
+        inverse.
+        """
         length = float(np.linalg.norm(self.start_state[:3]))
         return length, float(np.sqrt(length**3 / self.gravitational_parameter_m3_s2))
 
@@ -145,44 +171,65 @@ class Block:
         return np.diff(self.time_s, prepend=self.start_s) / self.units[1]
 
 
-def blocks_of(start_s: float, start_state: Floats, nodes: Nodes, gravitational_parameter_m3_s2: float) -> list[Block]:
+def blocks_of(
+    start_s: float, start_state: Floats, nodes: Nodes, gravitational_parameter_m3_s2: float
+) -> list[Block]:
     """Split visits after every rendezvous: the next ones start from a known state."""
-    blocks, first = [], 0
+    blocks = []
+    first = 0
     for node in range(len(nodes.arrive_s)):
         if nodes.rendezvous[node] or node == len(nodes.arrive_s) - 1:
-            times, goal = nodes.arrive_s[first : node + 1], nodes.arrive[first : node + 1]
+            times = nodes.arrive_s[first : node + 1]
+            goal = nodes.arrive[first : node + 1]
             is_met = bool(nodes.rendezvous[node])
-            blocks.append(Block(start_s, start_state, times, goal, is_met, gravitational_parameter_m3_s2))
-            start_s, start_state, first = float(nodes.leave_s[node]), nodes.leave[node], node + 1
+            blocks.append(
+                Block(start_s, start_state, times, goal, is_met, gravitational_parameter_m3_s2)
+            )
+            start_s = float(nodes.leave_s[node])
+            start_state = nodes.leave[node]
+            first = node + 1
     return blocks
 
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """A block's trajectory: lambda at the start, then the jumps at all nodes but the last, in units of the block."""
+    """A block's trajectory: lambda at the start, then the jumps at all nodes but the last, in units
+    of the block.
+    """
 
     block: Block
     unknowns: Floats
 
     def along(self, time_s: Floats) -> Floats:
-        """Return states and costates in SI, shape (k, 12), at k increasing times: at a node, after the jump."""
-        block, duration = self.block, self.block.units[1]
-        z, now, node = _initial(block, self.unknowns[:6]), block.start_s, 0
+        """Return states and costates in SI, shape (k, 12), at k increasing times: at a node, after
+        the jump.
+        """
+        block = self.block
+        duration = self.block.units[1]
+        z = _initial(block, self.unknowns[:6])
+        now = block.start_s
+        node = 0
         values = np.empty((len(time_s), 12))
         for row, time in enumerate(time_s):
             while node < len(block.time_s) - 1 and block.time_s[node] <= time:
                 _advance(z, (block.time_s[node] - now) / duration)
                 self._jump(z, node)
-                now, node = block.time_s[node], node + 1
+                now = block.time_s[node]
+                node = node + 1
             _advance(z, (time - now) / duration)
             now = time
             values[row] = z[:12, 0]
         return values * block.value_units
 
     def segments(self) -> tuple[Floats, Floats, float]:
-        """Return states and costates at the start and at the end of each segment, shape (k, 12), and the energy: SI."""
-        block, count = self.block, len(self.block.time_s)
-        z, starts, ends = _initial(block, self.unknowns[:6]), np.empty((count, 12)), np.empty((count, 12))
+        """Return states and costates at the start and at the end of each segment, shape (k, 12),
+        and the energy: SI.
+        """
+        block = self.block
+        count = len(self.block.time_s)
+        z = _initial(block, self.unknowns[:6])
+        starts = np.empty((count, 12))
+        ends = np.empty((count, 12))
         for node in range(count):
             starts[node] = z[:12, 0]
             _advance(z, block.durations[node])
@@ -190,7 +237,11 @@ class Shot:
             if node < count - 1:
                 self._jump(z, node)
         length, duration = block.units
-        return starts * block.value_units, ends * block.value_units, float(z[12, 0]) * length**2 / duration**3
+        return (
+            starts * block.value_units,
+            ends * block.value_units,
+            float(z[12, 0]) * length**2 / duration**3,
+        )
 
     def _jump(self, z: Floats, node: int) -> None:
         z[6:9, 0] -= self.unknowns[6 + 3 * node : 9 + 3 * node]
@@ -206,8 +257,10 @@ class ShotPath(Path):
     def of(cls, nodes: Nodes, shots: tuple[Shot, ...]) -> ShotPath:
         """Return the path of trajectories through `nodes`."""
         starts, ends, costs = zip(*(shot.segments() for shot in shots), strict=True)
-        start, end = np.concatenate(starts), np.concatenate(ends)
-        before, after = end[:, 6:], np.vstack([start[1:, 6:], np.zeros(6)])
+        start = np.concatenate(starts)
+        end = np.concatenate(ends)
+        before = end[:, 6:]
+        after = np.vstack([start[1:, 6:], np.zeros(6)])
         return cls(
             nodes,
             sum(costs),
@@ -222,7 +275,9 @@ class ShotPath(Path):
         )
 
     def breaks(self) -> Floats:
-        """Return times, s, not decreasing: radians of the circular orbits at the starts of the segments."""
+        """Return times, s, not decreasing: radians of the circular orbits at the starts of the
+        segments.
+        """
         mu = self.shots[0].block.gravitational_parameter_m3_s2
         radians = np.sqrt(mu / np.linalg.norm(self.start_states[:, :3], axis=1) ** 3) * (
             self.nodes.arrive_s - self.starts_s
@@ -233,23 +288,29 @@ class ShotPath(Path):
         """Return states and costates, shapes (k, 6), at k times from the start to the last node."""
         times = np.asarray(time_s, dtype=np.float64)
         values = np.zeros((len(times), 12))
-        which = np.searchsorted([shot.block.start_s for shot in self.shots], times, side="right") - 1
+        which = (
+            np.searchsorted([shot.block.start_s for shot in self.shots], times, side="right") - 1
+        )
         for index, shot in enumerate(self.shots):
-            rows, end = np.flatnonzero(which == index), float(shot.block.time_s[-1])
+            rows = np.flatnonzero(which == index)
+            end = float(shot.block.time_s[-1])
             rows = rows[np.argsort(times[rows], kind="stable")]
             stays = (times[rows] >= end) & (index < len(self.shots) - 1)
             values[rows[~stays]] = shot.along(times[rows[~stays]])
             rows = rows[stays]
             met = np.broadcast_to(shot.block.goal[-1], (len(rows), 6))
-            values[rows, :6] = coast(met, times[rows] - end, shot.block.gravitational_parameter_m3_s2)
+            values[rows, :6] = coast(
+                met, times[rows] - end, shot.block.gravitational_parameter_m3_s2
+            )
         return values[:, :6], values[:, 6:]
 
 
 def shoot(block: Block, near: Floats | None = None) -> Shot | None:
-    """Find the trajectory of a block by Newton's method, with the residual reduced in steps; None if it fails.
+    """Find the trajectory of a block by Newton's method, with the residual reduced in steps; None
+    if it fails.
 
-    The initial unknowns are `near`, of other times; if Newton's method fails from them, or they are None, those of the
-    coasting orbit.
+    The initial unknowns are `near`, of other times; if Newton's method fails from them, or they are
+    None, those of the coasting orbit.
     """
     coasting = np.zeros(3 + 3 * len(block.time_s))
     initials = [] if near is None else [(near, MIN_STEP_FROM_NEAR)]
@@ -261,7 +322,9 @@ def shoot(block: Block, near: Floats | None = None) -> Shot | None:
 
 
 def _initial(block: Block, costate: Floats, variations: int = 0) -> Floats:
-    """State, costate and energy at the start of a block in column 0, and columns for their variations."""
+    """State, costate and energy at the start of a block in column 0, and columns for their
+    variations.
+    """
     z = np.zeros((13, 1 + variations))
     z[:12, 0] = np.concatenate([block.start_state / block.value_units[:6], costate])
     return z
@@ -273,9 +336,12 @@ def _advance(z: Floats, duration: float) -> None:
 
 
 def _residual(block: Block, unknowns: Floats, slopes: Floats | None = None) -> Floats | None:
-    """Return the residual at the nodes, or None if there is no trajectory; fill in its derivatives `slopes`."""
+    """Return the residual at the nodes, or None if there is no trajectory; fill in its derivatives
+    `slopes`.
+    """
     goals = block.goal / block.value_units[:6]
-    size, last = len(unknowns), len(block.time_s) - 1
+    size = len(unknowns)
+    last = len(block.time_s) - 1
     z = _initial(block, unknowns[:6], size)
     z[6:12, 1:7] = np.eye(6)
     residual = np.empty(size)
@@ -285,7 +351,8 @@ def _residual(block: Block, unknowns: Floats, slopes: Floats | None = None) -> F
         if duration > 0.0 and not propagate(varied, duration):
             return None
         z[:, :known] = varied
-        rows, jump = slice(3 * node, 3 * node + 3), slice(6 + 3 * node, 9 + 3 * node)
+        rows = slice(3 * node, 3 * node + 3)
+        jump = slice(6 + 3 * node, 9 + 3 * node)
         residual[rows] = z[:3, 0] - goals[node, :3]
         if slopes is not None:
             slopes[rows] = z[:3, 1:]
@@ -295,7 +362,11 @@ def _residual(block: Block, unknowns: Floats, slopes: Floats | None = None) -> F
     residual[-3:] = z[3:6, 0] - goals[last, 3:] if block.rendezvous else z[9:12, 0]
     if slopes is not None:
         slopes[-3:] = z[3:6, 1:] if block.rendezvous else z[9:12, 1:]
-    return residual if np.isfinite(residual).all() and (slopes is None or np.isfinite(slopes).all()) else None
+    return (
+        residual
+        if np.isfinite(residual).all() and (slopes is None or np.isfinite(slopes).all())
+        else None
+    )
 
 
 def _follow(block: Block, initial: Floats, min_step: float) -> Floats | None:
@@ -304,14 +375,22 @@ def _follow(block: Block, initial: Floats, min_step: float) -> Floats | None:
     first = _residual(block, initial, slopes)
     if first is None:
         return None
-    unknowns, done, step = initial, 0.0, min(1.0, _FIRST_STEP / max(float(np.abs(first).max()), _FIRST_STEP))
+    unknowns = initial
+    done = 0.0
+    step = min(1.0, _FIRST_STEP / max(float(np.abs(first).max()), _FIRST_STEP))
     while True:
         ahead = _solved(slopes, -first)
         if ahead is None:
             return None
         while True:
             share = min(done + step, 1.0)
-            solved = _newton(block, unknowns + (share - done) * ahead, share, (1.0 - share) * first, slopes.copy())
+            solved = _newton(
+                block,
+                unknowns + (share - done) * ahead,
+                share,
+                (1.0 - share) * first,
+                slopes.copy(),
+            )
             if solved is not None:
                 break
             step *= 0.5
@@ -320,20 +399,28 @@ def _follow(block: Block, initial: Floats, min_step: float) -> Floats | None:
         unknowns, rounds = solved
         if share == 1.0:
             return unknowns
-        done, step = share, step * (2.0 if rounds <= 2 else 1.5 if rounds <= 4 else 1.0)
+        done = share
+        step = step * (2.0 if rounds <= 2 else 1.5 if rounds <= 4 else 1.0)
         if _residual(block, unknowns, slopes) is None:
             return None
 
 
-def _newton(block: Block, unknowns: Floats, share: float, goal: Floats, slopes: Floats) -> tuple[Floats, int] | None:
-    """Newton's method to a residual `goal`; derivatives are renewed where it is slow. None if it does not converge."""
-    before, fresh = np.inf, False
+def _newton(
+    block: Block, unknowns: Floats, share: float, goal: Floats, slopes: Floats
+) -> tuple[Floats, int] | None:
+    """Newton's method to a residual `goal`; derivatives are renewed where it is slow. None if it
+    does not converge.
+    """
+    before = np.inf
+    fresh = False
     for rounds in range(_ROUNDS):
         residual = _residual(block, unknowns)
         if residual is None:
             return None
         size = float(np.abs(residual - goal).max())
-        if size <= (TOLERANCE if share == 1.0 else ON_THE_WAY) or (fresh and size <= ROUNDING and size > 0.3 * before):
+        if size <= (TOLERANCE if share == 1.0 else ON_THE_WAY) or (
+            fresh and size <= ROUNDING and size > 0.3 * before
+        ):
             return unknowns, rounds
         if size > _MAX_CORRECTION or size > 2.0 * before:
             return None
@@ -343,7 +430,8 @@ def _newton(block: Block, unknowns: Floats, share: float, goal: Floats, slopes: 
         move = _solved(slopes, residual - goal)
         if move is None:
             return None
-        unknowns, before = unknowns - move, size
+        unknowns = unknowns - move
+        before = size
     return None
 
 

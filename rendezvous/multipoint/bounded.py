@@ -34,7 +34,9 @@ class BoundedPath(LinearPath):
         return saturated(super().control(time_s), self.max_m_s2)
 
     def breaks(self) -> Floats:
-        """Return times, s, not decreasing, between which the control is smooth and turns by about a radian."""
+        """Return times, s, not decreasing, between which the control is smooth and turns by about a
+        radian.
+        """
         return np.concatenate([flight.breaks() for flight in self.flights])
 
     def along(self, time_s: Floats) -> tuple[Floats, Floats]:
@@ -49,12 +51,15 @@ class BoundedPath(LinearPath):
 
 
 def needed_bound(path: LinearPath) -> float:
-    """Return the smallest bound, m/s^2, with which the visits of a `path` are possible at its times; to 1e-6 below."""
+    """Return the smallest bound, m/s^2, with which the visits of a `path` are possible at its
+    times; to 1e-6 below.
+    """
     return least_bound(_arcs(path)).value_m_s2
 
 
 def bound_path(path: LinearPath, max_m_s2: float) -> LinearPath:
-    """Return the path of minimum energy through the nodes of a `path` with |u| <= `max_m_s2`, or the `path` itself.
+    """Return the path of minimum energy through the nodes of a `path` with |u| <= `max_m_s2`, or
+    the `path` itself.
 
     Raises
     ------
@@ -63,7 +68,8 @@ def bound_path(path: LinearPath, max_m_s2: float) -> LinearPath:
     """
     if max_control(path.control, path.breaks()) <= max_m_s2:
         return path
-    nodes, motion = path.nodes, path.motion
+    nodes = path.nodes
+    motion = path.motion
     optimum = solve_bounded(_arcs(path), max_m_s2)
 
     arrive, begin = _at_rest(path)
@@ -99,10 +105,13 @@ def bound_path(path: LinearPath, max_m_s2: float) -> LinearPath:
 
 
 def _at_rest(path: LinearPath) -> tuple[Floats, Floats]:
-    """States at the ends and at the starts of the segments, shape (N, 6), with zeros for velocities at flybys."""
+    """States at the ends and at the starts of the segments, shape (N, 6), with zeros for velocities
+    at flybys.
+    """
     nodes = path.nodes
     free = ~nodes.rendezvous
-    arrive, begin = nodes.arrive.copy(), np.concatenate([path.start_states[:1], nodes.leave[:-1]])
+    arrive = nodes.arrive.copy()
+    begin = np.concatenate([path.start_states[:1], nodes.leave[:-1]])
     arrive[free, 3:] = 0.0
     begin[1:][free[:-1], 3:] = 0.0
     return arrive, begin
@@ -110,7 +119,8 @@ def _at_rest(path: LinearPath) -> tuple[Floats, Floats]:
 
 def _arcs(path: LinearPath) -> list[Arc]:
     """The segments of a path; the free values are the velocities at its flybys."""
-    nodes, motion = path.nodes, path.motion
+    nodes = path.nodes
+    motion = path.motion
     arrive, begin = _at_rest(path)
     transition = motion.transition(path.starts_s, nodes.arrive_s)
     missing = arrive - (transition @ begin[:, :, None])[:, :, 0]
@@ -127,12 +137,17 @@ def _arcs(path: LinearPath) -> list[Arc]:
 
 
 def bound_visits(
-    tour: Tour, best: BestOrder, max_m_s2: float, limits: TimeLimits | None, guesses: Sequence[Floats] = ()
+    tour: Tour,
+    best: BestOrder,
+    max_m_s2: float,
+    limits: TimeLimits | None,
+    guesses: Sequence[Floats] = (),
 ) -> BestOrder:
-    """Return the visits of `best` with |u| <= `max_m_s2`, or `best` itself if its path keeps the bound.
+    """Return the visits of `best` with |u| <= `max_m_s2`, or `best` itself if its path keeps the
+    bound.
 
-    The order stays. With `limits`, the times are optimised again with the bound, from those of `best` and from
-    `guesses`; without them, they stay.
+    The order stays. With `limits`, the times are optimised again with the bound, from those of
+    `best` and from `guesses`; without them, they stay.
 
     Raises
     ------
@@ -153,4 +168,9 @@ def bound_visits(
     dwell_s = tour.dwell_s[list(best.order)]
     starts = [path.nodes.arrive_s, *guesses]
     timed = optimise_times(fly_bounded, tour.start_s, dwell_s, limits, starts, effort=Effort.LAST)
-    return replace(best, path=timed.path, objective=timed.objective, evaluations=best.evaluations + timed.evaluations)
+    return replace(
+        best,
+        path=timed.path,
+        objective=timed.objective,
+        evaluations=best.evaluations + timed.evaluations,
+    )

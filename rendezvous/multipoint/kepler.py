@@ -20,8 +20,9 @@ MAX_KNOWN = 64
 class KeplerTour(Visits):
     """A chaser and the targets it visits, all under the gravity of one point.
 
-    `initial`, shape (n, 6), are the inertial states of the targets, m and m/s, at their epochs, `epoch_s`, shape (n,).
-    `start_state`, shape (6,), is the chaser's at t = 0; epochs refer to the same time. All may be on any conic.
+    `initial`, shape (n, 6), are the inertial states of the targets, m and m/s, at their epochs,
+    `epoch_s`, shape (n,). `start_state`, shape (6,), is the chaser's at t = 0; epochs refer to the
+    same time. All may be on any conic.
 
     Raises
     ------
@@ -30,9 +31,10 @@ class KeplerTour(Visits):
 
     Notes
     -----
-    Newton's method solves the conditions of the maximum principle, with targets that move away from the chaser's
-    coasting orbit in steps to their true positions, or from a known path near by. Mironov and Mironov (2007) linearise
-    the motion about the last trajectory instead, which does not converge far from the coasting orbit.
+    Newton's method solves the conditions of the maximum principle, with targets that move away from
+    the chaser's coasting orbit in steps to their true positions, or from a known path near by.
+    Mironov and Mironov (2007) linearise the motion about the last trajectory instead, which does
+    not converge far from the coasting orbit.
     """
 
     targets: tuple[Target, ...]
@@ -50,32 +52,40 @@ class KeplerTour(Visits):
 
     def target_states(self, which: Integers, time_s: Floats) -> Floats:
         """States, m and m/s, of the k targets numbered `which` at k times, shape (k, 6)."""
-        return coast(self.initial[which], time_s - self.epoch_s[which], self.gravitational_parameter_m3_s2)
+        return coast(
+            self.initial[which], time_s - self.epoch_s[which], self.gravitational_parameter_m3_s2
+        )
 
     def flyer(self, order: Sequence[int]) -> Callable[[Floats], Path]:
-        """Return a function of N times that shoots paths of one `order`, each from the nearest one before.
+        """Return a function of N times that shoots paths of one `order`, each from the nearest one
+        before.
 
         Raises
         ------
         NotSettledError
-            By the function, if the targets cannot be followed from the coasting orbit; a ValueError if times do not
-            increase.
+            By the function, if the targets cannot be followed from the coasting orbit; a ValueError
+            if times do not increase.
         """
         known: list[tuple[Floats, list[Floats]]] = []
 
         def fly(time_s: Floats) -> ShotPath:
             nodes = self.nodes(order, time_s)
             check_times(self.start_s, nodes.arrive_s, nodes.leave_s)
-            blocks = blocks_of(self.start_s, self.start_state, nodes, self.gravitational_parameter_m3_s2)
+            blocks = blocks_of(
+                self.start_s, self.start_state, nodes, self.gravitational_parameter_m3_s2
+            )
             initials: Sequence[Floats | None] = [None] * len(blocks)
             if known:
                 initials = min(known, key=lambda path: float(np.abs(path[0] - time_s).max()))[1]
             pairs = zip(blocks, initials, strict=True)
-            shots = tuple(shot for block, initial in pairs if (shot := shoot(block, initial)) is not None)
+            shots = tuple(
+                shot for block, initial in pairs if (shot := shoot(block, initial)) is not None
+            )
             if len(shots) < len(blocks):
                 raise NotSettledError(
-                    "no trajectory was found: the targets were followed from the chaser's coasting orbit, but not all "
-                    "the way; give visits more time, visit nearer targets first, or check units"
+                    "no trajectory was found: the targets were followed from the chaser's "
+                    "coasting orbit, but not all the way; give visits more time, visit nearer "
+                    "targets first, or check units"
                 )
             known.append((nodes.arrive_s, [shot.unknowns for shot in shots]))
             del known[:-MAX_KNOWN]

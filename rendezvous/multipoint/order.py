@@ -29,11 +29,17 @@ Report = Callable[[float], None]
 
 MAX_TARGETS = 9
 _MAX_ORDERS = 8
-"""Orders of the grid of all orders that are searched again: the best of 24 was the first to fifth in 8 cases."""
+"""Orders of the grid of all orders that are searched again: the best of 24 was the first to fifth
+in 8 cases.
+"""
 _MAX_DESCENTS = 24
-"""Candidates that are followed: in 106 random cases the best minimum was that of one of the first 13."""
+"""Candidates that are followed: in 106 random cases the best minimum was that of one of the first
+13.
+"""
 _MAX_POLISHED = 3
-"""Minima of the best order that are followed to the last digits: nearly equal ones may change places."""
+"""Minima of the best order that are followed to the last digits: nearly equal ones may change
+places.
+"""
 _GRID_SHARE = 0.7
 """Share of the progress that is that of the grid of all orders."""
 
@@ -50,10 +56,11 @@ class OrderSearch(NamedTuple):
 class BestOrder:
     """Targets visited in their best `order`, first to last.
 
-    `objective` is the energy plus the price of the time, m^2/s^3. The search examined `nodes` partial orders, on a grid
-    sets of visited targets with the last of them, and computed `evaluations` paths; partial orders in `lost` were
-    skipped because no path was found. `time_search` is the last search for the times; None if they were given.
-    `order_search` is the search of all orders on a grid; None if the order was given, or found by branch and bound.
+    `objective` is the energy plus the price of the time, m^2/s^3. The search examined `nodes`
+    partial orders, on a grid sets of visited targets with the last of them, and computed
+    `evaluations` paths; partial orders in `lost` were skipped because no path was found.
+    `time_search` is the last search for the times; None if they were given. `order_search` is the
+    search of all orders on a grid; None if the order was given, or found by branch and bound.
     """
 
     order: tuple[int, ...]
@@ -67,25 +74,33 @@ class BestOrder:
 
 
 def best_order(
-    tour: Visits, limits: TimeLimits, guesses: Sequence[Floats] = (), *, progress: Report | None = None
+    tour: Visits,
+    limits: TimeLimits,
+    guesses: Sequence[Floats] = (),
+    *,
+    progress: Report | None = None,
 ) -> BestOrder:
     """Find the best order of up to 9 targets of a `tour`, and the best times, within `limits`.
 
-    `guesses` are additional initial times, s, of any order; `progress` is called with the share of the search.
+    `guesses` are additional initial times, s, of any order; `progress` is called with the share of
+    the search.
 
-    In linear motion, all orders are compared on a grid of times (`search_grid`); the best ones are searched again on a
-    grid as fine as that of `best_times`, and descents begin at the best candidates of all of them. The result is the
-    best order found: an order whose minimum is much lower than its costs on the grid could be missed.
+    In linear motion, all orders are compared on a grid of times (`search_grid`); the best ones are
+    searched again on a grid as fine as that of `best_times`, and descents begin at the best
+    candidates of all of them. The result is the best order found: an order whose minimum is much
+    lower than its costs on the grid could be missed.
 
-    Under the gravity of one point, the search is depth first and starts with the cheapest partial order. The cost of a
-    partial order at its best times is a lower bound of the cost of all orders that begin with it, and its times are
-    their initial times. This holds for global minima. The computed minima are local, so the result is the best order
-    found: a partial order is discarded only if more starts find no lower minimum, and a factor is applied.
+    Under the gravity of one point, the search is depth first and starts with the cheapest partial
+    order. The cost of a partial order at its best times is a lower bound of the cost of all orders
+    that begin with it, and its times are their initial times. This holds for global minima. The
+    computed minima are local, so the result is the best order found: a partial order is discarded
+    only if more starts find no lower minimum, and a factor is applied.
 
     Raises
     ------
     ValueError
-        If there are more than 9 targets, or nothing limits the last time but its price and there are no guesses.
+        If there are more than 9 targets, or nothing limits the last time but its price and there
+        are no guesses.
     NotSettledError
         If no order fits before the latest time, or no path is found for any order.
     """
@@ -96,32 +111,51 @@ def best_order(
     horizon = limits.latest_s
 
     def solve(order: tuple[int, ...], warm: Sequence[Floats], careful: bool) -> tuple[float, Path]:
-        complete, held, enough = len(order) == count, limits, -np.inf
+        complete = len(order) == count
+        held = limits
+        enough = -np.inf
         if not complete:
             if horizon is not None:
                 rest = [target for target in range(count) if target not in order]
-                later = dwell[order[-1]] + dwell[rest].sum() - dwell[rest].max() + len(rest) * limits.min_gap_s
+                later = (
+                    dwell[order[-1]]
+                    + dwell[rest].sum()
+                    - dwell[rest].max()
+                    + len(rest) * limits.min_gap_s
+                )
                 held = TimeLimits(horizon - float(later), limits.min_gap_s, limits.price_per_s)
             if np.isfinite(search.best_objective):
                 enough = search.best_objective
         effort = Effort.BOUND if warm and not careful else Effort.RUGGED
         begins = [*warm, *guesses] if complete else warm
         times = optimise_times(
-            tour.flyer(order), tour.start_s, dwell[list(order)], held, begins, effort=effort, enough=enough
+            tour.flyer(order),
+            tour.start_s,
+            dwell[list(order)],
+            held,
+            begins,
+            effort=effort,
+            enough=enough,
         )
         search.evaluations += times.evaluations
         return times.objective, times.path
 
     # A local minimum of a partial order is no bound; divided by the ruggedness, it is used as one.
-    search = _Search(solve, count, progress, tour.start_s, horizon, tour.ruggedness, looks_twice=True)
+    search = _Search(
+        solve, count, progress, tour.start_s, horizon, tour.ruggedness, looks_twice=True
+    )
     best = search.run()
     final = best_times(tour, search.best, limits, [best.nodes.arrive_s, *guesses])
     evaluations = search.evaluations + final.evaluations
     lost = tuple(search.lost)
-    return BestOrder(search.best, final.path, final.objective, search.nodes, evaluations, lost, final.search)
+    return BestOrder(
+        search.best, final.path, final.objective, search.nodes, evaluations, lost, final.search
+    )
 
 
-def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | None = None) -> BestOrder:
+def best_order_of_slots(
+    tour: Visits, time_s: ArrayLike, *, progress: Report | None = None
+) -> BestOrder:
     """Find the best order of up to 9 targets of a `tour` for increasing times of the visits.
 
     `progress` is called with the share of orders decided.
@@ -135,22 +169,29 @@ def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | N
     NotSettledError
         If no order fits the times, or no path is found for any order.
     """
-    count, times = _checked_count(tour), np.asarray(time_s, dtype=np.float64)
+    count = _checked_count(tour)
+    times = np.asarray(time_s, dtype=np.float64)
     if times.shape != (count,):
         raise ValueError(f"{count} visits need {count} times, found {times.size}")
     check_times(tour.start_s, times, times)
     # Whether each target may be visited at each time: its stay must end before the next visit.
     fits = times[:, None] + tour.dwell_s < np.append(times[1:], np.inf)[:, None]
 
-    def solve(order: tuple[int, ...], _warm: Sequence[Floats], _careful: bool) -> tuple[float, Path]:
+    def solve(
+        order: tuple[int, ...], _warm: Sequence[Floats], _careful: bool
+    ) -> tuple[float, Path]:
         path = tour.flyer(order)(times[: len(order)])
         search.evaluations += 1
         return path.cost, path
 
     slack = tour.ruggedness if tour.ruggedness > SMOOTH else 1.0
-    search = _Search(solve, count, progress, tour.start_s, None, slack, looks_twice=False, fits=fits)
+    search = _Search(
+        solve, count, progress, tour.start_s, None, slack, looks_twice=False, fits=fits
+    )
     path = search.run()
-    return BestOrder(search.best, path, path.cost, search.nodes, search.evaluations, tuple(search.lost))
+    return BestOrder(
+        search.best, path, path.cost, search.nodes, search.evaluations, tuple(search.lost)
+    )
 
 
 def best_times(
@@ -161,22 +202,29 @@ def best_times(
     *,
     progress: Report | None = None,
 ) -> BestTimes:
-    """Find the best times of one `order` of a `tour`; `limits`, `guesses` and `progress` as for `best_order`.
+    """Find the best times of one `order` of a `tour`; `limits`, `guesses` and `progress` as for
+    `best_order`.
 
     In linear motion, descents begin at the best candidates of a grid of times (`search_grid`).
     """
     if isinstance(tour, Tour):
         bounded = _bounded(tour, order, limits, guesses)
-        return _best_on_grids(tour, [tuple(order)], limits, bounded, guesses, progress or _ignore)[1]
+        return _best_on_grids(tour, [tuple(order)], limits, bounded, guesses, progress or _ignore)[
+            1
+        ]
     dwell = tour.dwell_s[list(order)]
-    return optimise_times(tour.flyer(order), tour.start_s, dwell, limits, guesses, progress=progress)
+    return optimise_times(
+        tour.flyer(order), tour.start_s, dwell, limits, guesses, progress=progress
+    )
 
 
 def _ignore(_share: float) -> None:
     """Report no progress."""
 
 
-def _best_order_on_grid(tour: Tour, limits: TimeLimits, guesses: Sequence[Floats], report: Report) -> BestOrder:
+def _best_order_on_grid(
+    tour: Tour, limits: TimeLimits, guesses: Sequence[Floats], report: Report
+) -> BestOrder:
     """Find the best order and its times in linear motion."""
     # If any order fits, one with the longest stay at the end does.
     fitting = np.argsort(tour.dwell_s, kind="stable").tolist()
@@ -188,7 +236,9 @@ def _best_order_on_grid(tour: Tour, limits: TimeLimits, guesses: Sequence[Floats
     def report_rest(share: float) -> None:
         report(_GRID_SHARE + (1.0 - _GRID_SHARE) * share)
 
-    order, best = _best_on_grids(tour, orders or [tuple(fitting)], limits, bounded, guesses, report_rest)
+    order, best = _best_on_grids(
+        tour, orders or [tuple(fitting)], limits, bounded, guesses, report_rest
+    )
     count = len(tour.targets)
     order_search = OrderSearch(coarse.grid, len(orders))
     return BestOrder(
@@ -210,7 +260,9 @@ def _best_on_grids(
     guesses: Sequence[Floats],
     report: Report,
 ) -> tuple[tuple[int, ...], BestTimes]:
-    """Find the best of some `orders` and its times, from candidates of a grid before the latest time of `bounded`."""
+    """Find the best of some `orders` and its times, from candidates of a grid before the latest
+    time of `bounded`.
+    """
     grids = [search_grid(tour, bounded, order) for order in orders]
     candidates = [candidate for grid in grids for candidate in grid.candidates]
     candidates.sort(key=lambda candidate: candidate.objective)
@@ -223,7 +275,9 @@ def _best_on_grids(
     minima: list[tuple[tuple[int, ...], BestTimes]] = []
     for index, candidate in enumerate(followed):
         with suppress(NotSettledError):
-            minima.append((candidate.order, descend(candidate.order, [candidate.time_s], Effort.VALLEY)))
+            minima.append(
+                (candidate.order, descend(candidate.order, [candidate.time_s], Effort.VALLEY))
+            )
         report((index + 1) / len(followed))
     minima.sort(key=lambda minimum: minimum[1].objective)
 
@@ -235,10 +289,14 @@ def _best_on_grids(
     return best_order, replace(best, evaluations=evaluations, search=search)
 
 
-def _bounded(tour: Tour, order: Sequence[int], limits: TimeLimits, guesses: Sequence[Floats]) -> TimeLimits:
-    """Return limits with a latest time: without one, a time after which the price of time alone costs more.
+def _bounded(
+    tour: Tour, order: Sequence[int], limits: TimeLimits, guesses: Sequence[Floats]
+) -> TimeLimits:
+    """Return limits with a latest time: without one, a time after which the price of time alone
+    costs more.
 
-    The objective of any order bounds that time. It is sought in doubled intervals up to eight times the last guess.
+    The objective of any order bounds that time. It is sought in doubled intervals up to eight times
+    the last guess.
 
     Raises
     ------
@@ -284,7 +342,9 @@ class _Search:
     def run(self) -> Path:
         self._branch((), None)
         if self.best_path is None:
-            raise NotSettledError("no order fits, or no path was found for any order; give visits more time")
+            raise NotSettledError(
+                "no order fits, or no path was found for any order; give visits more time"
+            )
         return self.best_path
 
     def _branch(self, beginning: tuple[int, ...], before: Path | None) -> None:
@@ -307,17 +367,22 @@ class _Search:
                 children.append((objective, order, path))
         for objective, order, path in sorted(children, key=lambda child: child[:2]):
             complete = len(order) == self.count
-            lowest, best_path = objective, path
+            lowest = objective
+            best_path = path
             if self.looks_twice and (complete or objective >= self.slack * self.best_objective):
-                # This is a local minimum: try more starts before an order is accepted, or a partial order is dropped.
+                # This is a local minimum: try more starts before an order is accepted, or a partial
+                # order is dropped.
                 with suppress(NotSettledError):
                     again, other = self.solve(order, [path.nodes.arrive_s], True)
                     if again < objective:
-                        lowest, best_path = again, other
+                        lowest = again
+                        best_path = other
             if complete:
                 self._done(order)
                 if lowest < self.best_objective:
-                    self.best, self.best_path, self.best_objective = order, best_path, lowest
+                    self.best = order
+                    self.best_path = best_path
+                    self.best_objective = lowest
             elif lowest < self.slack * self.best_objective:
                 self._branch(order, best_path)
             else:
@@ -337,14 +402,18 @@ class _Search:
         last = float(times[-1])
         end = last if self.horizon_s is None else self.horizon_s
         shrunk = self.start_s + (times - self.start_s) * steps / (steps + 1.0)
-        return [np.append(shrunk, last), np.append(times, 0.5 * (last + end)) if end > last else np.append(shrunk, end)]
+        return [
+            np.append(shrunk, last),
+            np.append(times, 0.5 * (last + end)) if end > last else np.append(shrunk, end),
+        ]
 
 
 def _checked_count(tour: Visits) -> int:
     count = len(tour.targets)
     if count > MAX_TARGETS:
         raise ValueError(
-            f"{count} targets have {factorial(count)} orders; a search takes at most {MAX_TARGETS}, with "
-            f"{factorial(MAX_TARGETS)}, and each further target multiplies the cost: give the order"
+            f"{count} targets have {factorial(count)} orders; a search takes at most "
+            f"{MAX_TARGETS}, with {factorial(MAX_TARGETS)}, and each further target multiplies the "
+            "cost: give the order"
         )
     return count

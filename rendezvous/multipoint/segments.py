@@ -18,9 +18,9 @@ from infoset.rendezvous.relative_motion.linear_motion import state_scales
 class Nodes:
     """States through which a path must pass, and their times, in order.
 
-    `arrive` and `leave`, shape (N, 6), are the targets' states at the arrivals and departures, `arrive_s` and
-    `leave_s`, shape (N,), which are equal if the chaser does not stay. `rendezvous`, shape (N,), says whether the
-    velocities must also agree.
+    `arrive` and `leave`, shape (N, 6), are the targets' states at the arrivals and departures,
+    `arrive_s` and `leave_s`, shape (N,), which are equal if the chaser does not stay. `rendezvous`,
+    shape (N,), says whether the velocities must also agree.
     """
 
     arrive_s: Floats
@@ -70,15 +70,21 @@ class Path(ABC):
 
     @abstractmethod
     def breaks(self) -> Floats:
-        """Return times, s, not decreasing, between which the control is smooth and turns by about a radian."""
+        """Return times, s, not decreasing, between which the control is smooth and turns by about a
+        radian.
+        """
 
     @property
     def jumps(self) -> Floats:
-        """Costate before minus costate after, shape (N, 6): dI / d(target's state); zero in the velocity of a flyby."""
+        """Costate before minus costate after, shape (N, 6): dI / d(target's state); zero in the
+        velocity of a flyby.
+        """
         return self.costate_before - self.costate_after
 
     def costate(self, time_s: Floats) -> Floats:
-        """Return lambda (m/s^3, m/s^2), shape (k, 6), at k times: after the jump at a node, zero during a stay."""
+        """Return lambda (m/s^3, m/s^2), shape (k, 6), at k times: after the jump at a node, zero
+        during a stay.
+        """
         return self.along(time_s)[1]
 
     def control(self, time_s: Floats) -> Floats:
@@ -97,34 +103,44 @@ class LinearPath(Path):
     motion: LinearMotion
 
     def breaks(self) -> Floats:
-        """Return times, s, not decreasing, between which the control is smooth and turns by about a radian."""
+        """Return times, s, not decreasing, between which the control is smooth and turns by about a
+        radian.
+        """
         legs = zip(self.starts_s, self.nodes.arrive_s, strict=True)
         return np.concatenate([self.motion.breaks(float(start), float(end)) for start, end in legs])
 
     def along(self, time_s: Floats) -> tuple[Floats, Floats]:
         """Return states and costates, shapes (k, 6), at k times from the start to the last node.
 
-        States are propagated from one time to the next, because long intervals of a time-varying motion are expensive.
+        States are propagated from one time to the next, because long intervals of a time-varying
+        motion are expensive.
         """
         times = np.asarray(time_s, dtype=np.float64)
         which, moving = self._segment_of(times)
-        states, costates = np.empty((len(times), 6)), np.zeros((len(times), 6))
+        states = np.empty((len(times), 6))
+        costates = np.zeros((len(times), 6))
         order = np.argsort(times, kind="stable")
         for segment in np.unique(which):
             members = order[which[order] == segment]
-            flying, staying = members[moving[members]], members[~moving[members]]
+            flying = members[moving[members]]
+            staying = members[~moving[members]]
             end = float(self.nodes.arrive_s[segment])
             if len(flying):
-                start, last = self.start_states[segment], self.costate_before[segment]
+                start = self.start_states[segment]
+                last = self.costate_before[segment]
                 grid = np.concatenate([[self.starts_s[segment]], times[flying], [end]])
                 states[flying], costates[flying] = _carried(self.motion, grid, start, last)
             if len(staying):  # coasting with a target, from the arrival there
                 grid = np.concatenate([[end], times[staying], times[staying[-1:]]])
-                states[staying] = _carried(self.motion, grid, self.arrival_states[segment], np.zeros(6))[0]
+                states[staying] = _carried(
+                    self.motion, grid, self.arrival_states[segment], np.zeros(6)
+                )[0]
         return states, costates
 
     def _segment_of(self, time_s: Floats) -> tuple[Integers, Flags]:
-        """The segment of each time, and whether the chaser is in motion to its end rather than staying there."""
+        """The segment of each time, and whether the chaser is in motion to its end rather than
+        staying there.
+        """
         which = np.searchsorted(self.nodes.leave_s, time_s, side="right")
         last = len(self.nodes.leave_s) - 1
         ended = (which > last) & (time_s <= self.nodes.arrive_s[last])
@@ -132,13 +148,16 @@ class LinearPath(Path):
         return which, (time_s < self.nodes.arrive_s[which]) | ended
 
 
-def solve_segments(motion: LinearMotion, start_s: float, start_state: Floats, nodes: Nodes) -> LinearPath:
+def solve_segments(
+    motion: LinearMotion, start_s: float, start_state: Floats, nodes: Nodes
+) -> LinearPath:
     """Find the minimum-energy path of a `motion` from the `start_state` (m, m/s) through `nodes`.
 
-    Unknowns are the velocities at flybys. The cost is the sum of 1/2 |L_k^-1 e_k|^2, e_k = x_k - Phi_k x_(k-1),
-    with L_k the Cholesky factor of the Gramian, in states divided by (T, T, T, 1, 1, 1): a least-squares problem whose
-    normal equations are symmetric positive definite with 3 x 3 blocks on three diagonals. In contrast to R13 in the
-    paper's elimination, no inverted block is singular in a well-posed problem. O(N) time and memory.
+    Unknowns are the velocities at flybys. The cost is the sum of 1/2 |L_k^-1 e_k|^2, e_k = x_k -
+    Phi_k x_(k-1), with L_k the Cholesky factor of the Gramian, in states divided by (T, T, T, 1, 1,
+    1): a least-squares problem whose normal equations are symmetric positive definite with 3 x 3
+    blocks on three diagonals. In contrast to R13 in the paper's elimination, no inverted block is
+    singular in a well-posed problem. O(N) time and memory.
 
     Raises
     ------
@@ -151,7 +170,8 @@ def solve_segments(motion: LinearMotion, start_s: float, start_state: Floats, no
     starts = np.concatenate([[start_s], nodes.leave_s[:-1]])
     segment = motion.segment(starts, nodes.arrive_s)
     scale = state_scales(nodes.arrive_s - starts)
-    arrive, begin = nodes.arrive.copy(), np.concatenate([start_state[None], nodes.leave[:-1]])
+    arrive = nodes.arrive.copy()
+    begin = np.concatenate([start_state[None], nodes.leave[:-1]])
     free = ~nodes.rendezvous
     arrive[free, 3:] = begin[1:][free[:-1], 3:] = 0.0  # the unknowns
     missing = (arrive - (segment.transition @ begin[:, :, None])[:, :, 0]) / scale
@@ -162,11 +182,14 @@ def solve_segments(motion: LinearMotion, start_s: float, start_state: Floats, no
             segment.transition[:, :, 3:] / scale[:, :, None],
         )
         whitened = np.linalg.solve(lower, np.concatenate([missing[:, :, None], *slopes], axis=2))
-        effort, ahead, behind = whitened[:, :, 0], whitened[:, :, 1:4], whitened[:, :, 4:]
+        effort = whitened[:, :, 0]
+        ahead = whitened[:, :, 1:4]
+        behind = whitened[:, :, 4:]
         velocities = _velocities(effort, ahead, behind, free)
     except (np.linalg.LinAlgError, ValueError):  # ValueError: a number is not finite
         raise NotSettledError(
-            "the numbers of the path overflow, or a segment is too short or too long for its Gramian; check the units"
+            "the numbers of the path overflow, or a segment is too short or too long for its "
+            "Gramian; check the units"
         ) from None
     effort = effort + np.einsum("kij,kj->ki", ahead, velocities)
     effort[1:] -= np.einsum("kij,kj->ki", behind[1:], velocities[:-1])
@@ -175,21 +198,27 @@ def solve_segments(motion: LinearMotion, start_s: float, start_state: Floats, no
     after = np.concatenate([at_start[1:], np.zeros((1, 6))])
     arrive[free, 3:] = velocities[free]
     begin[1:][free[:-1], 3:] = velocities[:-1][free[:-1]]
-    cost, gradient = 0.5 * float((effort**2).sum()), time_gradient(nodes, arrive, before, after)
-    return LinearPath(nodes, cost, starts, begin, arrive, before, after, at_start[0], gradient, motion)
+    cost = 0.5 * float((effort**2).sum())
+    gradient = time_gradient(nodes, arrive, before, after)
+    return LinearPath(
+        nodes, cost, starts, begin, arrive, before, after, at_start[0], gradient, motion
+    )
 
 
 def _velocities(effort: Floats, ahead: Floats, behind: Floats, free: Flags) -> Floats:
-    """Minimise sum |effort_k + ahead_k v_k - behind_k v_(k-1)|^2 over velocities v_k that are free; others are zero.
+    """Minimise sum |effort_k + ahead_k v_k - behind_k v_(k-1)|^2 over velocities v_k that are free;
+    others are zero.
 
-    The normal equations have 3 x 3 blocks on three diagonals: a banded matrix, shape (6, 3 N), of the lower diagonals.
+    The normal equations have 3 x 3 blocks on three diagonals: a banded matrix, shape (6, 3 N), of
+    the lower diagonals.
     """
     diagonal = np.einsum("kra,krb->kab", ahead, ahead)
     diagonal[:-1] += np.einsum("kra,krb->kab", behind[1:], behind[1:])
     right = -np.einsum("kra,kr->ka", ahead, effort)
     right[:-1] += np.einsum("kra,kr->ka", behind[1:], effort[1:])
     below = -np.einsum("kra,krb->kab", ahead[1:], behind[1:])
-    diagonal[~free], right[~free] = np.eye(3), 0.0
+    diagonal[~free] = np.eye(3)
+    right[~free] = 0.0
     below[~(free[1:] & free[:-1])] = 0.0
     band = np.zeros((6, len(effort), 3))
     for row in range(3):
@@ -200,12 +229,18 @@ def _velocities(effort: Floats, ahead: Floats, behind: Floats, free: Flags) -> F
     return np.asarray(solveh_banded(band.reshape(6, -1), right.ravel(), lower=True).reshape(-1, 3))
 
 
-def _carried(motion: LinearMotion, grid: Floats, start: Floats, costate_end: Floats) -> tuple[Floats, Floats]:
-    """States and costates at the inner times of a grid, from the state at its start and the costate at its end."""
+def _carried(
+    motion: LinearMotion, grid: Floats, start: Floats, costate_end: Floats
+) -> tuple[Floats, Floats]:
+    """States and costates at the inner times of a grid, from the state at its start and the costate
+    at its end.
+    """
     segment = motion.segment(grid[:-1], grid[1:])
     count = len(grid) - 2
-    states, costates = np.empty((count, 6)), np.empty((count, 6))
-    costate, state = costate_end, start
+    states = np.empty((count, 6))
+    costates = np.empty((count, 6))
+    costate = costate_end
+    state = start
     for index in range(count - 1, -1, -1):
         costate = segment.transition[index + 1].T @ costate
         costates[index] = costate
@@ -216,7 +251,9 @@ def _carried(motion: LinearMotion, grid: Floats, start: Floats, costate_end: Flo
 
 
 def check_times(start_s: float, arrive_s: Floats, leave_s: Floats) -> None:
-    """Raise `ValueError` unless the times of the start, of arrivals and of departures are finite and increase."""
+    """Raise `ValueError` unless the times of the start, of arrivals and of departures are finite
+    and increase.
+    """
     if not (np.isfinite(start_s) and np.isfinite(arrive_s).all() and np.isfinite(leave_s).all()):
         raise ValueError("a time is not finite")
     before = np.concatenate([[start_s], leave_s[:-1]])
@@ -224,18 +261,28 @@ def check_times(start_s: float, arrive_s: Floats, leave_s: Floats) -> None:
     if len(late):
         index = int(late[0])
         limit = (
-            f"{before[index]:g} s, when the chaser leaves the one before" if index else f"the start at {start_s:g} s"
+            f"{before[index]:g} s, when the chaser leaves the one before"
+            if index
+            else f"the start at {start_s:g} s"
         )
-        raise ValueError(f"times must increase: visit {index + 1} is at {arrive_s[index]:g} s, not after {limit}")
+        raise ValueError(
+            f"times must increase: visit {index + 1} is at {arrive_s[index]:g} s, not after {limit}"
+        )
 
 
-def time_gradient(nodes: Nodes, arrive: Floats, before: Floats, after: Floats, max_m_s2: float = np.inf) -> Floats:
-    """dI/dt, shape (N,), from the chaser's states at the nodes and its costates before and after them, shapes (N, 6).
+def time_gradient(
+    nodes: Nodes, arrive: Floats, before: Floats, after: Floats, max_m_s2: float = np.inf
+) -> Floats:
+    """dI/dt, shape (N,), from the chaser's states at the nodes and its costates before and after
+    them, shapes (N, 6).
 
-    D'(V_i - V) at a flyby. H(t+) - H(t-) + (lambda- - lambda+)' x_i' at a rendezvous: as the target coasts in the
-    dynamics of the chaser, this is the power lambda_V' u - 1/2 |u|^2, after minus before; 1/2 |u|^2 below the bound.
+    D'(V_i - V) at a flyby. H(t+) - H(t-) + (lambda- - lambda+)' x_i' at a rendezvous: as the target
+    coasts in the dynamics of the chaser, this is the power lambda_V' u - 1/2 |u|^2, after minus
+    before; 1/2 |u|^2 below the bound.
     """
     flyby = ((before - after)[:, :3] * (nodes.arrive[:, 3:] - arrive[:, 3:])).sum(axis=1)
-    sizes_before, sizes_after = (np.linalg.norm(costates[:, 3:], axis=1) for costates in (before, after))
+    sizes_before, sizes_after = (
+        np.linalg.norm(costates[:, 3:], axis=1) for costates in (before, after)
+    )
     change = power(sizes_after, max_m_s2) - power(sizes_before, max_m_s2)
     return np.asarray(np.where(nodes.rendezvous, change, flyby))

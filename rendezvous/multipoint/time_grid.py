@@ -1,4 +1,6 @@
-"""Orders and times of visits, both together, on a grid of times: dynamic programming over sets of visited targets."""
+"""Orders and times of visits, both together, on a grid of times: dynamic programming over sets of
+visited targets.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,9 @@ from infoset.rendezvous.multipoint.times import MIN_SHARE, Grid, TimeLimits, roo
 from infoset.rendezvous.multipoint.tour import Meet, Tour
 
 TIMES_PER_RADIAN = 4.0
-"""25 times a revolution: the grid's lowest cost is then mostly within 5 % of the minimum near it."""
+"""25 times a revolution: the grid's lowest cost is then mostly within 5 % of the minimum near
+it.
+"""
 MIN_TIMES = 32
 """Times of a short grid: the transitions from nearly no gap to long ones need some at any angle."""
 MAX_TIMES = 400
@@ -22,18 +26,24 @@ MAX_TIMES = 400
 MAX_ORDER_TIMES = 72
 """Times of a grid of all orders; their best ones are searched again on a finer one."""
 MAX_TRIPLES = 1e8
-"""Compared sequences of three times, which take 60 to 100 ns each; the grid of nine targets has 40 times."""
+"""Compared sequences of three times, which take 60 to 100 ns each; the grid of nine targets has 40
+times.
+"""
 APART_RAD = 1.5
 """Quarter of a revolution: minima of the cost are half a revolution apart or more."""
 RANKS = 4
-"""Quadratics that are kept for two times of a given order: with one, the valley of the minimum was lost in 1 of 90."""
+"""Quadratics that are kept for two times of a given order: with one, the valley of the minimum was
+lost in 1 of 90.
+"""
 START = -1
 """Number of the chaser's coasting orbit among the targets."""
 _NONE = -2
 
 
 class Candidate(NamedTuple):
-    """An order and times of its visits, s, whose objective, m^2/s^3, is the lowest among those near it on the grid."""
+    """An order and times of its visits, s, whose objective, m^2/s^3, is the lowest among those near
+    it on the grid.
+    """
 
     order: tuple[int, ...]
     time_s: Floats
@@ -48,7 +58,9 @@ class GridSearch(NamedTuple):
 
 
 class _Departure(NamedTuple):
-    """Legs that leave the last of a set of visited targets, and the states of all bodies at their ends."""
+    """Legs that leave the last of a set of visited targets, and the states of all bodies at their
+    ends.
+    """
 
     legs: Legs
     states: Floats
@@ -78,7 +90,8 @@ def search_grid(
 ) -> GridSearch:
     """Search times before the latest one of `limits`, and all orders or a given one, on a grid.
 
-    Each gap between visits is the minimum gap and a number of steps. `progress` is called with the share that is done.
+    Each gap between visits is the minimum gap and a number of steps. `progress` is called with the
+    share that is done.
 
     Raises
     ------
@@ -87,12 +100,13 @@ def search_grid(
 
     Notes
     -----
-    Held and Karp, "A dynamic programming approach to sequencing problems", J. SIAM 10 (1962) 196-210. A state is a set
-    of visited targets, the last of them, and the times of the last two visits. The cost to come is a quadratic of the
-    velocity at the last one, see `_cost_to_come`; of all ways to a state, that with the lowest minimum is kept. After a
-    rendezvous the time of the last visit is enough. The minimum on the grid is therefore found for up to three visits,
-    and for more if no two flybys follow each other; otherwise a way with a higher minimum could continue better. Of a
-    given order, the best four ways are kept that differ by a quarter of a revolution.
+    Held and Karp, "A dynamic programming approach to sequencing problems", J. SIAM 10 (1962)
+    196-210. A state is a set of visited targets, the last of them, and the times of the last two
+    visits. The cost to come is a quadratic of the velocity at the last one, see `_cost_to_come`; of
+    all ways to a state, that with the lowest minimum is kept. After a rendezvous the time of the
+    last visit is enough. The minimum on the grid is therefore found for up to three visits, and for
+    more if no two flybys follow each other; otherwise a way with a higher minimum could continue
+    better. Of a given order, the best four ways are kept that differ by a quarter of a revolution.
     """
     return _TimeGrid(tour, limits, order).search(progress)
 
@@ -102,7 +116,9 @@ class _TimeGrid:
 
     def __init__(self, tour: Tour, limits: TimeLimits, order: Sequence[int] | None) -> None:
         assert limits.latest_s is not None
-        self._tour, self._limits, self._order = tour, limits, order
+        self._tour = tour
+        self._limits = limits
+        self._order = order
         self._latest_s = limits.latest_s
         stays = np.sort(tour.dwell_s) if order is None else tour.dwell_s[list(order)]
         self._count = len(stays)
@@ -122,7 +138,8 @@ class _TimeGrid:
 
     def search(self, progress: Callable[[float], None] | None) -> GridSearch:
         level = {0: {START: self._start()}}
-        done, total = 0, sum(self._pairs(visits) for visits in range(1, self._count + 1))
+        done = 0
+        total = sum(self._pairs(visits) for visits in range(1, self._count + 1))
         for _ in range(self._count):
             following: dict[int, dict[int, _Visits]] = {}
             for visited, before in level.items():
@@ -149,8 +166,13 @@ class _TimeGrid:
         return comb(self._count, visits) * visits * max(visits - 1, 1)
 
     def _most_times(self) -> int:
-        """Return the largest number of times, with `MAX_TRIPLES` sequences of three times; two visits have none."""
-        passes = sum(self._pairs(visits) * (self._ranks if visits > 3 else 1) for visits in range(3, self._count + 1))
+        """Return the largest number of times, with `MAX_TRIPLES` sequences of three times; two
+        visits have none.
+        """
+        passes = sum(
+            self._pairs(visits) * (self._ranks if visits > 3 else 1)
+            for visits in range(3, self._count + 1)
+        )
         most = MAX_TIMES if self._order is not None else MAX_ORDER_TIMES
         return most if passes == 0 else min(most, int(np.cbrt(6.0 * MAX_TRIPLES / passes)))
 
@@ -168,8 +190,12 @@ class _TimeGrid:
         return _Visits(cost, np.zeros((1, size, 3)), np.zeros((1, size, 3, 3)), back)
 
     def _leave_s(self, visited: int) -> float:
-        """Return the first time at which the chaser can leave the last of a set of visited targets."""
-        stays = sum(float(stay) for target, stay in enumerate(self._tour.dwell_s) if visited >> target & 1)
+        """Return the first time at which the chaser can leave the last of a set of visited
+        targets.
+        """
+        stays = sum(
+            float(stay) for target, stay in enumerate(self._tour.dwell_s) if visited >> target & 1
+        )
         return self._tour.start_s + visited.bit_count() * self._min_gap_s + stays
 
     def _arrive_s(self, visited: int) -> Floats:
@@ -177,29 +203,42 @@ class _TimeGrid:
         return self._leave_s(visited) + self._min_gap_s + self._steps_s
 
     def _departure(self, visited: int) -> _Departure:
-        """Return what the visits after a set of visited targets need; sets with equal times share it."""
+        """Return what the visits after a set of visited targets need; sets with equal times share
+        it.
+        """
         leave_s = self._leave_s(visited)
         if leave_s not in self._departures:
-            self._departures[leave_s] = self._departure_at(leave_s + self._steps_s, self._arrive_s(visited))
+            self._departures[leave_s] = self._departure_at(
+                leave_s + self._steps_s, self._arrive_s(visited)
+            )
         return self._departures[leave_s]
 
     def _departure_at(self, leave: Floats, arrive: Floats) -> _Departure:
-        """Return the legs between times, and the states at their ends; long ones of a time-varying motion are sums."""
-        motion, size = self._tour.motion, len(leave)
+        """Return the legs between times, and the states at their ends; long ones of a time-varying
+        motion are sums.
+        """
+        motion = self._tour.motion
+        size = len(leave)
         if motion.stationary:
             segment = motion.segment(leave[0], arrive)
-            legs = Legs(np.ascontiguousarray(segment.transition[None, :, :, 3:]), segment.gramian[None])
+            legs = Legs(
+                np.ascontiguousarray(segment.transition[None, :, :, 3:]), segment.gramian[None]
+            )
             return _Departure(legs, self._states(motion.transition(np.zeros(size), arrive)))
 
-        first, step = motion.segment(leave, arrive), motion.segment(arrive[:-1], arrive[1:])
+        first = motion.segment(leave, arrive)
+        step = motion.segment(arrive[:-1], arrive[1:])
         legs = Legs(np.zeros((size, size, 6, 3)), np.zeros((size, size, 6, 6)))
-        response, gramian = first.transition[:, :, 3:], first.gramian
-        legs.response[:, 0], legs.gramian[:, 0] = response, gramian
+        response = first.transition[:, :, 3:]
+        gramian = first.gramian
+        legs.response[:, 0] = response
+        legs.gramian[:, 0] = gramian
         for length in range(1, size):
             turn = step.transition[length - 1 :]
             response = turn @ response[:-1]
             gramian = turn @ gramian[:-1] @ np.swapaxes(turn, 1, 2) + step.gramian[length - 1 :]
-            legs.response[:-length, length], legs.gramian[:-length, length] = response, gramian
+            legs.response[:-length, length] = response
+            legs.gramian[:-length, length] = gramian
         since_zero = [motion.transition(0.0, arrive[0])]
         for turn in step.transition:
             since_zero.append(turn @ since_zero[-1])
@@ -215,12 +254,16 @@ class _TimeGrid:
         initial = np.concatenate([tour.initial, chaser[None]])
         return np.ascontiguousarray(np.moveaxis(since_zero @ initial.T, 2, 0))
 
-    def _visit(self, before: dict[int, _Visits], last: int, departure: _Departure, final: bool) -> _Visits:
+    def _visit(
+        self, before: dict[int, _Visits], last: int, departure: _Departure, final: bool
+    ) -> _Visits:
         """Return the visits of the target `last` that come from targets `before`."""
-        size, flyby = len(self._steps_s), self._tour.targets[last].meet is Meet.FLYBY
+        size = len(self._steps_s)
+        flyby = self._tour.targets[last].meet is Meet.FLYBY
         legs, states = departure
         ranks = 1 if START in before else self._ranks
-        # A last rendezvous needs candidates of each time of the visit before it: of 90 valleys 2 were lost otherwise.
+        # A last rendezvous needs candidates of each time of the visit before it: of 90 valleys 2
+        # were lost otherwise.
         rows = ranks * size if (flyby or final) and START not in before else ranks
         visits = _Visits(
             np.full((rows, size), np.inf),
@@ -262,7 +305,9 @@ class _TimeGrid:
         return visits
 
     def _candidates(self, complete: int, ends: dict[int, _Visits]) -> Iterator[Candidate]:
-        """Yield the visits of all targets that are in time, and cost no more than those near them."""
+        """Yield the visits of all targets that are in time, and cost no more than those near
+        them.
+        """
         start_s = self._tour.start_s
         for last, visits in ends.items():
             arrive_s = self._arrive_s(complete & ~(1 << last))
@@ -273,15 +318,22 @@ class _TimeGrid:
                 yield Candidate(order, times, float(cost[row, at]))
 
     def _lowest(self, cost: Floats, back: Shorts) -> Flags:
-        """Return whether costs are finite and not above those near them; see `extend` for the shapes.
+        """Return whether costs are finite and not above those near them; see `extend` for the
+        shapes.
 
-        Near are those of neighbouring times whose ways come from the same target, at times that are not far apart.
+        Near are those of neighbouring times whose ways come from the same target, at times that are
+        not far apart.
         """
-        ranks, size = min(self._ranks, len(cost)), cost.shape[1]
+        ranks = min(self._ranks, len(cost))
+        size = cost.shape[1]
         shape = (len(cost) // ranks, ranks, size)
-        cost, target, decided = cost.reshape(shape), back[..., 0].reshape(shape), back[..., 3].reshape(shape)
+        cost = cost.reshape(shape)
+        target = back[..., 0].reshape(shape)
+        decided = back[..., 3].reshape(shape)
         edge = ((1, 1), (0, 0), (1, 1))
-        costs, targets, decideds = np.pad(cost, edge), np.pad(target, edge), np.pad(decided, edge)
+        costs = np.pad(cost, edge)
+        targets = np.pad(target, edge)
+        decideds = np.pad(decided, edge)
         targets[[0, -1]] = targets[..., [0, -1]] = _NONE
 
         lowest = np.isfinite(cost)
@@ -290,7 +342,8 @@ class _TimeGrid:
                 window = (slice(row, row + shape[0]), slice(None), slice(column, column + size))
                 for rank in range(ranks):
                     its_cost = costs[window][:, rank, None]
-                    its_target, its_decided = targets[window][:, rank, None], decideds[window][:, rank, None]
+                    its_target = targets[window][:, rank, None]
+                    its_decided = decideds[window][:, rank, None]
                     near = (its_target == target) & (np.abs(its_decided - decided) <= self._apart)
                     # Of equal costs, the first is a candidate.
                     lower = its_cost <= cost if (row, column) < (1, 1) else its_cost < cost
@@ -298,7 +351,9 @@ class _TimeGrid:
         return lowest.reshape(-1, size)
 
     def _way(self, visited: int, last: int, row: int, at: int) -> tuple[tuple[int, ...], Floats]:
-        """Return the order and the times of the visits of a set of targets that end in a row and at a time."""
+        """Return the order and the times of the visits of a set of targets that end in a row and at
+        a time.
+        """
         order: list[int] = []
         times: list[float] = []
         while last != START:
@@ -306,5 +361,6 @@ class _TimeGrid:
             order.append(last)
             times.append(float(self._arrive_s(earlier)[at]))
             before, at, row, _ = self._back[visited, last][row, at].tolist()
-            visited, last = earlier, before
+            visited = earlier
+            last = before
         return tuple(order[::-1]), np.array(times[::-1])

@@ -35,8 +35,8 @@ _CLOCK = 1e-9
 class Effort(Enum):
     """Effort of a search for best times.
 
-    Starts besides the guesses, starts that are followed, relative tolerance, and whether the end is polished to the
-    last digits.
+    Starts besides the guesses, starts that are followed, relative tolerance, and whether the end is
+    polished to the last digits.
     """
 
     BOUND = (1, 1, 1e-5, False)
@@ -51,7 +51,10 @@ class Effort(Enum):
     """The final answer, from the best minima known."""
 
     def __init__(self, starts: int, followed: int, tolerance: float, polished: bool) -> None:
-        self.starts, self.followed, self.tolerance, self.polished = starts, followed, tolerance, polished
+        self.starts = starts
+        self.followed = followed
+        self.tolerance = tolerance
+        self.polished = polished
 
 
 @dataclass(frozen=True)
@@ -70,7 +73,8 @@ class TimeLimits:
     Raises
     ------
     ValueError
-        If nothing limits the last time: the energy then has no minimum, because it decreases to zero as time increases.
+        If nothing limits the last time: the energy then has no minimum, because it decreases to
+        zero as time increases.
     """
 
     latest_s: float | None = None
@@ -80,13 +84,15 @@ class TimeLimits:
     def __post_init__(self) -> None:
         if self.latest_s is None and self.price_per_s == 0.0:
             raise ValueError(
-                "with the last time free the energy falls to zero as it grows, so there is no best time: "
-                "give a latest time, or a price of time"
+                "with the last time free the energy falls to zero as it grows, so there is no "
+                "best time: give a latest time, or a price of time"
             )
 
 
 class Grid(NamedTuple):
-    """Equally spaced times of the first visit, and of later ones with the same gaps and stays before them."""
+    """Equally spaced times of the first visit, and of later ones with the same gaps and stays
+    before them.
+    """
 
     times: int
     until_s: float
@@ -99,7 +105,9 @@ class TimeSearch(NamedTuple):
     starts: int
     """Starting points, the guesses included, whose cost was computed."""
     followed: int
-    """Starting points that were followed to a local minimum, the cheapest of which is the result."""
+    """Starting points that were followed to a local minimum, the cheapest of which is the
+    result.
+    """
     grid: Grid | None = None
     """The grid of times from which the starting points are; None if they are from no grid."""
 
@@ -108,7 +116,8 @@ class TimeSearch(NamedTuple):
 class BestTimes:
     """Visits at the best times that were found, which are a local minimum.
 
-    `objective` is the energy plus the price of the time, m^2/s^3; `evaluations` is the number of paths computed.
+    `objective` is the energy plus the price of the time, m^2/s^3; `evaluations` is the number of
+    paths computed.
     """
 
     path: Path
@@ -124,7 +133,9 @@ class BestTimes:
 
 @dataclass(frozen=True, eq=False)
 class _Trial:
-    """Gaps, the path at their times, its objective and the slope of the objective along the gaps."""
+    """Gaps, the path at their times, its objective and the slope of the objective along the
+    gaps.
+    """
 
     gaps: Floats
     path: Path
@@ -142,7 +153,9 @@ class _StoppedError(Exception):
 
 @dataclass
 class _Trials:
-    """The objective as a function of gaps, with the limits of the gaps; it counts its evaluations."""
+    """The objective as a function of gaps, with the limits of the gaps; it counts its
+    evaluations.
+    """
 
     fly: FlyAt
     shifts_s: Floats
@@ -162,7 +175,9 @@ class _Trials:
         gradient = path.time_gradient.copy()
         gradient[-1] += self.price_per_s
         slope = np.cumsum(gradient[::-1])[::-1]
-        return _Trial(gaps, path, path.cost + self.price_per_s * float(times[-1] - self.shifts_s[0]), slope)
+        return _Trial(
+            gaps, path, path.cost + self.price_per_s * float(times[-1] - self.shifts_s[0]), slope
+        )
 
     def attempt(self, gaps: Floats) -> _Trial | None:
         """Return None instead of an error if there is no path at such times."""
@@ -220,24 +235,28 @@ def optimise_times(
 
     Notes
     -----
-    The problem is not convex. Many starts are evaluated, and the search begins with those that cost no more than their
-    neighbours; a lower minimum elsewhere is not excluded. The descent is
-    sequential quadratic programming in the gaps, on the logarithm of the objective, with the exact gradient dI/dt; then
-    Newton's method, with differences of the gradient, on the gaps that are not at a limit. Each step computes one path.
+    The problem is not convex. Many starts are evaluated, and the search begins with those that cost
+    no more than their neighbours; a lower minimum elsewhere is not excluded. The descent is
+    sequential quadratic programming in the gaps, on the logarithm of the objective, with the exact
+    gradient dI/dt; then Newton's method, with differences of the gradient, on the gaps that are not
+    at a limit. Each step computes one path.
     """
     count = len(dwell_s)
     shifts = start_s + np.concatenate([[0.0], np.cumsum(dwell_s[:-1])])
     total = room_s(start_s, dwell_s, limits)
     scale = total
     if np.isinf(total):
-        scale = max((float(guess[-1]) - start_s for guess in guesses if len(guess) == count), default=0.0)
+        scale = max(
+            (float(guess[-1]) - start_s for guess in guesses if len(guess) == count), default=0.0
+        )
         if scale <= 0.0:
             raise ValueError("with the last time free, times to start from are needed")
     minimum = max(limits.min_gap_s, MIN_SHARE * scale)
     trials = _Trials(fly, shifts, limits.price_per_s, minimum, total, scale)
     candidates = [np.diff(np.concatenate([[0.0], np.asarray(guess) - shifts])) for guess in guesses]
     candidates += _spread(count, scale, minimum, bounded=np.isfinite(total), most=effort.starts)
-    # Differences of times outside the limits by rounding, which is relative to the clock, are moved into them.
+    # Differences of times outside the limits by rounding, which is relative to the clock, are moved
+    # into them.
     sound = [
         trials.within(gaps)
         for gaps in candidates
@@ -266,19 +285,23 @@ def optimise_times(
             best = again
         if not _unsettled(trials, best) <= _SETTLED:
             raise NotSettledError(
-                f"the best times found cost {best.objective:.6g} m^2/s^3 and are no minimum: another gap lowers the "
-                "cost; start from other times, or give visits more time"
+                f"the best times found cost {best.objective:.6g} m^2/s^3 and are no minimum: "
+                "another gap lowers the cost; start from other times, or give visits more time"
             )
-    return BestTimes(best.path, best.objective, trials.evaluations, TimeSearch(len(starts), len(ends)))
+    return BestTimes(
+        best.path, best.objective, trials.evaluations, TimeSearch(len(starts), len(ends))
+    )
 
 
 def _unsettled(trials: _Trials, best: _Trial) -> float:
     """Return the residual of the conditions of a minimum, relative to the objective.
 
-    To first order, the share of the objective by which a change of one gap by its length, or down to the minimum gap,
-    would lower it, as far as the limits let it change; at the latest time, at the cost of the other gaps.
+    To first order, the share of the objective by which a change of one gap by its length, or down
+    to the minimum gap, would lower it, as far as the limits let it change; at the latest time, at
+    the cost of the other gaps.
     """
-    gaps, excess = best.gaps, np.maximum(best.gaps - trials.minimum, 0.0)
+    gaps = best.gaps
+    excess = np.maximum(best.gaps - trials.minimum, 0.0)
     slope = best.slope
     full = bool(np.isfinite(trials.total)) and trials.total - gaps.sum() <= 1e-9 * trials.total
     if full and excess.sum() > 0.0:
@@ -292,7 +315,9 @@ def _unsettled(trials: _Trials, best: _Trial) -> float:
 
 
 def room_s(start_s: float, dwell_s: Floats, limits: TimeLimits) -> float:
-    """Return the time for travel, s, infinite without a latest time; raise `NoRoomError` if the visits do not fit."""
+    """Return the time for travel, s, infinite without a latest time; raise `NoRoomError` if the
+    visits do not fit.
+    """
     if limits.latest_s is None:
         return float(np.inf)
     stays = float(dwell_s[:-1].sum())
@@ -301,15 +326,17 @@ def room_s(start_s: float, dwell_s: Floats, limits: TimeLimits) -> float:
     clock = max(abs(limits.latest_s), abs(start_s))
     if not total > _CLOCK * clock or total < need - 1e-14 * clock:
         raise NoRoomError(
-            f"{len(dwell_s)} visits do not fit before the latest time, {limits.latest_s:g} s: with gaps of at least "
-            f"{limits.min_gap_s:g} s and the dwells the last one is after {start_s + stays + need:g} s at the "
-            "earliest"
+            f"{len(dwell_s)} visits do not fit before the latest time, {limits.latest_s:g} s: with "
+            f"gaps of at least {limits.min_gap_s:g} s and the dwells the last one is after "
+            f"{start_s + stays + need:g} s at the earliest"
         )
     return max(total, need)
 
 
 def _spread(count: int, scale: float, minimum: float, bounded: bool, most: int) -> list[Floats]:
-    """Return initial gaps: even, rising and falling, over all the time and over half of it, and a Halton sequence."""
+    """Return initial gaps: even, rising and falling, over all the time and over half of it, and a
+    Halton sequence.
+    """
     rising = np.arange(1.0, count + 1.0)
     lengths = (1.0, 0.5) if bounded else (0.5, 1.0, 2.0, 4.0, 8.0)
     extra = max(scale - count * minimum, 0.0) if bounded else scale
@@ -325,24 +352,33 @@ def _spread(count: int, scale: float, minimum: float, bounded: bool, most: int) 
 
 
 def _valleys(starts: Sequence[_Trial], most: int) -> list[_Trial]:
-    """Return one start of each valley, the cheapest first: those that cost no more than the ones nearest to them.
+    """Return one start of each valley, the cheapest first: those that cost no more than the ones
+    nearest to them.
 
-    Toern and Viitanen, "Topographical global optimization using pre-sampled points", J. Global Optim. 5 (1994) 267-276.
+    Toern and Viitanen, "Topographical global optimization using pre-sampled points", J. Global
+    Optim. 5 (1994) 267-276.
     """
     ranked = sorted(starts, key=lambda trial: trial.objective)
     gaps = np.stack([trial.gaps for trial in ranked])
-    nearest = cKDTree(gaps).query(gaps, k=min(len(ranked), gaps.shape[1] + 2))[1].reshape(len(ranked), -1)
+    nearest = (
+        cKDTree(gaps).query(gaps, k=min(len(ranked), gaps.shape[1] + 2))[1].reshape(len(ranked), -1)
+    )
     lowest = (nearest >= np.arange(len(ranked))[:, None]).all(axis=1)
     return [ranked[index] for index in np.argsort(~lowest, kind="stable")[:most]]
 
 
-def _descend(trials: _Trials, start: _Trial, scale: float | Floats, tolerance: float, enough: float) -> _Trial:
-    """Minimise from a start, in gaps over `scale`; stop below `enough`, or after a few points without a path."""
+def _descend(
+    trials: _Trials, start: _Trial, scale: float | Floats, tolerance: float, enough: float
+) -> _Trial:
+    """Minimise from a start, in gaps over `scale`; stop below `enough`, or after a few points
+    without a path.
+    """
     if start.objective < enough:
         return start
     floor = 1e-30 * max(start.objective, 1e-270)
     shares = np.broadcast_to(scale, start.gaps.shape) / trials.total
-    walls, lowest = 0, start
+    walls = 0
+    lowest = start
 
     def value(x: Floats) -> tuple[float, Floats]:
         nonlocal walls, lowest
@@ -361,7 +397,11 @@ def _descend(trials: _Trials, start: _Trial, scale: float | Floats, tolerance: f
         return float(np.log(size)), trial.slope * (scale / size)
 
     constraints = (
-        {"type": "ineq", "fun": lambda x: 1.0 - (x * scale).sum() / trials.total, "jac": lambda _: -shares}
+        {
+            "type": "ineq",
+            "fun": lambda x: 1.0 - (x * scale).sum() / trials.total,
+            "jac": lambda _: -shares,
+        }
         if np.isfinite(trials.total)
         else ()
     )
@@ -370,7 +410,10 @@ def _descend(trials: _Trials, start: _Trial, scale: float | Floats, tolerance: f
             value,
             start.gaps / scale,
             jac=True,
-            bounds=[(float(bound), None) for bound in np.broadcast_to(trials.minimum / scale, start.gaps.shape)],
+            bounds=[
+                (float(bound), None)
+                for bound in np.broadcast_to(trials.minimum / scale, start.gaps.shape)
+            ],
             constraints=constraints,
             method="SLSQP",
             options={"ftol": tolerance, "maxiter": 100},
@@ -383,7 +426,9 @@ def _descend(trials: _Trials, start: _Trial, scale: float | Floats, tolerance: f
 
 def _polish(trials: _Trials, best: _Trial) -> _Trial:
     """Newton's method on the gaps above the minimum gap; at the latest time their sum is fixed."""
-    minimum, total, near = trials.minimum, trials.total, 1e-5 * trials.scale
+    minimum = trials.minimum
+    total = trials.total
+    near = 1e-5 * trials.scale
     gaps = best.gaps
     full = total - gaps.sum() <= near
     held = gaps - minimum <= _HELD * minimum
@@ -398,14 +443,19 @@ def _polish(trials: _Trials, best: _Trial) -> _Trial:
     here = trials(gaps)
     step = _DIFFERENCE * float(gaps.min())
     for _ in range(_POLISH_ROUNDS if directions.shape[1] else 0):
-        slopes = [trials(here.gaps + step * way).slope - trials(here.gaps - step * way).slope for way in directions.T]
+        slopes = [
+            trials(here.gaps + step * way).slope - trials(here.gaps - step * way).slope
+            for way in directions.T
+        ]
         hessian = directions.T @ np.stack(slopes, axis=1) / (2.0 * step)
         hessian = 0.5 * (hessian + hessian.T)
         if not np.isfinite(hessian).all() or np.linalg.eigvalsh(hessian)[0] <= 0.0:
             break
         move = -directions @ np.linalg.solve(hessian, directions.T @ here.slope)
         moved = here.gaps + move
-        outside = bool((moved < minimum * (1.0 - 1e-12)).any() or moved.sum() > total * (1.0 + 1e-12))
+        outside = bool(
+            (moved < minimum * (1.0 - 1e-12)).any() or moved.sum() > total * (1.0 + 1e-12)
+        )
         if outside or np.abs(move).max() > 0.1 * float(here.gaps.min()):
             break
         trial = trials(moved)

@@ -47,7 +47,8 @@ class Target:
 
 
 class Visits(ABC):
-    """Moving targets and the start (`start_s`, `start_state`) of a chaser that visits them; all move in one dynamics.
+    """Moving targets and the start (`start_s`, `start_state`) of a chaser that visits them; all
+    move in one dynamics.
 
     Raises
     ------
@@ -76,10 +77,13 @@ class Visits(ABC):
 
     @abstractmethod
     def flyer(self, order: Sequence[int]) -> Callable[[Floats], Path]:
-        """Return `fly` for one `order` as a function of N times, which remembers what helps it to find paths."""
+        """Return `fly` for one `order` as a function of N times, which remembers what helps it to
+        find paths.
+        """
 
     def fly(self, order: Sequence[int], time_s: ArrayLike) -> Path:
-        """Return the path of minimum energy that reaches targets in an `order`, some or all, each once, at N times.
+        """Return the path of minimum energy that reaches targets in an `order`, some or all, each
+        once, at N times.
 
         `ValueError` is raised if times do not increase; other errors are those of `flyer`.
         """
@@ -109,8 +113,8 @@ class Visits(ABC):
 class Tour(Visits):
     """A chaser and the targets it visits, in the same linear motion.
 
-    `initial`, shape (n, 6), are the states of the targets at t = 0, and `start_state`, shape (6,), is the chaser's at
-    the start, m and m/s.
+    `initial`, shape (n, 6), are the states of the targets at t = 0, and `start_state`, shape (6,),
+    is the chaser's at the start, m and m/s.
     """
 
     motion: LinearMotion
@@ -120,13 +124,19 @@ class Tour(Visits):
     start_s: float = 0.0
 
     ruggedness = SMOOTH
-    """Small: the path of given times is unique, and the costs of an order's few local minima are close."""
+    """Small: the path of given times is unique, and the costs of an order's few local minima are
+    close.
+    """
 
     def target_states(self, which: Integers, time_s: Floats) -> Floats:
         """States, m and m/s, of the k targets numbered `which` at k times, shape (k, 6)."""
-        coasted = self.motion.transition(np.zeros(time_s.shape), time_s) @ self.initial[which][:, :, None]
+        coasted = (
+            self.motion.transition(np.zeros(time_s.shape), time_s) @ self.initial[which][:, :, None]
+        )
         return np.asarray(coasted[:, :, 0])
 
     def flyer(self, order: Sequence[int]) -> Callable[[Floats], LinearPath]:
         """Return `fly` for one `order`; the path is unique."""
-        return lambda time_s: solve_segments(self.motion, self.start_s, self.start_state, self.nodes(order, time_s))
+        return lambda time_s: solve_segments(
+            self.motion, self.start_s, self.start_state, self.nodes(order, time_s)
+        )

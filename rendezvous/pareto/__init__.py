@@ -1,6 +1,11 @@
 """Minimum-energy encounter of several craft, and the choice among its Pareto-optimal meetings."""
 
-from infoset.rendezvous.pareto.bounded import BoundedEncounter, NeededBound, bound_encounter, needed_bound
+from infoset.rendezvous.pareto.bounded import (
+    BoundedEncounter,
+    NeededBound,
+    bound_encounter,
+    needed_bound,
+)
 from infoset.rendezvous.pareto.coalitions import Coalition, Coalitions, Core, analyse_coalitions
 from infoset.rendezvous.pareto.encounter import Component, Craft, Encounter, Meeting
 from infoset.rendezvous.pareto.front import distances, pareto_set, simplex_weights

@@ -7,7 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from infoset.rendezvous._arrays import Floats
-from infoset.rendezvous.bounded_control import Arc, BoundedFlight, BoundTooSmallError, least_bound, solve_bounded
+from infoset.rendezvous.bounded_control import (
+    Arc,
+    BoundedFlight,
+    BoundTooSmallError,
+    least_bound,
+    solve_bounded,
+)
 from infoset.rendezvous.pareto.encounter import Craft, Encounter
 from infoset.rendezvous.pareto.solution import EncounterSolution
 
@@ -36,24 +42,31 @@ class BoundedEncounter:
 
 @dataclass(frozen=True)
 class NeededBound:
-    """The smallest bound with which a meeting is possible, m/s^2, and the `craft`, by number, that need it."""
+    """The smallest bound with which a meeting is possible, m/s^2, and the `craft`, by number, that
+    need it.
+    """
 
     value_m_s2: float
     craft: tuple[int, ...]
 
 
 _NEEDS_IT = 1e-3
-"""Share of the smallest bound's direction above which a craft is among those that need it: rounding is below 1e-6."""
+"""Share of the smallest bound's direction above which a craft is among those that need it: rounding
+is below 1e-6.
+"""
 
 
 def needed_bound(encounter: Encounter) -> NeededBound:
-    """Return the smallest bound with which any meeting of an `encounter` is possible; to 1e-6 from below."""
+    """Return the smallest bound with which any meeting of an `encounter` is possible; to 1e-6 from
+    below.
+    """
     least = least_bound([_arc(encounter, craft, 1.0) for craft in encounter.craft])
     return NeededBound(least.value_m_s2, tuple(np.flatnonzero(least.shares > _NEEDS_IT).tolist()))
 
 
 def bound_encounter(solution: EncounterSolution, max_m_s2: float) -> BoundedEncounter:
-    """Return the meeting of minimum group loss of a solved encounter with |u| <= `max_m_s2` for every craft.
+    """Return the meeting of minimum group loss of a solved encounter with |u| <= `max_m_s2` for
+    every craft.
 
     A craft of weight 0 does not count in the choice of the meeting, but must reach it.
 
@@ -64,7 +77,9 @@ def bound_encounter(solution: EncounterSolution, max_m_s2: float) -> BoundedEnco
     """
     encounter = solution.encounter
     counted = [index for index, craft in enumerate(encounter.craft) if craft.weight > 0.0]
-    arcs = [_arc(encounter, encounter.craft[index], encounter.craft[index].weight) for index in counted]
+    arcs = [
+        _arc(encounter, encounter.craft[index], encounter.craft[index].weight) for index in counted
+    ]
     optimum = solve_bounded(arcs, max_m_s2)
     energies = np.empty(len(encounter.craft))
     energies[counted] = optimum.energies
@@ -74,13 +89,20 @@ def bound_encounter(solution: EncounterSolution, max_m_s2: float) -> BoundedEnco
         if index in costates:
             continue
         arc = _arc(encounter, craft, 1.0)
-        to_point = Arc(arc.motion, arc.start_s, arc.end_s, arc.missing + arc.slope @ optimum.free, arc.slope[:, :0])
+        to_point = Arc(
+            arc.motion,
+            arc.start_s,
+            arc.end_s,
+            arc.missing + arc.slope @ optimum.free,
+            arc.slope[:, :0],
+        )
         try:
             alone = solve_bounded([to_point], max_m_s2)
         except BoundTooSmallError:
             raise BoundTooSmallError(
-                f"the craft {craft.name}, of weight 0, does not reach the meeting of the others with at most "
-                f"{max_m_s2:g} m/s^2; it needs {least_bound([to_point]).value_m_s2:.6g} m/s^2"
+                f"the craft {craft.name}, of weight 0, does not reach the meeting of the others "
+                f"with at most {max_m_s2:g} m/s^2; it needs "
+                f"{least_bound([to_point]).value_m_s2:.6g} m/s^2"
             ) from None
         energies[index] = alone.energies[0]
         costates[index] = (alone.costates[0], alone.edges_s[0])
@@ -105,4 +127,11 @@ def _arc(encounter: Encounter, craft: Craft, weight: float) -> Arc:
     common = encounter.common
     coasted = craft.motion.transition(craft.start_s, encounter.meeting_s) @ craft.state
     missing = (encounter.base - coasted)[:common]
-    return Arc(craft.motion, craft.start_s, encounter.meeting_s, missing, encounter.opening[:common], weight)
+    return Arc(
+        craft.motion,
+        craft.start_s,
+        encounter.meeting_s,
+        missing,
+        encounter.opening[:common],
+        weight,
+    )

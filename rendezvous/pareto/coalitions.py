@@ -14,7 +14,9 @@ from infoset.rendezvous.pareto.solution import EncounterSolution, weighted_point
 
 MAX_CRAFT = 12
 _ROUNDING = 1e-18
-"""Excess that is the rounding of an ideal, relative to the squared cost that the free values change."""
+"""Excess that is the rounding of an ideal, relative to the squared cost that the free values
+change.
+"""
 
 
 class Core(Enum):
@@ -28,12 +30,13 @@ class Core(Enum):
         """The reason, in a sentence."""
         if self is Core.EMPTY:
             return (
-                "the core is empty: each craft alone has zero excess, so its share in the core is at most zero, but "
-                "the shares must sum to the cost of the common meeting, which is positive"
+                "the core is empty: each craft alone has zero excess, so its share in the core is "
+                "at most zero, but the shares must sum to the cost of the common meeting, which "
+                "is positive"
             )
         return (
-            "the ideal meetings of all craft with a weight above 0 coincide: these craft have no excess, and in the "
-            "only division of the core all shares are zero"
+            "the ideal meetings of all craft with a weight above 0 coincide: these craft have no "
+            "excess, and in the only division of the core all shares are zero"
         )
 
 
@@ -41,8 +44,8 @@ class Core(Enum):
 class Coalition:
     """A coalition of craft, whose `members` are indices.
 
-    `excess` is c(S), their minimum weighted sum of excesses at a common meeting, and `regret` its increase at the
-    common meeting of all; both in m^2/s^3.
+    `excess` is c(S), their minimum weighted sum of excesses at a common meeting, and `regret` its
+    increase at the common meeting of all; both in m^2/s^3.
     """
 
     members: tuple[int, ...]
@@ -54,9 +57,9 @@ class Coalition:
 class Coalitions:
     """All coalitions of an encounter, by size, from single craft to the coalition of all.
 
-    `shapley`, shape (n,), is the Shapley value of the cost game c, and `core` the core of this game. `transfers`, shape
-    (n,), are payments to each craft that leave it with its Shapley value: its weighted excess minus that value, of sum
-    zero. Both are in m^2/s^3.
+    `shapley`, shape (n,), is the Shapley value of the cost game c, and `core` the core of this
+    game. `transfers`, shape (n,), are payments to each craft that leave it with its Shapley value:
+    its weighted excess minus that value, of sum zero. Both are in m^2/s^3.
     """
 
     coalitions: tuple[Coalition, ...]
@@ -68,8 +71,9 @@ class Coalitions:
 def analyse_coalitions(solution: EncounterSolution) -> Coalitions:
     """Analyse every coalition of a `solution`, whose meeting is the best one for the group.
 
-    With one M and equal weights c(S) = sum over pairs of d_ij^2 / |S|. c is superadditive with c({i}) = 0, so its core
-    is empty unless all ideals of craft with a weight above 0 coincide. O(2^n n).
+    With one M and equal weights c(S) = sum over pairs of d_ij^2 / |S|. c is superadditive with
+    c({i}) = 0, so its core is empty unless all ideals of craft with a weight above 0 coincide.
+    O(2^n n).
 
     Raises
     ------
@@ -78,7 +82,9 @@ def analyse_coalitions(solution: EncounterSolution) -> Coalitions:
     """
     count = len(solution.costs)
     if count > MAX_CRAFT:
-        raise ValueError(f"{count} craft have {2**count - 1} coalitions; at most {MAX_CRAFT} craft are analysed")
+        raise ValueError(
+            f"{count} craft have {2**count - 1} coalitions; at most {MAX_CRAFT} craft are analysed"
+        )
     weights = solution.encounter.weights
     common = weights * solution.excess()
     worth: dict[tuple[int, ...], float] = {(): 0.0}
@@ -95,9 +101,13 @@ def analyse_coalitions(solution: EncounterSolution) -> Coalitions:
             orders = factorial(len(others)) * factorial(count - len(members))
             shapley[craft] += orders / factorial(count) * (value - worth[others])
     # Equal ideals are equal up to rounding only.
-    rounding = _ROUNDING * sum(weights * [cost.effort_base @ cost.effort_base for cost in solution.costs])
+    rounding = _ROUNDING * sum(
+        weights * [cost.effort_base @ cost.effort_base for cost in solution.costs]
+    )
     core = Core.EMPTY if worth[tuple(range(count))] > rounding else Core.ZERO
-    return Coalitions(tuple(coalitions), shapley, common - shapley - (common.sum() - shapley.sum()) / count, core)
+    return Coalitions(
+        tuple(coalitions), shapley, common - shapley - (common.sum() - shapley.sum()) / count, core
+    )
 
 
 def _worth(solution: EncounterSolution, members: tuple[int, ...], weights: Floats) -> float:
@@ -105,4 +115,9 @@ def _worth(solution: EncounterSolution, members: tuple[int, ...], weights: Float
     if len(members) == 1 or not (weights[list(members)] > 0.0).any():
         return 0.0
     point = weighted_point(costs, weights[list(members)])
-    return float(sum(weights[member] * cost.excess(point) for member, cost in zip(members, costs, strict=True)))
+    return float(
+        sum(
+            weights[member] * cost.excess(point)
+            for member, cost in zip(members, costs, strict=True)
+        )
+    )

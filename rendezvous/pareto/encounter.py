@@ -35,8 +35,8 @@ class Meeting(Enum):
 class Craft:
     """A craft that takes part.
 
-    `state`, shape (6,), is (x, y, z, vx, vy, vz) at its start, in Hill's axes, m and m/s. The `weight` of its excess in
-    the loss of the group is not negative.
+    `state`, shape (6,), is (x, y, z, vx, vy, vz) at its start, in Hill's axes, m and m/s. The
+    `weight` of its excess in the loss of the group is not negative.
     """
 
     name: str
@@ -50,13 +50,15 @@ class Craft:
 class Encounter:
     """Craft that meet at one time.
 
-    `free` lists the free components of the terminal state, at least one; for an intercept of the position only.
-    `fixed`, shape (6,), contains the values of the other components, m and m/s; those of free components are ignored.
+    `free` lists the free components of the terminal state, at least one; for an intercept of the
+    position only. `fixed`, shape (6,), contains the values of the other components, m and m/s;
+    those of free components are ignored.
 
     Raises
     ------
     ValueError
-        If there is no free component, all weights are zero, a craft starts at the meeting or later, or names repeat.
+        If there is no free component, all weights are zero, a craft starts at the meeting or later,
+        or names repeat.
     """
 
     craft: tuple[Craft, ...]
@@ -70,13 +72,17 @@ class Encounter:
             raise ValueError("two craft have the same name")
         if not self.free or len(set(self.free)) < len(self.free):
             raise ValueError("name one or more free components of x, y, z, vx, vy, vz, each once")
-        if self.meeting is Meeting.INTERCEPT and any(component.value >= 3 for component in self.free):
-            raise ValueError("the velocities of the craft differ in an intercept; free only x, y and z")
+        if self.meeting is Meeting.INTERCEPT and any(
+            component.value >= 3 for component in self.free
+        ):
+            raise ValueError(
+                "the velocities of the craft differ in an intercept; free only x, y and z"
+            )
         for craft in self.craft:
             if not craft.start_s < self.meeting_s:
                 raise ValueError(
-                    f"craft {craft.name!r}: it must start before the meeting at {self.meeting_s!r} s, found "
-                    f"{craft.start_s!r} s"
+                    f"craft {craft.name!r}: it must start before the meeting at {self.meeting_s!r} "
+                    f"s, found {craft.start_s!r} s"
                 )
         if not any(craft.weight > 0.0 for craft in self.craft):
             raise ValueError("all weights are zero; give one craft a positive weight")
@@ -88,7 +94,9 @@ class Encounter:
 
     @property
     def common(self) -> int:
-        """Number of components of the terminal state that the craft have in common: 6, or the 3 of the position."""
+        """Number of components of the terminal state that the craft have in common: 6, or the 3 of
+        the position.
+        """
         return 6 if self.meeting is Meeting.RENDEZVOUS else 3
 
     @property

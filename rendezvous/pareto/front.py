@@ -12,9 +12,9 @@ from infoset.rendezvous.pareto.solution import EncounterSolution
 def pareto_set(solution: EncounterSolution, weights: Floats) -> Floats:
     """Return Pareto-optimal meetings of a `solution`, shape (k, f), for `weights`, shape (k, n).
 
-    They are free terminal values; the weights are not negative, nor all zero in a row. (sum w_i M_i)^-1 sum w_i M_i
-    p_i*: with one M the convex hull of the ideals, otherwise curved. All weights together cover the set, as the
-    excesses are convex.
+    They are free terminal values; the weights are not negative, nor all zero in a row. (sum w_i
+    M_i)^-1 sum w_i M_i p_i*: with one M the convex hull of the ideals, otherwise curved. All
+    weights together cover the set, as the excesses are convex.
     """
     shares = weights / weights.sum(axis=1, keepdims=True)
     ideals = solution.ideals
@@ -30,9 +30,11 @@ def pareto_set(solution: EncounterSolution, weights: Floats) -> Floats:
 
 
 def simplex_weights(craft: int, count: int) -> Floats:
-    """Return about `count` rows of weights, shape (k, craft), spread evenly over all shares of `craft` craft.
+    """Return about `count` rows of weights, shape (k, craft), spread evenly over all shares of
+    `craft` craft.
 
-    Those of single craft are included. A lattice up to three craft, beyond that a low-discrepancy sequence.
+    Those of single craft are included. A lattice up to three craft, beyond that a low-discrepancy
+    sequence.
     """
     if craft == 1:
         return np.ones((1, 1))
@@ -49,6 +51,8 @@ def simplex_weights(craft: int, count: int) -> Floats:
 
 
 def distances(solution: EncounterSolution) -> Floats:
-    """Return d_ij = |p_i* - p_j*|_M of the ideals of a `solution` with one M, m/s^1.5, shape (n, n)."""
+    """Return d_ij = |p_i* - p_j*|_M of the ideals of a `solution` with one M, m/s^1.5, shape (n,
+    n).
+    """
     scaled = solution.ideals @ solution.costs[0].root.T
     return np.asarray(np.linalg.norm(scaled[:, None] - scaled, axis=-1))

@@ -12,19 +12,24 @@ from infoset.rendezvous._arrays import Floats
 from infoset.rendezvous.pareto.solution import EncounterSolution
 
 _CORNER = 1e-20
-"""Square of the radius of the rounded corner of a norm, relative to the distance of the farthest ideal."""
+"""Square of the radius of the rounded corner of a norm, relative to the distance of the farthest
+ideal.
+"""
 
 
 def min_sum_of_costs(solution: EncounterSolution) -> Floats:
-    """Return the free values, shape (f,), that minimise sum w_i J_i of a `solution`: costs like impulses.
+    """Return the free values, shape (f,), that minimise sum w_i J_i of a `solution`: costs like
+    impulses.
 
-    A sum of norms of affine functions, convex: Newton's method in a trust region. It begins at the best of the mean
-    of the ideals and the ideals that cost nothing, where the norm has a corner.
+    A sum of norms of affine functions, convex: Newton's method in a trust region. It begins at the
+    best of the mean of the ideals and the ideals that cost nothing, where the norm has a corner.
     """
     roots, back, middle, ideals, size, weights = _scaled(solution)
     if size == 0.0:
         return middle
-    floors = np.array([cost.ideal_cost_squared for cost in solution.costs])[solution.encounter.weights > 0.0]
+    floors = np.array([cost.ideal_cost_squared for cost in solution.costs])[
+        solution.encounter.weights > 0.0
+    ]
     floors = floors / size**2 + _CORNER
 
     def costs(point: Floats) -> tuple[Floats, Floats]:
@@ -50,15 +55,18 @@ def min_sum_of_costs(solution: EncounterSolution) -> Floats:
 
 
 def minimax_excess(solution: EncounterSolution) -> Floats:
-    """Return the free values, shape (f,), that minimise the maximum weighted excess of a `solution`.
+    """Return the free values, shape (f,), that minimise the maximum weighted excess of a
+    `solution`.
 
-    With one M, the centre of the smallest enclosing ball. Sequential quadratic programming on (p, t), minimum t with
-    w_i e_i(p) <= t, then Newton's method on the conditions of the active craft.
-    If weights differ by a factor of 1e4 and more, the maximum can be up to 1e-4 of itself above the minimum.
+    With one M, the centre of the smallest enclosing ball. Sequential quadratic programming on (p,
+    t), minimum t with w_i e_i(p) <= t, then Newton's method on the conditions of the active craft.
+    If weights differ by a factor of 1e4 and more, the maximum can be up to 1e-4 of itself above the
+    minimum.
     """
     costs = [cost for cost in solution.costs if cost.craft.weight > 0.0]
     weights = np.array([cost.craft.weight for cost in costs])
-    roots, centres = np.array([cost.root for cost in costs]), np.array([cost.ideal for cost in costs])
+    roots = np.array([cost.root for cost in costs])
+    centres = np.array([cost.ideal for cost in costs])
     matrices = np.einsum("n,nca,ncb->nab", weights, roots, roots)
     scale = np.linalg.inv(np.linalg.cholesky(matrices.mean(axis=0)).T)
     scaled = np.einsum("ca,ncd,db->nab", scale, matrices, scale)
@@ -95,7 +103,8 @@ def minimax_excess(solution: EncounterSolution) -> Floats:
 
 
 def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
-    """Return the Pareto-optimal free values of a `solution` nearest to `preferred` ones, shape (f,), in the norm of M.
+    """Return the Pareto-optimal free values of a `solution` nearest to `preferred` ones, shape
+    (f,), in the norm of M.
 
     An exact projection onto the convex hull of the ideals.
 
@@ -107,42 +116,64 @@ def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
     matrices = np.array([cost.matrix for cost in solution.costs])
     unit = matrices / np.trace(matrices, axis1=1, axis2=2)[:, None, None]
     if not np.allclose(unit, unit[0], rtol=1e-12, atol=1e-15):
-        raise ValueError("the meeting nearest to a preferred one is known only for craft that start at the same time")
-    root, ideals = solution.costs[0].root, solution.ideals
-    known, target = (ideals - ideals[0]) @ root.T, root @ (preferred - ideals[0])
+        raise ValueError(
+            "the meeting nearest to a preferred one is known only for craft that start at the "
+            "same time"
+        )
+    root = solution.costs[0].root
+    ideals = solution.ideals
+    known = (ideals - ideals[0]) @ root.T
+    target = root @ (preferred - ideals[0])
     nearest = nearest_pair(known, target[None]).point
     return np.asarray(ideals[0] + np.linalg.solve(root, nearest))
 
 
 def _scaled(solution: EncounterSolution) -> tuple[Floats, Floats, Floats, Floats, float, Floats]:
-    """Return the craft of positive weight in coordinates x in which their M are of order one, p = middle + size back x.
+    """Return the craft of positive weight in coordinates x in which their M are of order one, p =
+    middle + size back x.
 
-    The results are the roots of M, `back`, the `middle` of the ideals, the ideals, `size`, which is zero if all ideals
-    coincide, and the weights.
+    The results are the roots of M, `back`, the `middle` of the ideals, the ideals, `size`, which is
+    zero if all ideals coincide, and the weights.
     """
     costs = [cost for cost in solution.costs if cost.craft.weight > 0.0]
     weights = np.array([cost.craft.weight for cost in costs])
-    matrices, ideals = np.array([cost.matrix for cost in costs]), np.array([cost.ideal for cost in costs])
+    matrices = np.array([cost.matrix for cost in costs])
+    ideals = np.array([cost.ideal for cost in costs])
     root = np.linalg.cholesky(np.einsum("n,nab->ab", weights / weights.sum(), matrices)).T
-    back, middle = np.linalg.inv(root), ideals.mean(axis=0)
+    back = np.linalg.inv(root)
+    middle = ideals.mean(axis=0)
     apart = (ideals - middle) @ root.T
     size = float(np.linalg.norm(apart, axis=1).max())
-    return np.array([cost.root for cost in costs]) @ back, back, middle, apart / (size or 1.0), size, weights
+    return (
+        np.array([cost.root for cost in costs]) @ back,
+        back,
+        middle,
+        apart / (size or 1.0),
+        size,
+        weights,
+    )
 
 
 def _bound_craft(
-    point: Floats, excess: Callable[[Floats], Floats], slopes: Callable[[Floats], Floats], matrices: Floats
+    point: Floats,
+    excess: Callable[[Floats], Floats],
+    slopes: Callable[[Floats], Floats],
+    matrices: Floats,
 ) -> Floats:
     """Polish a minimax point: equal excesses of the active craft, slopes that cancel."""
     values = excess(point)
     bound = np.flatnonzero(values >= values.max() * (1.0 - 1e-5))
-    count, free = len(bound), len(point)
+    count = len(bound)
+    free = len(point)
     shares = np.linalg.lstsq(
-        np.vstack([slopes(point)[bound].T, np.ones(count)]), np.append(np.zeros(free), 1.0), rcond=None
+        np.vstack([slopes(point)[bound].T, np.ones(count)]),
+        np.append(np.zeros(free), 1.0),
+        rcond=None,
     )[0]
     best = point
     for _ in range(8):
-        values, tilts = excess(point)[bound], slopes(point)[bound]
+        values = excess(point)[bound]
+        tilts = slopes(point)[bound]
         top = float(values.mean())
         residual = np.concatenate([shares @ tilts, values - top, [shares.sum() - 1.0]])
         system = np.zeros((free + count + 1, free + count + 1))
@@ -152,5 +183,6 @@ def _bound_craft(
         system[free : free + count, -1] = -1.0
         system[-1, free : free + count] = 1.0
         step = np.linalg.lstsq(system, -residual, rcond=None)[0]
-        point, shares = point + step[:free], shares + step[free : free + count]
+        point = point + step[:free]
+        shares = shares + step[free : free + count]
     return np.asarray(point if excess(point).max() <= excess(best).max() * (1.0 + 1e-9) else best)

@@ -1,4 +1,6 @@
-"""The solution in closed form: every craft's cost as a quadratic form of the free terminal values, and its flight."""
+"""The solution in closed form: every craft's cost as a quadratic form of the free terminal values,
+and its flight.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,9 @@ from infoset.rendezvous.pareto.encounter import Craft, Encounter
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """The minimum-energy flight of one craft from its start to the meeting, where its `costate`, shape (6,), is."""
+    """The minimum-energy flight of one craft from its start to the meeting, where its `costate`,
+    shape (6,), is.
+    """
 
     craft: Craft
     meeting_s: float
@@ -25,7 +29,9 @@ class Plan:
         return self._costate_at(np.asarray(time_s, dtype=np.float64))[..., 3:]
 
     def state(self, time_s: ArrayLike) -> Floats:
-        """Return x(t) = Phi x0 + G(t, t0) Phi(T, t)' lambda, m and m/s, shape (..., 6): (2.5) of the paper."""
+        """Return x(t) = Phi x0 + G(t, t0) Phi(T, t)' lambda, m and m/s, shape (..., 6): (2.5) of
+        the paper.
+        """
         times = np.asarray(time_s, dtype=np.float64)
         segment = self.craft.motion.segment(np.full(times.shape, self.craft.start_s), times)
         forced = np.einsum("...ab,...b->...a", segment.gramian, self._costate_at(times))
@@ -36,11 +42,15 @@ class Plan:
         return np.linspace(self.craft.start_s, self.meeting_s, count)
 
     def effects(self, time_s: Floats) -> Floats:
-        """Return Phi(T, t) B(t), shape (k, 6, 3), the effect of a unit control for a second on the terminal state."""
+        """Return Phi(T, t) B(t), shape (k, 6, 3), the effect of a unit control for a second on the
+        terminal state.
+        """
         return self._to_meeting(time_s)[:, :, 3:]
 
     def breaks(self) -> Floats:
-        """Return times from start to meeting between which the motion turns by about a radian at most, s."""
+        """Return times from start to meeting between which the motion turns by about a radian at
+        most, s.
+        """
         return self.craft.motion.breaks(self.craft.start_s, self.meeting_s)
 
     def _costate_at(self, times: Floats) -> Floats:
@@ -91,8 +101,8 @@ class CraftCost:
 class EncounterSolution:
     """A solved encounter: the meeting of minimum group loss, and the costs of any other meeting.
 
-    `point`, shape (f,), contains the free values that minimise the weighted sum of excesses, the norm (1.7) of the
-    paper. The methods use it where their `point` is None.
+    `point`, shape (f,), contains the free values that minimise the weighted sum of excesses, the
+    norm (1.7) of the paper. The methods use it where their `point` is None.
     """
 
     encounter: Encounter
@@ -111,26 +121,38 @@ class EncounterSolution:
         return all(np.allclose(cost.matrix, first, rtol=1e-12, atol=0.0) for cost in self.costs[1:])
 
     def meeting_state(self, point: Floats | None = None) -> Floats:
-        """Return the terminal state, shape (6,), of a `point`, shape (f,); of an intercept only the position."""
-        return np.asarray(self.encounter.base + self.encounter.opening @ (self.point if point is None else point))
+        """Return the terminal state, shape (6,), of a `point`, shape (f,); of an intercept only the
+        position.
+        """
+        return np.asarray(
+            self.encounter.base + self.encounter.opening @ (self.point if point is None else point)
+        )
 
     def excess(self, point: Floats | None = None) -> Floats:
-        """Return J_i^2 - J_i*^2 of all craft, m^2/s^3, shape (..., n), at a `point`, shape (..., f)."""
+        """Return J_i^2 - J_i*^2 of all craft, m^2/s^3, shape (..., n), at a `point`, shape (...,
+        f).
+        """
         point = self.point if point is None else point
         return np.stack([cost.excess(point) for cost in self.costs], axis=-1)
 
     def cost_squared(self, point: Floats | None = None) -> Floats:
         """Return J_i^2 of all craft, m^2/s^3, shape (..., n), at a `point`, shape (..., f)."""
-        return np.asarray(self.excess(point) + np.array([cost.ideal_cost_squared for cost in self.costs]))
+        return np.asarray(
+            self.excess(point) + np.array([cost.ideal_cost_squared for cost in self.costs])
+        )
 
     def group_loss(self, point: Floats | None = None) -> Floats:
-        """Return the weighted sum of excesses, the norm (1.7), m^2/s^3, shape (...), at a `point`, shape (..., f)."""
+        """Return the weighted sum of excesses, the norm (1.7), m^2/s^3, shape (...), at a `point`,
+        shape (..., f).
+        """
         return np.asarray(self.excess(point) @ self.encounter.weights)
 
     def plan(self, index: int, point: Floats | None = None) -> Plan:
         """Return the flight of craft number `index` to a `point`, shape (f,)."""
         cost = self.costs[index]
-        costate = cost.to_costate @ (cost.effort_base + cost.effort_slope @ (self.point if point is None else point))
+        costate = cost.to_costate @ (
+            cost.effort_base + cost.effort_slope @ (self.point if point is None else point)
+        )
         return Plan(cost.craft, self.encounter.meeting_s, costate)
 
     def plans(self, point: Floats | None = None) -> tuple[Plan, ...]:
@@ -141,16 +163,19 @@ class EncounterSolution:
 def solve_encounter(encounter: Encounter) -> EncounterSolution:
     """Solve an `encounter`.
 
-    (2.1) to (2.7) of Barseghyan and Stepanyan (2008) for any free components. States are divided by (T, T, T, 1, 1, 1)
-    before the Cholesky factor of the Gramian is computed, and the ideal is a least-squares problem of that factor, so
-    J* loses no digits. O(n) small matrices.
+    (2.1) to (2.7) of Barseghyan and Stepanyan (2008) for any free components. States are divided by
+    (T, T, T, 1, 1, 1) before the Cholesky factor of the Gramian is computed, and the ideal is a
+    least-squares problem of that factor, so J* loses no digits. O(n) small matrices.
 
     Raises
     ------
     ValueError
-        If the numbers overflow, or a Gramian is singular: the craft's control does not reach all components.
+        If the numbers overflow, or a Gramian is singular: the craft's control does not reach all
+        components.
     """
-    common, opening, base = encounter.common, encounter.opening, encounter.base
+    common = encounter.common
+    opening = encounter.opening
+    base = encounter.base
     factors: dict[tuple[int, float], tuple[Floats, Floats]] = {}
     costs = []
     for craft in encounter.craft:
@@ -164,13 +189,17 @@ def solve_encounter(encounter: Encounter) -> EncounterSolution:
 
 
 def weighted_point(costs: Sequence[CraftCost], weights: ArrayLike) -> Floats:
-    """Return the free values, shape (f,), that minimise the sum of excesses with `weights`, not negative, shape (n,).
+    """Return the free values, shape (f,), that minimise the sum of excesses with `weights`, not
+    negative, shape (n,).
 
-    (sum w_i M_i)^-1 sum w_i M_i p_i*, as a least-squares problem of the roots of M_i of the `costs`.
+    (sum w_i M_i)^-1 sum w_i M_i p_i*, as a least-squares problem of the roots of M_i of the
+    `costs`.
     """
     roots = np.sqrt(np.asarray(weights, dtype=np.float64))
     rows = np.concatenate([root * cost.root for root, cost in zip(roots, costs, strict=True)])
-    right = np.concatenate([root * (cost.root @ cost.ideal) for root, cost in zip(roots, costs, strict=True)])
+    right = np.concatenate(
+        [root * (cost.root @ cost.ideal) for root, cost in zip(roots, costs, strict=True)]
+    )
     orthogonal, upper = np.linalg.qr(rows)
     return np.asarray(np.linalg.solve(upper, orthogonal.T @ right))
 
@@ -183,24 +212,27 @@ def _factor(craft: Craft, meeting_s: float, common: int) -> tuple[Floats, Floats
     scaled = segment.gramian[:common, :common] / np.outer(scale, scale)
     if not (np.isfinite(scaled).all() and np.isfinite(segment.transition).all()):
         raise ValueError(
-            f"craft {craft.name!r}: the motion overflows over {meeting_s - craft.start_s:g} s; check the units"
+            f"craft {craft.name!r}: the motion overflows over {meeting_s - craft.start_s:g} s; "
+            "check the units"
         )
     try:
         lower = np.linalg.cholesky(scaled)
     except np.linalg.LinAlgError:
         raise ValueError(
-            f"craft {craft.name!r}: its Gramian over {meeting_s - craft.start_s:g} s is singular; check duration, rate"
+            f"craft {craft.name!r}: its Gramian over {meeting_s - craft.start_s:g} s is singular; "
+            "check duration, rate"
         ) from None
     whiten = np.linalg.solve(lower, np.diag(1.0 / scale))
     return segment.transition, np.asarray(whiten)
 
 
 def _craft_cost(craft: Craft, whiten: Floats, missing: Floats, opening: Floats) -> CraftCost:
-    base, slope = whiten @ missing, whiten @ opening
+    base = whiten @ missing
+    slope = whiten @ opening
     orthogonal, upper = np.linalg.qr(slope)
     ideal = -np.linalg.solve(upper, orthogonal.T @ base)
-    # Orthogonal to the slope: base + slope p* would cancel if the ideal is far away. If all components that are in
-    # common are free there is no rest.
+    # Orthogonal to the slope: base + slope p* would cancel if the ideal is far away. If all
+    # components that are in common are free there is no rest.
     rest = base - orthogonal @ (orthogonal.T @ base) if len(base) > slope.shape[1] else np.zeros(0)
     to_costate = np.zeros((6, len(base)))
     to_costate[: len(base)] = whiten.T

@@ -1,7 +1,9 @@
-"""One branch of the game's extremals: the distance l that the evader keeps at a time T, followed as T grows.
+"""One branch of the game's extremals: the distance l that the evader keeps at a time T, followed as
+T grows.
 
-At T -> 0 nu is the line of sight and l the distance, so no guess is needed. Capture is where l has fallen to the
-capture radius: l above it before then excludes an earlier capture on this branch. Nondimensional.
+At T -> 0 nu is the line of sight and l the distance, so no guess is needed. Capture is where l has
+fallen to the capture radius: l above it before then excludes an earlier capture on this branch.
+Nondimensional.
 
 Wang's slides shoot forward from a guess instead.
 """
@@ -20,8 +22,9 @@ from infoset.rendezvous.pursuit_evasion._pair import FINE, MAX_RESIDUAL, ROUGH, 
 _LONGEST_STEP, _SHORTEST_STEP = 0.3, 1e-6
 _PREDICTED_WITHIN = 3e-3
 _TRACKED = 1e-7
-"""Tolerance of the propagation of extremals before the capture: a thousandth of the corrections that are accepted
-(`ROUGH`). Captures, and their times, are polished with `FINE`, and do not depend on it."""
+"""Tolerance of the propagation of extremals before the capture: a thousandth of the corrections
+that are accepted (`ROUGH`). Captures, and their times, are polished with `FINE`, and do not depend
+on it."""
 
 MAX_WORK = 20_000.0
 """Radians of extremals propagated for a pair of sides: 15 revolutions of 28 steps each; seconds."""
@@ -39,7 +42,9 @@ class Ending(Enum):
 
 @dataclass(frozen=True)
 class Branch:
-    """A branch of extremals, `nodes` in ascending order of duration; `work` is the radians of extremals propagated."""
+    """A branch of extremals, `nodes` in ascending order of duration; `work` is the radians of
+    extremals propagated.
+    """
 
     nodes: tuple[Node, ...]
     ending: Ending
@@ -51,14 +56,19 @@ class Branch:
         return self.nodes[-1]
 
 
-def follow(pair: Pair, first: Node, radius: float, latest: float, max_work: float = MAX_WORK) -> Branch:
-    """Follow a branch from its first extremal, as the duration grows, to the capture, to `latest`, or to a fold.
+def follow(
+    pair: Pair, first: Node, radius: float, latest: float, max_work: float = MAX_WORK
+) -> Branch:
+    """Follow a branch from its first extremal, as the duration grows, to the capture, to `latest`,
+    or to a fold.
 
-    A `radius` of minus infinity follows the branch beyond the capture. `max_work` limits the radians of extremals
-    propagated: the same limit on every machine. A capture that ends the branch is computed to full precision. Some 20
-    steps a revolution, of two or three iterations each.
+    A `radius` of minus infinity follows the branch beyond the capture. `max_work` limits the
+    radians of extremals propagated: the same limit on every machine. A capture that ends the branch
+    is computed to full precision. Some 20 steps a revolution, of two or three iterations each.
     """
-    nodes, step, work = [first], first.duration, 0.0
+    nodes = [first]
+    step = first.duration
+    work = 0.0
     while work < max_work:
         node = nodes[-1]
         left = latest - node.duration
@@ -86,7 +96,10 @@ def follow(pair: Pair, first: Node, radius: float, latest: float, max_work: floa
                 step = min(_LONGEST_STEP, step * min(2.0, growth))
                 continue
             capture = polish(pair, _predicted(nodes, at), at, radius, latest)
-            if capture is not None and node.duration < capture.duration <= after.duration + _SHORTEST_STEP:
+            if (
+                capture is not None
+                and node.duration < capture.duration <= after.duration + _SHORTEST_STEP
+            ):
                 return Branch((*nodes, capture), Ending.CAPTURE, work)
         if step < _SHORTEST_STEP:
             return Branch(tuple(nodes), Ending.FOLD, work)
@@ -104,27 +117,50 @@ def polish(pair: Pair, guess: Floats, duration: float, radius: float, latest: fl
         return None
     # Once more, linearised at the solution itself: for its costates, curvature and residual.
     fine = pair.solve(
-        rough.vector, rough.duration, radius, time_free=True, tolerance=FINE, linear_tolerance=FINE, latest=latest
+        rough.vector,
+        rough.duration,
+        radius,
+        time_free=True,
+        tolerance=FINE,
+        linear_tolerance=FINE,
+        latest=latest,
     )
     return fine if fine is not None and fine.residual < MAX_RESIDUAL else None
 
 
 def first_crossing(before: Node, after: Node, radius: float) -> float | None:
-    """Return the time at which l first falls to a radius between two extremals, by the cubic through both, or None."""
+    """Return the time at which l first falls to a radius between two extremals, by the cubic
+    through both, or None.
+    """
     step = after.duration - before.duration
-    # Between its ends a cubic falls below the lower one by at most 4/27 of its slopes times the step.
+    # Between its ends a cubic falls below the lower one by at most 4/27 of its slopes times the
+    # step.
     dip = 4.0 / 27.0 * step * (abs(before.closing) + abs(after.closing))
     if min(before.distance, after.distance) - dip > radius:
         return None
     rise = (after.distance - before.distance) / step
-    a, b = -before.closing, -after.closing
-    cubic = np.array([(a + b - 2.0 * rise) / step**2, (3.0 * rise - 2.0 * a - b) / step, a, before.distance - radius])
-    times = [float(root.real) for root in np.roots(cubic) if abs(root.imag) < 1e-9 and 0.0 < root.real < step]
+    a = -before.closing
+    b = -after.closing
+    cubic = np.array(
+        [
+            (a + b - 2.0 * rise) / step**2,
+            (3.0 * rise - 2.0 * a - b) / step,
+            a,
+            before.distance - radius,
+        ]
+    )
+    times = [
+        float(root.real)
+        for root in np.roots(cubic)
+        if abs(root.imag) < 1e-9 and 0.0 < root.real < step
+    ]
     return before.duration + min([*times, step]) if times or after.distance <= radius else None
 
 
 def _predicted(nodes: list[Node], duration: float) -> Floats:
-    """Extrapolate (pursuer, evader, nu) by the cubic through the last two extremals with their slopes."""
+    """Extrapolate (pursuer, evader, nu) by the cubic through the last two extremals with their
+    slopes.
+    """
     node = nodes[-1]
     step = duration - node.duration
     guess = node.vector + step * node.slope

@@ -1,4 +1,6 @@
-"""The 3 x 3 system that couples the extremals of both sides, and Newton's step of both: compiled. Nondimensional."""
+"""The 3 x 3 system that couples the extremals of both sides, and Newton's step of both: compiled.
+Nondimensional.
+"""
 
 from __future__ import annotations
 
@@ -15,9 +17,10 @@ from infoset.rendezvous.pursuit_evasion._extremal import Response, invert
 class Coupling(NamedTuple):
     """Both sides linearised at a guess, and coupled by r_E - r_P = l nu.
 
-    `inverse`, shape (3, 3), gives the change of (nu, T) or (nu, l) for an error of that equation. `slope`, shape (15,),
-    is d/dT of (pursuer, evader, nu) at l free, and `curvature`, shape (2,), contains the eigenvalues of the Hessian of
-    h_P - h_E across nu, ascending. If the equations are singular, `solvable` is False, and the rest is not meaningful.
+    `inverse`, shape (3, 3), gives the change of (nu, T) or (nu, l) for an error of that equation.
+    `slope`, shape (15,), is d/dT of (pursuer, evader, nu) at l free, and `curvature`, shape (2,),
+    contains the eigenvalues of the Hessian of h_P - h_E across nu, ascending. If the equations are
+    singular, `solvable` is False, and the rest is not meaningful.
     """
 
     inverse: Floats
@@ -36,7 +39,9 @@ class Step(NamedTuple):
 @compiled
 def across(nu: Floats) -> Floats:
     """Return two unit vectors across a unit vector and each other, shape (2, 3)."""
-    x, y, z = nu[0], nu[1], nu[2]
+    x = nu[0]
+    y = nu[1]
+    z = nu[2]
     sign = 1.0 if z >= 0.0 else -1.0
     a = -1.0 / (sign + z)
     b = x * y * a
@@ -54,9 +59,13 @@ def across(nu: Floats) -> Floats:
 def couple(
     pursuer: Response, evader: Response, plane: Floats, nu: Floats, distance: float, time_free: bool
 ) -> Coupling:
-    """Return the coupling of two responses at a guess of `nu`, with the directions `plane` across it, and of l."""
-    outer, inverse = np.empty((3, 3)), np.empty((3, 3))
-    slope, curvature = np.empty(15), np.empty(2)
+    """Return the coupling of two responses at a guess of `nu`, with the directions `plane` across
+    it, and of l.
+    """
+    outer = np.empty((3, 3))
+    inverse = np.empty((3, 3))
+    slope = np.empty(15)
+    curvature = np.empty(2)
     drift = evader.by_time[:3] - pursuer.by_time[:3]
     for i in range(3):
         for j in range(2):
@@ -100,10 +109,20 @@ def fill_curvature(pursuer: Response, evader: Response, plane: Floats, curvature
 
 @compiled
 def newton_step(
-    pursuer: Response, evader: Response, plane: Floats, inverse: Floats, rho: Floats, state: Floats, time_free: bool
+    pursuer: Response,
+    evader: Response,
+    plane: Floats,
+    inverse: Floats,
+    rho: Floats,
+    state: Floats,
+    time_free: bool,
 ) -> Step:
-    """Return Newton's step for corrections `rho`, shape (2, 6), of the end states of a guess, shape (17,)."""
-    gap, turn, change = np.empty(3), np.zeros(3), np.empty(17)
+    """Return Newton's step for corrections `rho`, shape (2, 6), of the end states of a guess, shape
+    (17,).
+    """
+    gap = np.empty(3)
+    turn = np.zeros(3)
+    change = np.empty(17)
     for i in range(3):
         gap[i] = state[6 + i] + rho[1, i] - state[i] - rho[0, i] - state[16] * state[12 + i]
     for i in range(3):
@@ -114,9 +133,13 @@ def newton_step(
 
     for i in range(6):
         by_time = pursuer.by_time[i] * change[15]
-        change[i] = rho[0, i] + pursuer.by_nu[i, 0] * turn[0] + pursuer.by_nu[i, 1] * turn[1] + by_time
+        change[i] = (
+            rho[0, i] + pursuer.by_nu[i, 0] * turn[0] + pursuer.by_nu[i, 1] * turn[1] + by_time
+        )
         by_time = evader.by_time[i] * change[15]
-        change[6 + i] = rho[1, i] + evader.by_nu[i, 0] * turn[0] + evader.by_nu[i, 1] * turn[1] + by_time
+        change[6 + i] = (
+            rho[1, i] + evader.by_nu[i, 0] * turn[0] + evader.by_nu[i, 1] * turn[1] + by_time
+        )
     for i in range(3):
         change[12 + i] = turn[0] * plane[0, i] + turn[1] * plane[1, i]
     return Step(change, np.abs(change).max())

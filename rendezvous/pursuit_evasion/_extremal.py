@@ -1,12 +1,15 @@
-"""One craft's extremals, from the end of the game back to its start, with their variational equations: compiled.
+"""One craft's extremals, from the end of the game back to its start, with their variational
+equations: compiled.
 
-An extremal takes its craft as far along `nu` as possible by the time of the end. There its costate is (nu, 0), and
-backward in time it is the same flow for pursuer and evader: thrust along p_v, where p is the costate of the pursuer and
-minus the costate of the evader. Near the end p_v / |p_v| is nu, and the flow is smooth up to the end.
+An extremal takes its craft as far along `nu` as possible by the time of the end. There its costate
+is (nu, 0), and backward in time it is the same flow for pursuer and evader: thrust along p_v, where
+p is the costate of the pursuer and minus the costate of the evader. Near the end p_v / |p_v| is nu,
+and the flow is smooth up to the end.
 
-Wang's slides, "Optimal control", with k = +1 for the pursuer and -1 for the evader: u = k lambda_v / |lambda_v|,
-lambda_r' = (mu / r^3) lambda_v - 3 mu (lambda_v . r) r / r^5 (they omit '. r'), lambda_v' = -lambda_r; p = k lambda.
-That of the mass, lambda_m' = k |lambda_v| T / m^2 (they omit k), is not needed: both thrust fully all the time.
+Wang's slides, "Optimal control", with k = +1 for the pursuer and -1 for the evader: u = k lambda_v
+/ |lambda_v|, lambda_r' = (mu / r^3) lambda_v - 3 mu (lambda_v . r) r / r^5 (they omit '. r'),
+lambda_v' = -lambda_r; p = k lambda. That of the mass, lambda_m' = k |lambda_v| T / m^2 (they omit
+k), is not needed: both thrust fully all the time.
 """
 
 from __future__ import annotations
@@ -20,7 +23,9 @@ from infoset.rendezvous._compile import allocation_free, compiled
 from infoset.rendezvous.dormand_prince import STAGES, error_of_step, step_of
 
 STATES, COLUMNS = 12, 9
-"""Position, velocity and costate; what they are differentiated by: end state (6), nu in its plane (2), end mass."""
+"""Position, velocity and costate; what they are differentiated by: end state (6), nu in its plane
+(2), end mass.
+"""
 _SAFETY, _MIN_FACTOR, _MAX_FACTOR = 0.9, 0.2, 6.0
 _MAX_STEPS = 20_000
 _FIRST_STEP = 0.05
@@ -29,13 +34,15 @@ _Parameters = tuple[Floats, Floats, Floats]
 
 
 class Response(NamedTuple):
-    """Linear dependence of an end state at a guess of it: rho + by_nu dnu + by_time dT leads to the true one.
+    """Linear dependence of an end state at a guess of it: rho + by_nu dnu + by_time dT leads to the
+    true one.
 
-    `rho`, shape (6,), is Newton's correction of the guess; `by_nu`, shape (6, 2), and `by_time`, shape (6,), are the
-    derivatives along two directions across nu and by the duration. `regular` says that there is no conjugate point: the
-    map from end states near by to start states preserves orientation. `inverse`, shape (6, 6), is the inverse of the
-    derivative of the start state by the end state, `costate`, shape (6,), p_r and p_v at the start, and `residual` the
-    maximum component of the error of the start state: infinite if the guess cannot be propagated, or the map is
+    `rho`, shape (6,), is Newton's correction of the guess; `by_nu`, shape (6, 2), and `by_time`,
+    shape (6,), are the derivatives along two directions across nu and by the duration. `regular`
+    says that there is no conjugate point: the map from end states near by to start states preserves
+    orientation. `inverse`, shape (6, 6), is the inverse of the derivative of the start state by the
+    end state, `costate`, shape (6,), p_r and p_v at the start, and `residual` the maximum component
+    of the error of the start state: infinite if the guess cannot be propagated, or the map is
     singular.
     """
 
@@ -50,13 +57,22 @@ class Response(NamedTuple):
 
 @allocation_free
 def derivatives(
-    r: Floats, p: Floats, mu: float, oblateness: float, g: Floats, first: Floats, second: Floats, with_second: bool
+    r: Floats,
+    p: Floats,
+    mu: float,
+    oblateness: float,
+    g: Floats,
+    first: Floats,
+    second: Floats,
+    with_second: bool,
 ) -> None:
-    """Put the acceleration, its gradient (3, 3) and, if wanted, the gradient of gradient times `p` (3, 3) into arrays.
+    """Put the acceleration, its gradient (3, 3) and, if wanted, the gradient of gradient times `p`
+    (3, 3) into arrays.
 
-    `oblateness` is mu J2 R^2 / 2, the axis z: the potential is mu/r + oblateness (1/r^3 - 3 z^2/r^5). For a function f
-    of q = r . r the gradient is 2 f' r, its gradient 4 f'' r r^T + 2 f' I, and along p 8 f''' s r r^T + 4 f'' (r p^T +
-    p r^T + s I) with s = r . p. The oblate part is a power of q, less z^2 times one.
+    `oblateness` is mu J2 R^2 / 2, the axis z: the potential is mu/r + oblateness (1/r^3 - 3
+    z^2/r^5). For a function f of q = r . r the gradient is 2 f' r, its gradient 4 f'' r r^T + 2 f'
+    I, and along p 8 f''' s r r^T + 4 f'' (r p^T + p r^T + s I) with s = r . p. The oblate part is a
+    power of q, less z^2 times one.
     """
     q = r[0] * r[0] + r[1] * r[1] + r[2] * r[2]
     s = r[0] * p[0] + r[1] * p[1] + r[2] * p[2]
@@ -86,12 +102,22 @@ def derivatives(
 
 @allocation_free
 def _subtract_axial(
-    r: Floats, p: Floats, s: float, q: float, oblateness: float, g: Floats, first: Floats, second: Floats
+    r: Floats,
+    p: Floats,
+    s: float,
+    q: float,
+    oblateness: float,
+    g: Floats,
+    first: Floats,
+    second: Floats,
 ) -> None:
     """Subtract the derivatives of z^2 f, f = 3 oblateness q^(-5/2)."""
-    z, square = r[2], r[2] * r[2]
+    z = r[2]
+    square = r[2] * r[2]
     f = 3.0 * oblateness / (q * q * np.sqrt(q))
-    f1, f2, f4 = -2.5 * f / q, 8.75 * f / (q * q), -39.375 * f / (q * q * q)
+    f1 = -2.5 * f / q
+    f2 = 8.75 * f / (q * q)
+    f4 = -39.375 * f / (q * q * q)
     along = 2.0 * f1 * s
     for i in range(3):
         g[i] -= square * 2.0 * f1 * r[i]
@@ -119,17 +145,23 @@ def _subtract_axial(
 def _rates(s: float, y: Floats, z: Floats, parameters: _Parameters, dy: Floats, dz: Floats) -> None:
     """Rates, in time to go, of the state and of its variations.
 
-    `parameters` are the craft (mu, oblateness, thrust, mass at the end, flow) and room for two matrices, (3, 3). At the
-    end of the game p_v is zero: there the direction of thrust is that of p_r, which is its rate.
+    `parameters` are the craft (mu, oblateness, thrust, mass at the end, flow) and room for two
+    matrices, (3, 3). At the end of the game p_v is zero: there the direction of thrust is that of
+    p_r, which is its rate.
     """
     craft, first, second = parameters
-    thrust, mass = craft[2], craft[3] + craft[4] * s
+    thrust = craft[2]
+    mass = craft[3] + craft[4] * s
     push = thrust / mass
     derivatives(y[:3], y[9:], craft[0], craft[1], dy[3:6], first, second, len(z) > 0)
     at = 9 if s > 0.0 else 6
-    x0, x1, x2 = y[at], y[at + 1], y[at + 2]
+    x0 = y[at]
+    x1 = y[at + 1]
+    x2 = y[at + 2]
     inverse = 1.0 / np.sqrt(x0 * x0 + x1 * x1 + x2 * x2)
-    u0, u1, u2 = x0 * inverse, x1 * inverse, x2 * inverse
+    u0 = x0 * inverse
+    u1 = x1 * inverse
+    u2 = x2 * inverse
     for i in range(3):
         dy[i] = -y[3 + i]
         dy[6 + i] = first[i, 0] * y[9] + first[i, 1] * y[10] + first[i, 2] * y[11]
@@ -140,12 +172,28 @@ def _rates(s: float, y: Floats, z: Floats, parameters: _Parameters, dy: Floats, 
     if len(z) == 0:
         return
     turn = push * inverse
-    g00, g01, g02, g11, g12, g22 = first[0, 0], first[0, 1], first[0, 2], first[1, 1], first[1, 2], first[2, 2]
-    m00, m01, m02, m11, m12, m22 = second[0, 0], second[0, 1], second[0, 2], second[1, 1], second[1, 2], second[2, 2]
+    g00 = first[0, 0]
+    g01 = first[0, 1]
+    g02 = first[0, 2]
+    g11 = first[1, 1]
+    g12 = first[1, 2]
+    g22 = first[2, 2]
+    m00 = second[0, 0]
+    m01 = second[0, 1]
+    m02 = second[0, 2]
+    m11 = second[1, 1]
+    m12 = second[1, 2]
+    m22 = second[2, 2]
     for j in range(COLUMNS):
-        r0, r1, r2 = z[0, j], z[1, j], z[2, j]
-        q0, q1, q2 = z[9, j], z[10, j], z[11, j]
-        t0, t1, t2 = z[at, j], z[at + 1, j], z[at + 2, j]
+        r0 = z[0, j]
+        r1 = z[1, j]
+        r2 = z[2, j]
+        q0 = z[9, j]
+        q1 = z[10, j]
+        q2 = z[11, j]
+        t0 = z[at, j]
+        t1 = z[at + 1, j]
+        t2 = z[at + 2, j]
         along = u0 * t0 + u1 * t1 + u2 * t2
         dz[0, j] = -z[3, j]
         dz[1, j] = -z[4, j]
@@ -169,24 +217,31 @@ _step = step_of(_rates)
 
 
 @compiled
-def flow_back(y: Floats, z: Floats, craft: Floats, begin: float, end: float, tolerance: float) -> bool:
-    """Integrate a state and its variations from time to go `begin` to `end`, in place; either may be the greater.
+def flow_back(
+    y: Floats, z: Floats, craft: Floats, begin: float, end: float, tolerance: float
+) -> bool:
+    """Integrate a state and its variations from time to go `begin` to `end`, in place; either may
+    be the greater.
 
-    `y`, shape (12,), is (position, velocity, p_r, p_v), and `z`, shape (12, 9), contains its derivatives; one of no
-    rows (`NO_VARIATIONS`) integrates y alone. `craft`, shape (5,), is (mu, oblateness, thrust, mass at the end of the
-    game, mass flow). Returns False where the steps are too many or too small, or a number overflows.
+    `y`, shape (12,), is (position, velocity, p_r, p_v), and `z`, shape (12, 9), contains its
+    derivatives; one of no rows (`NO_VARIATIONS`) integrates y alone. `craft`, shape (5,), is (mu,
+    oblateness, thrust, mass at the end of the game, mass flow). Returns False where the steps are
+    too many or too small, or a number overflows.
 
-    The `tolerance` of a step's error, relative and absolute, applies to y alone. A step costs 12 stages of some 0.3 us,
-    or 0.1 us for y alone.
+    The `tolerance` of a step's error, relative and absolute, applies to y alone. A step costs 12
+    stages of some 0.3 us, or 0.1 us for y alone.
     """
     if begin == end:
         return True
-    ky, kz = np.empty((STAGES, STATES)), np.empty((STAGES, len(z), COLUMNS))
-    y_next, z_next = np.empty_like(y), np.empty_like(z)
+    ky = np.empty((STAGES, STATES))
+    kz = np.empty((STAGES, len(z), COLUMNS))
+    y_next = np.empty_like(y)
+    z_next = np.empty_like(z)
     parameters = craft, np.empty((3, 3)), np.empty((3, 3))
     span = abs(end - begin)
     sign = 1.0 if end > begin else -1.0
-    s, step = begin, min(_FIRST_STEP, span)
+    s = begin
+    step = min(_FIRST_STEP, span)
     first = 0
     for _ in range(_MAX_STEPS):
         left = abs(end - s)
@@ -221,11 +276,14 @@ def end_of(state: Floats, nu: Floats) -> Floats:
 
 @compiled
 def rate(y: Floats, mu: float, oblateness: float, push: float) -> Floats:
-    """Return the time derivative of position and velocity, shape (6,), at a state and costate, shape (12,).
+    """Return the time derivative of position and velocity, shape (6,), at a state and costate,
+    shape (12,).
 
     `push` is the acceleration of the thrust.
     """
-    out, gradient, unused = np.empty(6), np.empty((3, 3)), np.zeros((3, 3))
+    out = np.empty(6)
+    gradient = np.empty((3, 3))
+    unused = np.zeros((3, 3))
     derivatives(y[:3], y[9:], mu, oblateness, out[3:], gradient, unused, False)
     size = np.sqrt(y[9] * y[9] + y[10] * y[10] + y[11] * y[11])
     for i in range(3):
@@ -237,13 +295,21 @@ def rate(y: Floats, mu: float, oblateness: float, push: float) -> Floats:
 
 @compiled
 def respond(
-    start: Floats, craft: Floats, end_state: Floats, nu: Floats, plane: Floats, duration: float, tolerance: float
+    start: Floats,
+    craft: Floats,
+    end_state: Floats,
+    nu: Floats,
+    plane: Floats,
+    duration: float,
+    tolerance: float,
 ) -> Response:
-    """Return the response of one side at a guess of its end state; `plane`, shape (2, 3), are the directions across nu.
+    """Return the response of one side at a guess of its end state; `plane`, shape (2, 3), are the
+    directions across nu.
 
     `start`, shape (6,), is the state at the start of the game, and `craft` that of `flow_back`.
     """
-    y, z = np.zeros(STATES), np.zeros((STATES, COLUMNS))
+    y = np.zeros(STATES)
+    z = np.zeros((STATES, COLUMNS))
     for i in range(6):
         y[i] = end_state[i]
         z[i, i] = 1.0
@@ -253,11 +319,14 @@ def respond(
         z[6 + i, 7] = plane[1, i]
     is_propagated = flow_back(y, z, craft, 0.0, duration, tolerance)
 
-    by_end, inverse = z[:6, :6].copy(), np.zeros((6, 6))
+    by_end = z[:6, :6].copy()
+    inverse = np.zeros((6, 6))
     determinant = invert(by_end, inverse) if is_propagated else 0.0
     # A longer game starts further back, and ends with less mass.
     later = rate(y, craft[0], craft[1], craft[2] / (craft[3] + craft[4] * duration))
-    rho, by_nu, by_time = np.zeros(6), np.zeros((6, 2)), np.zeros(6)
+    rho = np.zeros(6)
+    by_nu = np.zeros((6, 2))
+    by_time = np.zeros(6)
     for i in range(6):
         for j in range(6):
             rho[i] += inverse[i, j] * (start[j] - y[j])
@@ -270,7 +339,8 @@ def respond(
 
 @compiled
 def invert(matrix: Floats, inverse: Floats) -> float:
-    """Fill the inverse of a matrix, shape (n, n), and return its determinant; 0 if it is singular or not finite.
+    """Fill the inverse of a matrix, shape (n, n), and return its determinant; 0 if it is singular
+    or not finite.
 
     Gauss and Jordan's elimination with partial pivoting; the matrix is overwritten.
     """

@@ -1,9 +1,11 @@
-"""The extremals of one side at a time, and of both together by Newton's method: at a duration T, or at a distance l.
+"""The extremals of one side at a time, and of both together by Newton's method: at a duration T, or
+at a distance l.
 
-At each duration T both sides reach the maximum distance along nu, and r_E - r_P = l nu. At l = 0 these are the
-terminal conditions of Wang's slides ("Optimal control"): r_P = r_E, lambda_rP + lambda_rE = 0, lambda_v = 0. The last
-condition there, lambda_rP . (v_P - v_E) = 1, only determines the scale of the costates: here |nu| = 1, and the closing
-speed must be positive. All values are nondimensional.
+At each duration T both sides reach the maximum distance along nu, and r_E - r_P = l nu. At l = 0
+these are the terminal conditions of Wang's slides ("Optimal control"): r_P = r_E, lambda_rP +
+lambda_rE = 0, lambda_v = 0. The last condition there, lambda_rP . (v_P - v_E) = 1, only determines
+the scale of the costates: here |nu| = 1, and the closing speed must be positive. All values are
+nondimensional.
 """
 
 from __future__ import annotations
@@ -16,14 +18,23 @@ import numpy as np
 
 from infoset.rendezvous._arrays import Floats
 from infoset.rendezvous.pursuit_evasion._coupling import Coupling, Step, across, couple, newton_step
-from infoset.rendezvous.pursuit_evasion._extremal import NO_VARIATIONS, Response, end_of, flow_back, rate, respond
+from infoset.rendezvous.pursuit_evasion._extremal import (
+    NO_VARIATIONS,
+    Response,
+    end_of,
+    flow_back,
+    rate,
+    respond,
+)
 
 FINE, COARSE = 1e-13, 1e-9
 """Tolerances of propagation: of results, and of intermediate iterations."""
 MAX_RESIDUAL = 1e-9
 """Maximum error of a result in the necessary conditions: start states, and r_E - r_P = l nu."""
 CLOSE, ROUGH = 1e-7, 1e-4
-"""Maximum last corrections of Newton's method, for the same; the remaining error is about their square."""
+"""Maximum last corrections of Newton's method, for the same; the remaining error is about their
+square.
+"""
 _MAX_ITERATIONS = 12
 _FIRST_DURATION = 0.01
 _MIN_OF_FIRST = 1e-9
@@ -32,7 +43,9 @@ _FARTHEST, _NEAR, _FRACTION, _NEAR_ENOUGH = 0.7, 1e-2, 0.2, 1e-3
 
 @dataclass(frozen=True)
 class Craft:
-    """One side of a game, which chooses its direction of thrust; all nondimensional, `start` of shape (6,)."""
+    """One side of a game, which chooses its direction of thrust; all nondimensional, `start` of
+    shape (6,).
+    """
 
     start: Floats
     thrust: float
@@ -43,7 +56,9 @@ class Craft:
 
     def kernel_craft(self, duration: float) -> Floats:
         """Return the parameters of `flow_back` for a game of a duration."""
-        return np.array([self.mu, self.oblateness, self.thrust, self.mass - self.flow * duration, self.flow])
+        return np.array(
+            [self.mu, self.oblateness, self.thrust, self.mass - self.flow * duration, self.flow]
+        )
 
     def respond(
         self, end_state: Floats, nu: Floats, plane: Floats, duration: float, tolerance: float
@@ -56,21 +71,34 @@ class Craft:
     def correct(
         self, response: Response, end_state: Floats, nu: Floats, duration: float, tolerance: float
     ) -> Floats | None:
-        """Newton's correction of another guess, shape (6,), with the derivatives of an earlier one near by."""
+        """Newton's correction of another guess, shape (6,), with the derivatives of an earlier one
+        near by.
+        """
         y = end_of(end_state, nu)
-        is_propagated = flow_back(y, NO_VARIATIONS, self.kernel_craft(duration), 0.0, duration, tolerance)
+        is_propagated = flow_back(
+            y, NO_VARIATIONS, self.kernel_craft(duration), 0.0, duration, tolerance
+        )
         return response.inverse @ (self.start - y[:6]) if is_propagated else None
 
     def ballistic(self, duration: float, nu: Floats) -> Floats:
-        """Return a guess of the end state after a short time, shape (6,): gravity and thrust are those at the start."""
+        """Return a guess of the end state after a short time, shape (6,): gravity and thrust are
+        those at the start.
+        """
         y = np.concatenate([self.start, nu, nu])
-        velocity = self.start[3:] + duration * rate(y, self.mu, self.oblateness, self.thrust / self.mass)[3:]
-        return np.concatenate([self.start[:3] + 0.5 * duration * (self.start[3:] + velocity), velocity])
+        velocity = (
+            self.start[3:]
+            + duration * rate(y, self.mu, self.oblateness, self.thrust / self.mass)[3:]
+        )
+        return np.concatenate(
+            [self.start[:3] + 0.5 * duration * (self.start[3:] + velocity), velocity]
+        )
 
 
 @dataclass(frozen=True)
 class KnownPath:
-    """A side on a known path: `state_at` gives state, shape (6,), and acceleration, shape (3,), at a time."""
+    """A side on a known path: `state_at` gives state, shape (6,), and acceleration, shape (3,), at
+    a time.
+    """
 
     state_at: Callable[[float], tuple[Floats, Floats]]
 
@@ -102,14 +130,15 @@ Side = Craft | KnownPath
 class Node:
     """An extremal of the game of one duration T, with the distance l.
 
-    `nu`, shape (3,), is the unit vector from the pursuer's end to the evader's; `pursuer` and `evader`, shape (6,), are
-    the end states. `curvature`, shape (2,), contains the eigenvalues of the Hessian of h_P - h_E across nu, ascending;
-    `closing` is nu . (v_P - v_E), the rate at which l falls; `regular` says that neither side's extremal has a
-    conjugate point.
+    `nu`, shape (3,), is the unit vector from the pursuer's end to the evader's; `pursuer` and
+    `evader`, shape (6,), are the end states. `curvature`, shape (2,), contains the eigenvalues of
+    the Hessian of h_P - h_E across nu, ascending; `closing` is nu . (v_P - v_E), the rate at which
+    l falls; `regular` says that neither side's extremal has a conjugate point.
 
-    `slope`, shape (15,), is d/dT of (pursuer, evader, nu) at l free, of the last guess, so to first order. `costates`,
-    shape (2, 6), are p at the start, pursuer's and evader's, of the last guess that was linearised. `residual` is the
-    error of the start states of that guess, and of r_E - r_P = l nu at the ends of this extremal.
+    `slope`, shape (15,), is d/dT of (pursuer, evader, nu) at l free, of the last guess, so to first
+    order. `costates`, shape (2, 6), are p at the start, pursuer's and evader's, of the last guess
+    that was linearised. `residual` is the error of the start states of that guess, and of r_E - r_P
+    = l nu at the ends of this extremal.
     """
 
     duration: float
@@ -126,15 +155,17 @@ class Node:
 
     @property
     def is_saddle(self) -> bool:
-        """Whether no small change of nu increases the distance of the evader, and both extremals are maxima."""
+        """Whether no small change of nu increases the distance of the evader, and both extremals
+        are maxima.
+        """
         return self.regular and bool(self.curvature[0] + self.distance > 0.0)
 
     @property
     def is_nearest(self) -> bool:
         """Whether no small change brings the pursuer nearer to an evader on a given path.
 
-        Beyond a conjugate point the reachable set of the pursuer is locally concave: the radius of curvature of its
-        boundary has changed from plus to minus infinity, and must stay beyond -l.
+        Beyond a conjugate point the reachable set of the pursuer is locally concave: the radius of
+        curvature of its boundary has changed from plus to minus infinity, and must stay beyond -l.
         """
         minimum, maximum = self.curvature + self.distance
         return bool(minimum > 0.0) if self.regular else bool(minimum < 0.0 < maximum)
@@ -156,12 +187,17 @@ class _Linear:
     coupling: Coupling
 
     def step(self, rho: Floats, state: Floats) -> Step:
-        """Newton's step of (pursuer, evader, nu, T, l) for corrections of the two end states, shape (2, 6)."""
-        return newton_step(self.pursuer, self.evader, self.plane, self.coupling.inverse, rho, state, self.time_free)
+        """Newton's step of (pursuer, evader, nu, T, l) for corrections of the two end states, shape
+        (2, 6).
+        """
+        return newton_step(
+            self.pursuer, self.evader, self.plane, self.coupling.inverse, rho, state, self.time_free
+        )
 
     def node(self, state: Floats) -> Node:
         """Return the extremal that the last step led to."""
-        p, e = self.pursuer, self.evader
+        p = self.pursuer
+        e = self.evader
         apart = state[6:9] - state[:3] - state[16] * state[12:15]
         return Node(
             duration=float(state[15]),
@@ -186,7 +222,9 @@ class Pair:
     evader: Side
 
     def is_sound(self, node: Node) -> bool:
-        """Return whether an extremal is a saddle, or a nearest one where the evader cannot choose."""
+        """Return whether an extremal is a saddle, or a nearest one where the evader cannot
+        choose.
+        """
         return node.is_nearest if isinstance(self.evader, KnownPath) else node.is_saddle
 
     def solve(
@@ -201,18 +239,23 @@ class Pair:
         close: float = CLOSE,
         latest: float = math.inf,
     ) -> Node | None:
-        """Return the extremal near a guess, shape (15,), of end states and nu, or None if Newton's method does not
-        converge.
+        """Return the extremal near a guess, shape (15,), of end states and nu, or None if Newton's
+        method does not converge.
 
-        If `time_free`, the distance is known and the duration a guess, otherwise the reverse. The propagation has a
-        `tolerance`, that of derivatives `linear_tolerance` if it is larger; `close` is the maximum size of the last
-        correction, and `latest` the longest duration that can be propagated.
+        If `time_free`, the distance is known and the duration a guess, otherwise the reverse. The
+        propagation has a `tolerance`, that of derivatives `linear_tolerance` if it is larger;
+        `close` is the maximum size of the last correction, and `latest` the longest duration that
+        can be propagated.
 
-        Both sides are propagated with their variations, then several times without, with the same derivatives, while
-        each correction is a fraction of the previous one: 0.5 ms and 0.1 ms per revolution.
+        Both sides are propagated with their variations, then several times without, with the same
+        derivatives, while each correction is a fraction of the previous one: 0.5 ms and 0.1 ms per
+        revolution.
         """
-        state = np.concatenate([guess[:12], guess[12:] / np.sqrt(guess[12:] @ guess[12:]), [duration, distance]])
-        before, uses = math.inf, 0
+        state = np.concatenate(
+            [guess[:12], guess[12:] / np.sqrt(guess[12:] @ guess[12:]), [duration, distance]]
+        )
+        before = math.inf
+        uses = 0
         linear: _Linear | None = None
         for _ in range(_MAX_ITERATIONS):
             fresh = linear is None
@@ -222,7 +265,8 @@ class Pair:
             if fresh and tolerance >= linear_tolerance:
                 rho = np.array([linear.pursuer.rho, linear.evader.rho])
             else:
-                nu, length = state[12:15], float(state[15])
+                nu = state[12:15]
+                length = float(state[15])
                 p = self.pursuer.correct(linear.pursuer, state[:6], nu, length, tolerance)
                 e = self.evader.correct(linear.evader, state[6:12], nu, length, tolerance)
                 if p is None or e is None:
@@ -245,7 +289,9 @@ class Pair:
         return None
 
     def _linearised(self, state: Floats, tolerance: float, time_free: bool) -> _Linear | None:
-        nu, duration, distance = state[12:15], float(state[15]), float(state[16])
+        nu = state[12:15]
+        duration = float(state[15])
+        distance = float(state[16])
         plane = across(nu)
         p = self.pursuer.respond(state[:6], nu, plane, duration, tolerance)
         e = self.evader.respond(state[6:12], nu, plane, duration, tolerance)
@@ -255,18 +301,26 @@ class Pair:
         return _Linear(p, e, plane, time_free, coupling) if coupling.solvable else None
 
     def begin(self, latest: float, radius: float) -> Node | None:
-        """Return the extremal of a short duration, at most `latest`, from the line of sight as a guess, or None.
+        """Return the extremal of a short duration, at most `latest`, from the line of sight as a
+        guess, or None.
 
         Its distance is greater than the capture radius: there is no earlier capture.
         """
         duration = min(_FIRST_DURATION, 0.5 * latest)
         while duration > _MIN_OF_FIRST:
             still = np.zeros(3)
-            sight = self.evader.ballistic(duration, still)[:3] - self.pursuer.ballistic(duration, still)[:3]
+            sight = (
+                self.evader.ballistic(duration, still)[:3]
+                - self.pursuer.ballistic(duration, still)[:3]
+            )
             distance = float(np.linalg.norm(sight))
             nu = sight / distance
-            guess = np.concatenate([self.pursuer.ballistic(duration, nu), self.evader.ballistic(duration, nu), nu])
-            node = self.solve(guess, duration, distance, time_free=False, tolerance=COARSE, close=ROUGH)
+            guess = np.concatenate(
+                [self.pursuer.ballistic(duration, nu), self.evader.ballistic(duration, nu), nu]
+            )
+            node = self.solve(
+                guess, duration, distance, time_free=False, tolerance=COARSE, close=ROUGH
+            )
             close = node is not None and float(np.abs(node.vector - guess).max()) < _NEAR
             if node is not None and close and node.is_saddle and node.distance > radius:
                 return node

@@ -1,7 +1,8 @@
-"""All directions of the evader at one duration: a search for one that keeps it farther away. Nondimensional.
+"""All directions of the evader at one duration: a search for one that keeps it farther away.
+Nondimensional.
 
-h(nu) is the distance that a side reaches along nu. The evader keeps the maximum of h_E - h_P over all nu: a branch of
-extremals that is not the maximum is not optimal for it.
+h(nu) is the distance that a side reaches along nu. The evader keeps the maximum of h_E - h_P over
+all nu: a branch of extremals that is not the maximum is not optimal for it.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ _CLIMBS, _MAX_CLIMBING, _APART, _MIN_STRIDE = 4, 40, 0.9, 1e-4
 class Scan:
     """Distances h_E - h_P, shape (n,), along directions `nu`, shape (n, 3), at one duration.
 
-    Of the directions `tried`, these are the ones for which both sides' extremals were found. `maxima` are local maxima
-    among them, computed exactly, the maximum first.
+    Of the directions `tried`, these are the ones for which both sides' extremals were found.
+    `maxima` are local maxima among them, computed exactly, the maximum first.
     """
 
     nu: Floats
@@ -40,7 +41,9 @@ class Scan:
 
 @dataclass(frozen=True)
 class End:
-    """The end of an extremal of one side along `nu`, with the directions across it and the linear response."""
+    """The end of an extremal of one side along `nu`, with the directions across it and the linear
+    response.
+    """
 
     state: Floats
     nu: Floats
@@ -49,11 +52,13 @@ class End:
 
 
 def scan(pair: Pair, node: Node) -> Scan:
-    """Compute extremals in all directions at the duration of a known extremal, from its direction outward.
+    """Compute extremals in all directions at the duration of a known extremal, from its direction
+    outward.
 
-    120 directions per side, each from a solved neighbour: at least 0.5 s per revolution. A reachable set that is not
-    convex has several extremals per direction. If the end of another direction is farther along a direction, its
-    extremal is not the farthest, and the direction counts as not found.
+    120 directions per side, each from a solved neighbour: at least 0.5 s per revolution. A
+    reachable set that is not convex has several extremals per direction. If the end of another
+    direction is farther along a direction, its extremal is not the farthest, and the direction
+    counts as not found.
     """
     grid = directions(_DIRECTIONS)
     grid = grid[np.argsort(-(grid @ node.nu))]
@@ -71,7 +76,8 @@ def scan(pair: Pair, node: Node) -> Scan:
 
 
 def greater(pair: Pair, node: Node) -> Node | None:
-    """Return an extremal of the same duration that keeps the evader farther away; None if none is found.
+    """Return an extremal of the same duration that keeps the evader farther away; None if none is
+    found.
 
     Durations of more than six revolutions are not scanned, because that would take minutes.
     """
@@ -91,7 +97,9 @@ def directions(count: int) -> Floats:
 
 
 def _fan(side: Side, state: Floats, nu: Floats, grid: Floats, duration: float) -> dict[int, End]:
-    """Find the end states of one side for the directions of a grid, which are sorted from nu outward."""
+    """Find the end states of one side for the directions of a grid, which are sorted from nu
+    outward.
+    """
     first = end_along(side, state, nu, duration)
     solved: dict[int, End] = {}
     if first is None:
@@ -105,7 +113,9 @@ def _fan(side: Side, state: Floats, nu: Floats, grid: Floats, duration: float) -
                 break
     ends = np.array([first.state[:3], *(end.state[:3] for end in solved.values())])
     reach = grid @ ends.T
-    return {i: end for i, end in solved.items() if end.nu @ end.state[:3] >= reach[i].max() - _SHORT}
+    return {
+        i: end for i, end in solved.items() if end.nu @ end.state[:3] >= reach[i].max() - _SHORT
+    }
 
 
 def _turn(side: Side, seed: End, toward: Floats, duration: float) -> End | None:
@@ -116,7 +126,9 @@ def _turn(side: Side, seed: End, toward: Floats, duration: float) -> End | None:
         for part in range(1, parts + 1):
             nu = seed.nu + (toward - seed.nu) * (part / parts)
             nu = nu / np.linalg.norm(nu)
-            end = end_along(side, here.state + here.response.by_nu @ (here.plane @ (nu - here.nu)), nu, duration)
+            end = end_along(
+                side, here.state + here.response.by_nu @ (here.plane @ (nu - here.nu)), nu, duration
+            )
             if end is None:
                 break
             here = end
@@ -127,7 +139,9 @@ def _turn(side: Side, seed: End, toward: Floats, duration: float) -> End | None:
 
 
 def end_along(side: Side, state: Floats, nu: Floats, duration: float) -> End | None:
-    """Return the end of the extremal of one side along nu, near a guess; None if Newton's method finds none."""
+    """Return the end of the extremal of one side along nu, near a guess; None if Newton's method
+    finds none.
+    """
     plane = across(nu)
     before = np.inf
     for _ in range(_MAX_ITERATIONS):
@@ -137,7 +151,8 @@ def end_along(side: Side, state: Floats, nu: Floats, duration: float) -> End | N
         correction = float(np.abs(response.rho).max())
         if not correction < min(_FARTHEST, 2.0 * before):
             return None
-        state, before = state + response.rho, correction
+        state = state + response.rho
+        before = correction
         if correction < _CONVERGED:
             return End(state, nu, plane, response) if response.regular else None
     return None
@@ -174,9 +189,11 @@ def _climb(pair: Pair, pursuer: End, evader: End, duration: float) -> Node | Non
         while stride > _MIN_STRIDE:
             nu = evader.nu + stride * slope / max(float(np.linalg.norm(slope)), 1e-3)
             nu = nu / np.linalg.norm(nu)
-            p, e = _turn(pair.pursuer, pursuer, nu, duration), _turn(pair.evader, evader, nu, duration)
+            p = _turn(pair.pursuer, pursuer, nu, duration)
+            e = _turn(pair.evader, evader, nu, duration)
             if p is not None and e is not None and nu @ (e.state - p.state)[:3] > value:
-                pursuer, evader = p, e
+                pursuer = p
+                evader = e
                 stride *= 1.5
                 break
             stride *= 0.3

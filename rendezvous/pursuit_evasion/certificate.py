@@ -1,7 +1,8 @@
-"""Checks that a capture is a saddle point; they share as little as possible with the method of solution.
+"""Checks that a capture is a saddle point; they share as little as possible with the method of
+solution.
 
-The Hamiltonian is that of Wang's slides, "Optimal control": H_P + H_E, constant, and one in their scale. The other
-checks are not from there.
+The Hamiltonian is that of Wang's slides, "Optimal control": H_P + H_E, constant, and one in their
+scale. The other checks are not from there.
 """
 
 from __future__ import annotations
@@ -14,10 +15,22 @@ from scipy.integrate import solve_ivp
 
 from infoset.rendezvous._arrays import Floats
 from infoset.rendezvous.pursuit_evasion._branch import MAX_WORK, Ending, follow
-from infoset.rendezvous.pursuit_evasion._pair import MAX_RESIDUAL, Craft, KnownPath, Node, Pair, Side
+from infoset.rendezvous.pursuit_evasion._pair import (
+    MAX_RESIDUAL,
+    Craft,
+    KnownPath,
+    Node,
+    Pair,
+    Side,
+)
 from infoset.rendezvous.pursuit_evasion._scan import greater, scan
 from infoset.rendezvous.pursuit_evasion.game import scaled_game
-from infoset.rendezvous.pursuit_evasion.paths import ExtremalPath, PathError, extremal_paths, steered_path
+from infoset.rendezvous.pursuit_evasion.paths import (
+    ExtremalPath,
+    PathError,
+    extremal_paths,
+    steered_path,
+)
 from infoset.rendezvous.pursuit_evasion.solution import Solution
 from infoset.rendezvous.pursuit_evasion.steering import Policy
 
@@ -28,8 +41,8 @@ MAX_GAIN_S = 1e-2
 MAX_EXCESS = 1e-6
 """In units of length: the scan is less accurate than the solution of the game."""
 MAX_UNDECIDED = 0.5
-"""Share of the directions that may be undecided in a claim: a scan that compares less than half of them has not looked
-at most of the alternatives. `geo-pursuit` leaves 47 of 120 undecided."""
+"""Share of the directions that may be undecided in a claim: a scan that compares less than half of
+them has not looked at most of the alternatives. `geo-pursuit` leaves 47 of 120 undecided."""
 
 _PANELS, _POINTS, _MAX_CHANGES = 32, 8, 3
 _BEYOND = 1.0 + 1e-6
@@ -41,8 +54,8 @@ _MAX_WORK = 2.0 * MAX_WORK
 class Deviation:
     """A deviation of one player by a policy, with the optimal response of the other.
 
-    `capture_s` is None without a capture until the capture time of the game; `conclusive` is False if the best response
-    could not be computed.
+    `capture_s` is None without a capture until the capture time of the game; `conclusive` is False
+    if the best response could not be computed.
     """
 
     name: str
@@ -65,7 +78,8 @@ class Certificate:
     closing_speed_m_s : float
         Speed at which the distance falls at the capture.
     min_curvature : float
-        Minimum eigenvalue of the Hessian of h_P - h_E + R across nu, nondimensional; R is the capture radius.
+        Minimum eigenvalue of the Hessian of h_P - h_E + R across nu, nondimensional; R is the
+        capture radius.
     no_conjugate_point : bool
         Whether neither extremal has one.
     no_earlier_capture : bool
@@ -75,7 +89,8 @@ class Certificate:
     pursuer_alone_s : float or None
         Earliest capture of the evader on its fixed optimal path; None if it could not be computed.
     evader_deviations : tuple of Deviation
-        Deviations of the evader, with the best responses of the pursuer: each must capture until the capture time.
+        Deviations of the evader, with the best responses of the pursuer: each must capture until
+        the capture time.
     directions_found, directions_tried : int
         Number of directions with a solution, and number of directions tried; zero without a scan.
     max_excess_m : float or None
@@ -109,7 +124,10 @@ class Certificate:
                 self.hamiltonian_drift < MAX_HAMILTONIAN_DRIFT,
                 f"the Hamiltonian drifts by {self.hamiltonian_drift:.1e}",
             ),
-            (gap_m < MAX_INTEGRATOR_GAP * self.unit_length_m, f"a second integrator ends {gap_m:.3g} m away"),
+            (
+                gap_m < MAX_INTEGRATOR_GAP * self.unit_length_m,
+                f"a second integrator ends {gap_m:.3g} m away",
+            ),
             (self.closing_speed_m_s > 0.0, "the closing speed is not positive"),
             (self.min_curvature > 0.0, "a curvature is not positive"),
             (self.no_conjugate_point, "an extremal has a conjugate point"),
@@ -132,11 +150,17 @@ class Certificate:
 
     @property
     def undecided(self) -> tuple[str, ...]:
-        """Return a phrase for each check that was not made or is only partly conclusive: it limits the claim."""
+        """Return a phrase for each check that was not made or is only partly conclusive: it limits
+        the claim.
+        """
         if not self.directions_tried:
             return ("the other directions at the capture were not compared",)
         undecided = self.directions_tried - self.directions_found
-        return (f"{undecided} of {self.directions_tried} directions were not decided",) if undecided else ()
+        return (
+            (f"{undecided} of {self.directions_tried} directions were not decided",)
+            if undecided
+            else ()
+        )
 
     @property
     def is_mostly_undecided(self) -> bool:
@@ -154,11 +178,13 @@ class Certificate:
 
 
 def certify(solution: Solution, *, all_directions: bool = False) -> Certificate:
-    """Check the capture of a `solution`; `all_directions` also scans all directions at the capture time.
+    """Check the capture of a `solution`; `all_directions` also scans all directions at the capture
+    time.
 
-    The scan looks for a direction that keeps the evader farther away. Cost: 0.3 s for one revolution, and at least 0.5
-    s more for the directions. All deviations together take at most twice the work limit of a game; in games of more
-    than six revolutions the last ones may be inconclusive.
+    The scan looks for a direction that keeps the evader farther away. Cost: 0.3 s for one
+    revolution, and at least 0.5 s more for the directions. All deviations together take at most
+    twice the work limit of a game; in games of more than six revolutions the last ones may be
+    inconclusive.
 
     Raises
     ------
@@ -168,13 +194,19 @@ def certify(solution: Solution, *, all_directions: bool = False) -> Certificate:
     capture = solution.capture
     if capture is None:
         raise ValueError(f"there is no capture to certify: the verdict is {solution.verdict.value}")
-    game, units, node = solution.game, solution.units, capture.extremal
+    game = solution.game
+    units = solution.units
+    node = capture.extremal
     scaled = scaled_game(game, units)
-    pursuer, evader, radius = scaled.pursuer, scaled.evader, scaled.radius
+    pursuer = scaled.pursuer
+    evader = scaled.evader
+    radius = scaled.radius
     paths = extremal_paths(pursuer, evader, node)
     drift, min_distance = _along(paths, node)
     latest = node.duration * _BEYOND
-    alone, conclusive, left = _followed(pursuer, KnownPath(paths[1].state_at), radius, latest, _MAX_WORK)
+    alone, conclusive, left = _followed(
+        pursuer, KnownPath(paths[1].state_at), radius, latest, _MAX_WORK
+    )
     if alone is None and conclusive:
         alone = node.duration
     deviations: list[Deviation] = []
@@ -185,12 +217,22 @@ def certify(solution: Solution, *, all_directions: bool = False) -> Certificate:
             deviations.append(Deviation(policy.value, None, False))
             continue
         found, conclusive, left = _followed(pursuer, KnownPath(path.state_at), radius, latest, left)
-        deviations.append(Deviation(policy.value, None if found is None else found * units.time_s, conclusive))
+        deviations.append(
+            Deviation(policy.value, None if found is None else found * units.time_s, conclusive)
+        )
     looked = scan(scaled.pair, node) if all_directions else None
     earlier_m = solution.curve.distance_m[solution.curve.duration_s < capture.time_s * (1.0 - 1e-9)]
     excess = None
     if looked is not None:
-        excess = max([float(looked.distance.max(initial=-np.inf)), *(peak.distance for peak in looked.maxima)]) - radius
+        excess = (
+            max(
+                [
+                    float(looked.distance.max(initial=-np.inf)),
+                    *(peak.distance for peak in looked.maxima),
+                ]
+            )
+            - radius
+        )
     return Certificate(
         residual=capture.residual,
         hamiltonian_drift=drift,
@@ -206,7 +248,9 @@ def certify(solution: Solution, *, all_directions: bool = False) -> Certificate:
         capture_s=capture.time_s,
         directions_found=0 if looked is None else len(looked.nu),
         directions_tried=0 if looked is None else looked.tried,
-        max_excess_m=None if excess is None or not np.isfinite(excess) else float(excess) * units.length_m,
+        max_excess_m=None
+        if excess is None or not np.isfinite(excess)
+        else float(excess) * units.length_m,
         unit_length_m=units.length_m,
     )
 
@@ -214,7 +258,9 @@ def certify(solution: Solution, *, all_directions: bool = False) -> Certificate:
 def _followed(
     pursuer: Side, evader: Side, radius: float, latest: float, left: float
 ) -> tuple[float | None, bool, float]:
-    """Return the earliest capture or None, whether the branch reached its end, and the remaining work."""
+    """Return the earliest capture or None, whether the branch reached its end, and the remaining
+    work.
+    """
     pair = Pair(pursuer, evader)
     first = pair.begin(latest, radius)
     if first is None:
@@ -233,9 +279,11 @@ def _followed(
 
 
 def _along(paths: tuple[ExtremalPath, ExtremalPath], node: Node) -> tuple[float, float]:
-    """Return the drift of the Hamiltonian, scaled to be one, and the minimum distance from the planet's centre.
+    """Return the drift of the Hamiltonian, scaled to be one, and the minimum distance from the
+    planet's centre.
 
-    The costate of the mass is the integral of |p_v| thrust / m^2, by Gauss and Legendre's rule on panels.
+    The costate of the mass is the integral of |p_v| thrust / m^2, by Gauss and Legendre's rule on
+    panels.
     """
     points, weights = np.polynomial.legendre.leggauss(_POINTS)
     edges = np.linspace(0.0, node.duration, _PANELS + 1)
@@ -244,9 +292,11 @@ def _along(paths: tuple[ExtremalPath, ExtremalPath], node: Node) -> tuple[float,
     times = np.sort(np.concatenate([edges, inner.ravel()]))
     at_edges = np.searchsorted(times, edges)
     at_inner = np.searchsorted(times, inner.ravel())
-    drift, minimum = 0.0, np.inf
+    drift = 0.0
+    minimum = np.inf
     for path in paths:
-        y, craft = path.sampled(times), path.craft
+        y = path.sampled(times)
+        craft = path.craft
         mass = craft.mass - craft.flow * times
         size = np.linalg.norm(y[:, 9:], axis=1)
         rates = (size * craft.thrust / mass**2)[at_inner].reshape(_PANELS, _POINTS)
@@ -261,9 +311,13 @@ def _along(paths: tuple[ExtremalPath, ExtremalPath], node: Node) -> tuple[float,
 
 
 def _integrator_gap(pursuer: Craft, evader: Craft, node: Node) -> float:
-    """Integrate both forward from their start states and costates by a multistep method, and compare the ends."""
+    """Integrate both forward from their start states and costates by a multistep method, and
+    compare the ends.
+    """
     gaps = []
-    for craft, costate, end in zip((pursuer, evader), node.costates, (node.pursuer, node.evader), strict=True):
+    for craft, costate, end in zip(
+        (pursuer, evader), node.costates, (node.pursuer, node.evader), strict=True
+    ):
         forward = solve_ivp(
             _forward_rates,
             (0.0, node.duration),
@@ -278,12 +332,16 @@ def _integrator_gap(pursuer: Craft, evader: Craft, node: Node) -> float:
 
 
 def _forward_rates(time: float, y: Floats, craft: Craft) -> Floats:
-    """State and costate in time; gravity's gradient along p_v by a complex step, not by its formula."""
+    """State and costate in time; gravity's gradient along p_v by a complex step, not by its
+    formula.
+    """
     out = np.empty(12)
     p = y[9:]
     size = float(np.linalg.norm(p))
     out[:3] = y[3:6]
-    out[3:6] = _gravity(y[:3], craft) + craft.thrust / (craft.mass - craft.flow * time) * p / max(size, 1e-300)
+    out[3:6] = _gravity(y[:3], craft) + craft.thrust / (craft.mass - craft.flow * time) * p / max(
+        size, 1e-300
+    )
     out[6:9] = -_gravity(y[:3] + 1e-30j * p, craft).imag / 1e-30
     out[9:] = -y[6:9]
     return out

@@ -32,8 +32,8 @@ _MAX_PLANS, _LONGEST = 10_000, 1e3
 class Observation:
     """The pursuer's observation of the evader when it plans.
 
-    `delay_s` is its age; the pursuer assumes that the evader has been optimal since. The errors are standard deviations
-    of each component.
+    `delay_s` is its age; the pursuer assumes that the evader has been optimal since. The errors are
+    standard deviations of each component.
     """
 
     delay_s: float = 0.0
@@ -43,7 +43,9 @@ class Observation:
     @property
     def is_exact(self) -> bool:
         """Whether the pursuer observes the evader exactly."""
-        return self.delay_s == 0.0 and self.position_error_m == 0.0 and self.velocity_error_m_s == 0.0
+        return (
+            self.delay_s == 0.0 and self.position_error_m == 0.0 and self.velocity_error_m_s == 0.0
+        )
 
 
 class Ended(Enum):
@@ -61,8 +63,9 @@ class Ended(Enum):
 class Flight:
     """A pursuit with feedback.
 
-    It ends at `time_s`, at the capture, at the closest approach or for another reason, at `distance_m`. At the times of
-    the n plans, `planned_s`, which predict captures at `predicted_s`, the distances are `distances_m`, shape (n,).
+    It ends at `time_s`, at the capture, at the closest approach or for another reason, at
+    `distance_m`. At the times of the n plans, `planned_s`, which predict captures at `predicted_s`,
+    the distances are `distances_m`, shape (n,).
     """
 
     ended: Ended
@@ -82,10 +85,12 @@ def fly(
     seed: int | np.random.SeedSequence = 0,
     solution: Solution | None = None,
 ) -> Flight:
-    """Simulate a pursuer that computes a new plan at regular times, `replan_s` apart, and follows each until the next.
+    """Simulate a pursuer that computes a new plan at regular times, `replan_s` apart, and follows
+    each until the next.
 
-    `steering` is that of the evader; None is optimal against the true state of the pursuer. No `observation` observes
-    the evader exactly; otherwise `seed` is that of its errors. `solution` is that of the game, if it is known.
+    `steering` is that of the evader; None is optimal against the true state of the pursuer. No
+    `observation` observes the evader exactly; otherwise `seed` is that of its errors. `solution` is
+    that of the game, if it is known.
 
     Raises
     ------
@@ -96,15 +101,18 @@ def fly(
 
     Notes
     -----
-    Each plan starts Newton's method at the previous one: 2 ms and, for a steered evader, 2 ms of its flight. The last
-    leg is simulated without observation. If Newton's method fails from the previous plan, the game is solved from
-    scratch; the previous plan is kept if that would take much longer.
+    Each plan starts Newton's method at the previous one: 2 ms and, for a steered evader, 2 ms of
+    its flight. The last leg is simulated without observation. If Newton's method fails from the
+    previous plan, the game is solved from scratch; the previous plan is kept if that would take
+    much longer.
     """
     if not 0.0 < replan_s < np.inf:
         raise ValueError("the time between plans must be positive")
     solution = solve(game) if solution is None else solution
     if solution.capture is None:
-        raise ValueError(f"there is no first plan: the verdict of the game is {solution.verdict.value}")
+        raise ValueError(
+            f"there is no first plan: the verdict of the game is {solution.verdict.value}"
+        )
     units = solution.units
     seen = observation or Observation()
     random = np.random.default_rng(seed)
@@ -116,14 +124,28 @@ class _Pursuit:
     """One pursuit in progress, nondimensional."""
 
     def __init__(
-        self, game: Game, units: Units, steering: Steering | None, observation: Observation, random: np.random.Generator
+        self,
+        game: Game,
+        units: Units,
+        steering: Steering | None,
+        observation: Observation,
+        random: np.random.Generator,
     ) -> None:
-        self._units, self._steering, self._observation, self._random = units, steering, observation, random
+        self._units = units
+        self._steering = steering
+        self._observation = observation
+        self._random = random
         scaled = scaled_game(game, units)
-        self._radius, self._pursuer, self._evader = scaled.radius, scaled.pursuer, scaled.evader
+        self._radius = scaled.radius
+        self._pursuer = scaled.pursuer
+        self._evader = scaled.evader
         self._hit = HIT_M / units.length_m
-        self._dry = game.pursuer.dry_mass_kg / units.mass_kg, game.evader.dry_mass_kg / units.mass_kg
-        self._time, self._work = 0.0, MAX_WORK
+        self._dry = (
+            game.pursuer.dry_mass_kg / units.mass_kg,
+            game.evader.dry_mass_kg / units.mass_kg,
+        )
+        self._time = 0.0
+        self._work = MAX_WORK
         self._past: list[tuple[float, PathNow]] = []
         self._log: list[tuple[float, float, Floats]] = []
 
@@ -146,7 +168,8 @@ class _Pursuit:
             self._pursuer = replace(self._pursuer, start=pursuer.at(spell)[:6], mass=mass)
             self._evader = replace(self._evader, start=evader(spell), mass=evader_mass)
             self._time += spell
-            planned, known = self._plan(plan, spell, self._seen(plan)), plan
+            planned = self._plan(plan, spell, self._seen(plan))
+            known = plan
             if planned is None:
                 return self._end(Ended.NO_PLAN)
             plan = planned
@@ -162,9 +185,18 @@ class _Pursuit:
             evader = replace(evader, thrust=0.0, flow=0.0)
         pair = Pair(self._pursuer, evader)
         latest = min(_lasts(self._pursuer, self._dry[0]), _lasts(evader, self._dry[1]), _LONGEST)
-        kept = replace(before, duration=before.duration - spell) if before.duration > spell else None
+        kept = (
+            replace(before, duration=before.duration - spell) if before.duration > spell else None
+        )
         if kept is not None:
-            node = pair.solve(kept.vector, kept.duration, self._radius, time_free=True, tolerance=FINE, latest=latest)
+            node = pair.solve(
+                kept.vector,
+                kept.duration,
+                self._radius,
+                time_free=True,
+                tolerance=FINE,
+                latest=latest,
+            )
             if node is not None and node.is_saddle and node.closing > 0.0:
                 return node
         if float(np.linalg.norm(evader.start[:3] - self._pursuer.start[:3])) <= self._radius:
@@ -173,7 +205,8 @@ class _Pursuit:
         branch = None if first is None else follow(pair, first, self._radius, latest, self._work)
         self._work -= 0.0 if branch is None else branch.work
         afresh = branch.last if branch is not None and branch.ending is Ending.CAPTURE else None
-        # Near the end a point may be unreachable by metres: a near miss is better than another revolution.
+        # Near the end a point may be unreachable by metres: a near miss is better than another
+        # revolution.
         if kept is not None and (
             afresh is None or afresh.duration > kept.duration + _PATIENCE * (kept.duration + spell)
         ):
@@ -185,15 +218,23 @@ class _Pursuit:
         if self._steering is None:
             path = ExtremalPath(self._evader, own.evader, own.nu, own.duration)
             return (lambda time: path.at(time)[:6]), self._evader.mass - self._evader.flow * spell
-        units, begin, steering = self._units, self._time, self._steering
+        units = self._units
+        begin = self._time
+        steering = self._steering
         scale = np.repeat([units.length_m, units.speed_m_s], 3)
         spent = self._evader.mass <= self._dry[1] + self._evader.flow * spell
 
         def direction(time: float, state: Floats) -> Floats:
-            return np.zeros(3) if spent else np.asarray(steering((begin + time) * units.time_s, state * scale))
+            return (
+                np.zeros(3)
+                if spent
+                else np.asarray(steering((begin + time) * units.time_s, state * scale))
+            )
 
         steered = steered_path(self._evader, direction, spell)
-        return (lambda time: np.asarray(steered.solution(time)[:6])), float(steered.solution(spell)[6])
+        return (lambda time: np.asarray(steered.solution(time)[:6])), float(
+            steered.solution(spell)[6]
+        )
 
     def _seen(self, plan: Node) -> Craft:
         """Return the evader as the pursuer observes it."""
@@ -207,18 +248,28 @@ class _Pursuit:
             begin, path = next(leg for leg in reversed(self._past) if leg[0] <= at)
             state = path(at - begin)
         errors = np.repeat(
-            [seen.position_error_m / self._units.length_m, seen.velocity_error_m_s / self._units.speed_m_s], 3
+            [
+                seen.position_error_m / self._units.length_m,
+                seen.velocity_error_m_s / self._units.speed_m_s,
+            ],
+            3,
         )
         state = state + errors * self._random.standard_normal(6)
         if delay > 0.0:
             # As in the plan: full thrust in its current direction, which turns slowly.
             believed = plan.costates[1][3:]
-            since = steered_path(replace(self._evader, start=state), lambda _time, _state: believed, delay)
+            since = steered_path(
+                replace(self._evader, start=state), lambda _time, _state: believed, delay
+            )
             state = since.state_at(delay)[0]
         return replace(self._evader, start=state)
 
-    def _look(self, pursuer: ExtremalPath, evader: PathNow, spell: float, last: bool) -> Flight | None:
-        """Return the flight if it ends in the leg: by a capture, or in the last leg at the closest approach."""
+    def _look(
+        self, pursuer: ExtremalPath, evader: PathNow, spell: float, last: bool
+    ) -> Flight | None:
+        """Return the flight if it ends in the leg: by a capture, or in the last leg at the closest
+        approach.
+        """
 
         def distance(time: float) -> float:
             return float(np.linalg.norm(pursuer.at(time)[:3] - evader(time)[:3]))
@@ -235,11 +286,20 @@ class _Pursuit:
             if not len(inside):
                 return None
             first = int(inside[0])
-            at = brentq(lambda time: distance(time) - self._radius, times[first - 1], times[first]) if first else 0.0
+            at = (
+                brentq(lambda time: distance(time) - self._radius, times[first - 1], times[first])
+                if first
+                else 0.0
+            )
             return self._flight(Ended.CAPTURED, self._time + at, distance(at))
         near = int(np.argmin(values))
-        low, high = times[max(0, near - 1)], times[min(_LOOKS - 1, near + 1)]
-        at = float(minimize_scalar(distance, bounds=(low, high), method="bounded", options={"xatol": 1e-12}).x)
+        low = times[max(0, near - 1)]
+        high = times[min(_LOOKS - 1, near + 1)]
+        at = float(
+            minimize_scalar(
+                distance, bounds=(low, high), method="bounded", options={"xatol": 1e-12}
+            ).x
+        )
         ended = Ended.CAPTURED if distance(at) <= self._hit else Ended.MISSED
         return self._flight(ended, self._time + at, distance(at))
 
@@ -261,6 +321,8 @@ class _Pursuit:
 
 
 def _lasts(craft: Craft, dry: float) -> float:
-    """Return how long the propellant lasts; a little less for a craft without dry mass, whose acceleration diverges."""
+    """Return how long the propellant lasts; a little less for a craft without dry mass, whose
+    acceleration diverges.
+    """
     share = 1.0 if dry > 0.0 else 0.999
     return share * (craft.mass - dry) / craft.flow if craft.flow > 0.0 else np.inf

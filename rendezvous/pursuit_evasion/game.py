@@ -1,7 +1,8 @@
 """The game: two craft with thrust, in a planet's gravity, and the distance that counts as capture.
 
-It is that of Wang's slides (Bauman University), after Shen and Casalino, Journal of Guidance, Control, and Dynamics
-41(8), 2018, p. 1823. Its nondimensional form has units of length, time and mass for which mu is one.
+It is that of Wang's slides (Bauman University), after Shen and Casalino, Journal of Guidance,
+Control, and Dynamics 41(8), 2018, p. 1823. Its nondimensional form has units of length, time and
+mass for which mu is one.
 """
 
 from __future__ import annotations
@@ -25,9 +26,10 @@ LONGEST_REVOLUTIONS = 15.0
 class Gravity:
     """Gravity of the planet.
 
-    `planet_radius_m` is the minimum allowed distance from the centre; zero for no limit. `j2` is the second zonal
-    harmonic, about the z axis, which refers to `equatorial_radius_m`; zero for a sphere. J2 is not in the slides:
-    without it gravity is that of their first equation, -mu r / |r|^3.
+    `planet_radius_m` is the minimum allowed distance from the centre; zero for no limit. `j2` is
+    the second zonal harmonic, about the z axis, which refers to `equatorial_radius_m`; zero for a
+    sphere. J2 is not in the slides: without it gravity is that of their first equation, -mu r /
+    |r|^3.
 
     Raises
     ------
@@ -53,11 +55,11 @@ class Gravity:
 class Player:
     """A craft with full thrust in any direction, until its propellant is spent.
 
-    Its state is in an inertial frame whose z axis is the planet's. A craft with no thrust coasts; one with an infinite
-    specific impulse has a constant mass.
+    Its state is in an inertial frame whose z axis is the planet's. A craft with no thrust coasts;
+    one with an infinite specific impulse has a constant mass.
 
-    r' = v, v' = g + (T/m) u, m' = -T/c (Wang's slides, "Modelling of the motion"), c the specific impulse times
-    standard gravity: the slides write the former for c.
+    r' = v, v' = g + (T/m) u, m' = -T/c (Wang's slides, "Modelling of the motion"), c the specific
+    impulse times standard gravity: the slides write the former for c.
 
     Raises
     ------
@@ -83,7 +85,9 @@ class Player:
     @property
     def burn_time_s(self) -> float:
         """Return the time until the propellant is spent; infinite without mass flow."""
-        return (self.mass_kg - self.dry_mass_kg) / self.flow_kg_s if self.flow_kg_s > 0.0 else math.inf
+        return (
+            (self.mass_kg - self.dry_mass_kg) / self.flow_kg_s if self.flow_kg_s > 0.0 else math.inf
+        )
 
     @property
     def acceleration_m_s2(self) -> float:
@@ -95,16 +99,17 @@ class Player:
 class Game:
     """A pursuer that minimises the capture time and an evader that maximises it.
 
-    `capture_radius_m` is the distance that counts as capture; zero for a point. `longest_s` is the longest duration
-    considered; infinite for 15 revolutions of the pursuer.
+    `capture_radius_m` is the distance that counts as capture; zero for a point. `longest_s` is the
+    longest duration considered; infinite for 15 revolutions of the pursuer.
 
-    Wang's slides, "Modelling of the motion": the payoff is t_f, at which r_P = r_E; the capture radius is ours.
+    Wang's slides, "Modelling of the motion": the payoff is t_f, at which r_P = r_E; the capture
+    radius is ours.
 
     Raises
     ------
     ValueError
-        If the pursuer has no thrust, an orbit is not an ellipse or intersects the planet, or the distance at the start
-        is within the capture radius.
+        If the pursuer has no thrust, an orbit is not an ellipse or intersects the planet, or the
+        distance at the start is within the capture radius.
     """
 
     gravity: Gravity
@@ -120,7 +125,10 @@ class Game:
             fault = orbit_fault(*state, self.gravity.parameter_m3_s2, self.gravity.planet_radius_m)
             _need(fault is None, f"{name}: {fault}")
         _need(self.distance_m > 0.0, "pursuer and evader are at the same position")
-        _need(self.distance_m > self.capture_radius_m, "the evader is within the capture radius at the start")
+        _need(
+            self.distance_m > self.capture_radius_m,
+            "the evader is within the capture radius at the start",
+        )
 
     @property
     def distance_m(self) -> float:
@@ -135,8 +143,8 @@ def _need(holds: bool | np.bool_, message: str) -> None:
 
 @dataclass(frozen=True)
 class Units:
-    """Units of a game: the pursuer's semi-major axis and mass at the start, and the time of a radian of a circular
-    orbit of that size.
+    """Units of a game: the pursuer's semi-major axis and mass at the start, and the time of a
+    radian of a circular orbit of that size.
     """
 
     length_m: float
@@ -168,7 +176,9 @@ class ScaledGame:
 def units_of(game: Game) -> Units:
     """Return the units that suit a game."""
     mu = game.gravity.parameter_m3_s2
-    length = semi_major_axis_m(np.array(game.pursuer.position_m), np.array(game.pursuer.velocity_m_s), mu)
+    length = semi_major_axis_m(
+        np.array(game.pursuer.position_m), np.array(game.pursuer.velocity_m_s), mu
+    )
     return Units(length, float(np.sqrt(length**3 / mu)), game.pursuer.mass_kg)
 
 
@@ -176,7 +186,8 @@ def scaled_craft(player: Player, gravity: Gravity, units: Units) -> Craft:
     """Return a player as a nondimensional craft."""
     force = units.mass_kg * units.length_m / units.time_s**2
     return Craft(
-        start=np.array([*player.position_m, *player.velocity_m_s]) / np.repeat([units.length_m, units.speed_m_s], 3),
+        start=np.array([*player.position_m, *player.velocity_m_s])
+        / np.repeat([units.length_m, units.speed_m_s], 3),
         thrust=player.thrust_n / force,
         mass=player.mass_kg / units.mass_kg,
         flow=player.flow_kg_s * units.time_s / units.mass_kg,
@@ -188,17 +199,28 @@ def scaled_craft(player: Player, gravity: Gravity, units: Units) -> Craft:
 def scaled_game(game: Game, units: Units | None = None) -> ScaledGame:
     """Return a nondimensional game; without `units` those of `units_of` are used."""
     units = units or units_of(game)
-    pursuer, evader = (scaled_craft(player, game.gravity, units) for player in (game.pursuer, game.evader))
-    return ScaledGame(units, pursuer, evader, game.capture_radius_m / units.length_m, horizon_s(game) / units.time_s)
+    pursuer, evader = (
+        scaled_craft(player, game.gravity, units) for player in (game.pursuer, game.evader)
+    )
+    return ScaledGame(
+        units,
+        pursuer,
+        evader,
+        game.capture_radius_m / units.length_m,
+        horizon_s(game) / units.time_s,
+    )
 
 
 def horizon_s(game: Game) -> float:
-    """Return the longest duration of a game, s: the time until a player's propellant is spent, or that of the game."""
+    """Return the longest duration of a game, s: the time until a player's propellant is spent, or
+    that of the game.
+    """
     longest = game.longest_s
     if not np.isfinite(longest):
         longest = 2.0 * np.pi * LONGEST_REVOLUTIONS * units_of(game).time_s
     # The acceleration of a craft without dry mass is infinite at the end of its propellant.
     burns = [
-        player.burn_time_s * (1.0 if player.dry_mass_kg > 0.0 else 0.999) for player in (game.pursuer, game.evader)
+        player.burn_time_s * (1.0 if player.dry_mass_kg > 0.0 else 0.999)
+        for player in (game.pursuer, game.evader)
     ]
     return float(min(longest, *burns))

@@ -1,4 +1,6 @@
-"""Paths of the players, extremal or steered by a rule, and the history of a capture for figures and tables."""
+"""Paths of the players, extremal or steered by a rule, and the history of a capture for figures and
+tables.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,13 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from infoset.rendezvous._arrays import Floats
-from infoset.rendezvous.pursuit_evasion._extremal import NO_VARIATIONS, STATES, end_of, flow_back, rate
+from infoset.rendezvous.pursuit_evasion._extremal import (
+    NO_VARIATIONS,
+    STATES,
+    end_of,
+    flow_back,
+    rate,
+)
 from infoset.rendezvous.pursuit_evasion._pair import FINE, Craft, Node
 from infoset.rendezvous.pursuit_evasion.game import Units, scaled_game
 from infoset.rendezvous.pursuit_evasion.solution import Solution
@@ -38,7 +46,9 @@ class ExtremalPath:
     duration: float
 
     def at(self, time: float) -> Floats:
-        """Return state and costate at a time, shape (12,); the time may be a little beyond the end."""
+        """Return state and costate at a time, shape (12,); the time may be a little beyond the
+        end.
+        """
         y = end_of(self.end_state, self.nu)
         self._carry(y, 0.0, self.duration - time)
         return y
@@ -46,7 +56,8 @@ class ExtremalPath:
     def sampled(self, times: Floats) -> Floats:
         """Return states and costates at rising times, shape (n, 12)."""
         out = np.empty((len(times), STATES))
-        y, to_go = end_of(self.end_state, self.nu), 0.0
+        y = end_of(self.end_state, self.nu)
+        to_go = 0.0
         for i in range(len(times) - 1, -1, -1):
             self._carry(y, to_go, self.duration - times[i])
             to_go = self.duration - times[i]
@@ -60,7 +71,9 @@ class ExtremalPath:
         return y[:6], rate(y, self.craft.mu, self.craft.oblateness, self.craft.thrust / mass)[3:]
 
     def _carry(self, y: Floats, begin: float, end: float) -> None:
-        if not flow_back(y, NO_VARIATIONS, self.craft.kernel_craft(self.duration), begin, end, FINE):
+        if not flow_back(
+            y, NO_VARIATIONS, self.craft.kernel_craft(self.duration), begin, end, FINE
+        ):
             raise PathError("an extremal of the solution cannot be propagated")
 
 
@@ -74,7 +87,9 @@ def extremal_paths(pursuer: Craft, evader: Craft, node: Node) -> tuple[ExtremalP
 
 @dataclass(frozen=True)
 class SteeredPath:
-    """The path of a craft that steers by a rule: `solution` gives state and mass, shape (7,), at a time."""
+    """The path of a craft that steers by a rule: `solution` gives state and mass, shape (7,), at a
+    time.
+    """
 
     craft: Craft
     direction: Direction
@@ -87,10 +102,11 @@ class SteeredPath:
 
 
 def steered_path(craft: Craft, direction: Direction, duration: float) -> SteeredPath:
-    """Return the path of a craft that steers by a rule: full thrust along the direction, or none where that is zero.
+    """Return the path of a craft that steers by a rule: full thrust along the direction, or none
+    where that is zero.
 
-    SciPy's DOP853 to 1e-12: some 3 ms a revolution. Raise `PathError` if the direction turns so fast that integration
-    takes too long, or the path comes too near the planet's centre.
+    SciPy's DOP853 to 1e-12: some 3 ms a revolution. Raise `PathError` if the direction turns so
+    fast that integration takes too long, or the path comes too near the planet's centre.
     """
     calls = 0
 
@@ -128,9 +144,9 @@ def _rates(time: float, state: Floats, craft: Craft, direction: Direction) -> Fl
 class PlayerHistory:
     """One player at n times, in the inertial frame; vectors have shape (n, 3).
 
-    `thrust_direction` has unit vectors; zero for a craft without thrust. `switching`, shape (n,), is |lambda_v| / m - k
-    lambda_m / c over its value at the start: full thrust is optimal while it is positive. It is the factor of k T in
-    the Hamiltonian of Wang's slides, "Optimal control".
+    `thrust_direction` has unit vectors; zero for a craft without thrust. `switching`, shape (n,),
+    is |lambda_v| / m - k lambda_m / c over its value at the start: full thrust is optimal while it
+    is positive. It is the factor of k T in the Hamiltonian of Wang's slides, "Optimal control".
     """
 
     position_m: Floats
@@ -150,7 +166,8 @@ class History:
 
 
 def history(solution: Solution, count: int = 400) -> History:
-    """Sample the capture of a `solution` at `count` equally spaced times, from the start to the end.
+    """Sample the capture of a `solution` at `count` equally spaced times, from the start to the
+    end.
 
     Raises
     ------
@@ -160,7 +177,8 @@ def history(solution: Solution, count: int = 400) -> History:
     capture = solution.capture
     if capture is None:
         raise ValueError(f"there is no capture to sample: the verdict is {solution.verdict.value}")
-    units, node = solution.units, capture.extremal
+    units = solution.units
+    node = capture.extremal
     times = np.linspace(0.0, node.duration, count)
     scaled = scaled_game(solution.game, units)
     paths = extremal_paths(scaled.pursuer, scaled.evader, node)
@@ -171,7 +189,8 @@ def history(solution: Solution, count: int = 400) -> History:
 def orbital_axes(position_m: Floats, velocity_m_s: Floats) -> Floats:
     """Return the axes radial, along the motion and normal at states, shape (n, 3, 3).
 
-    `position_m` and `velocity_m_s` have shape (n, 3). Rows are the axes: the components of a vector are axes @ vector.
+    `position_m` and `velocity_m_s` have shape (n, 3). Rows are the axes: the components of a vector
+    are axes @ vector.
     """
     radial = position_m / np.linalg.norm(position_m, axis=1, keepdims=True)
     normal = np.cross(position_m, velocity_m_s)
@@ -180,7 +199,8 @@ def orbital_axes(position_m: Floats, velocity_m_s: Floats) -> Floats:
 
 
 def _sampled(path: ExtremalPath, times: Floats, units: Units) -> PlayerHistory:
-    y, craft = path.sampled(times), path.craft
+    y = path.sampled(times)
+    craft = path.craft
     mass = craft.mass - craft.flow * times
     size = np.linalg.norm(y[:, 9:], axis=1)
     direction = np.where(size[:, None] > 0.0, y[:, 9:] / np.maximum(size, 1e-300)[:, None], path.nu)

@@ -16,9 +16,13 @@ class Verdict(Enum):
     CAPTURED = "captured"
     """The pursuer reaches the evader, at the capture time if both are optimal."""
     ESCAPES = "escapes"
-    """An evader at least as strong keeps away until the pursuer's propellant is spent, or for the longest duration."""
+    """An evader at least as strong keeps away until the pursuer's propellant is spent, or for the
+    longest duration.
+    """
     PROPELLANT_EXHAUSTED = "propellant-exhausted"
-    """A player's propellant is spent before the capture, although the pursuer's acceleration is greater."""
+    """A player's propellant is spent before the capture, although the pursuer's acceleration is
+    greater.
+    """
     BRANCH_NOT_CERTIFIED = "branch-not-certified"
     """The extremals are no saddle from some duration on: nothing is claimed."""
 
@@ -27,8 +31,9 @@ class Verdict(Enum):
 class PlayerEnd:
     """One player at the end of the game, in the inertial frame.
 
-    `propellant_kg` is the propellant spent. `costate_at_start`, shape (6,), is (lambda_r, lambda_v) at t = 0 in the
-    units of the solution, scaled so that the Hamiltonian is one: H_f = 1 of Wang's slides, "Optimal control".
+    `propellant_kg` is the propellant spent. `costate_at_start`, shape (6,), is (lambda_r, lambda_v)
+    at t = 0 in the units of the solution, scaled so that the Hamiltonian is one: H_f = 1 of Wang's
+    slides, "Optimal control".
     """
 
     propellant_kg: float
@@ -41,8 +46,8 @@ class PlayerEnd:
 class DistanceCurve:
     """The distance l that the evader can keep at each duration T, rising, both of shape (n,).
 
-    `min_curvature`, shape (n,), is the lesser eigenvalue of the Hessian of h_P - h_E + l across nu, in units of
-    length: a saddle while it is positive.
+    `min_curvature`, shape (n,), is the lesser eigenvalue of the Hessian of h_P - h_E + l across nu,
+    in units of length: a saddle while it is positive.
     """
 
     duration_s: Floats
@@ -59,13 +64,14 @@ class Capture:
     position_m : ndarray, shape (3,)
         Position of the evader at the capture time.
     direction : ndarray, shape (3,)
-        nu, the direction along which both players reach the maximum distance; with a capture radius, the direction
-        from the pursuer to the evader. It is that of lambda_rP at the end, which equals -lambda_rE.
+        nu, the direction along which both players reach the maximum distance; with a capture
+        radius, the direction from the pursuer to the evader. It is that of lambda_rP at the end,
+        which equals -lambda_rE.
     closing_speed_m_s : float
         Speed at which the distance falls.
     curvature : ndarray, shape (2,)
-        Eigenvalues of the Hessian of h_P - h_E on the plane normal to nu, in units of length, ascending; not from the
-        slides.
+        Eigenvalues of the Hessian of h_P - h_E on the plane normal to nu, in units of length,
+        ascending; not from the slides.
     residual : float
         Error of the start states and of r_E - r_P = R nu, in units of length and speed: below 1e-9.
     extremal : Node
@@ -92,10 +98,10 @@ class Capture:
 class Solution:
     """A game with its verdict; `units` are those of nondimensional values.
 
-    There is a `capture` if the verdict is `captured`. The continuation changed `branch_changes` times to a branch that
-    keeps the evader farther away. `curve` contains the distances along the branch, and
-    `looked_at_s` is the longest duration that was solved; `exhausted` is the player without propellant at that time,
-    pursuer or evader.
+    There is a `capture` if the verdict is `captured`. The continuation changed `branch_changes`
+    times to a branch that keeps the evader farther away. `curve` contains the distances along the
+    branch, and `looked_at_s` is the longest duration that was solved; `exhausted` is the player
+    without propellant at that time, pursuer or evader.
     """
 
     game: Game

@@ -9,7 +9,13 @@ from infoset.rendezvous.pursuit_evasion._branch import MAX_WORK, Ending, follow
 from infoset.rendezvous.pursuit_evasion._pair import Node
 from infoset.rendezvous.pursuit_evasion._scan import greater
 from infoset.rendezvous.pursuit_evasion.game import Game, Player, Units, horizon_s, scaled_game
-from infoset.rendezvous.pursuit_evasion.solution import Capture, DistanceCurve, PlayerEnd, Solution, Verdict
+from infoset.rendezvous.pursuit_evasion.solution import (
+    Capture,
+    DistanceCurve,
+    PlayerEnd,
+    Solution,
+    Verdict,
+)
 
 _MAX_BRANCHES = 6
 
@@ -17,25 +23,30 @@ _MAX_BRANCHES = 6
 def solve(game: Game, *, change_branch: bool = True, all_directions: bool = False) -> Solution:
     """Solve a game without a guess.
 
-    `change_branch` searches for another branch at a fold; each search takes seconds. `all_directions` searches also at
-    the capture for a branch that keeps the evader farther away.
+    `change_branch` searches for another branch at a fold; each search takes seconds.
+    `all_directions` searches also at the capture for a branch that keeps the evader farther away.
 
     Notes
     -----
-    The game is that of Wang's slides, after Shen and Casalino (2018), who shoot forward from a guess. At each duration
-    the evader takes the branch with the maximum distance l; the capture is the first time at which l is the capture
-    radius. Cost: 10 to 15 ms per revolution. A capture whose residual is not below 1e-9 is rejected: the verdict is
-    then that the branch is not certified.
+    The game is that of Wang's slides, after Shen and Casalino (2018), who shoot forward from a
+    guess. At each duration the evader takes the branch with the maximum distance l; the capture is
+    the first time at which l is the capture radius. Cost: 10 to 15 ms per revolution. A capture
+    whose residual is not below 1e-9 is rejected: the verdict is then that the branch is not
+    certified.
     """
     scaled = scaled_game(game)
-    units, pair, radius, latest = scaled.units, scaled.pair, scaled.radius, scaled.latest
+    units = scaled.units
+    pair = scaled.pair
+    radius = scaled.radius
+    latest = scaled.latest
     first = pair.begin(latest, radius)
     if first is None:
         empty = DistanceCurve(np.zeros(0), np.zeros(0), np.zeros(0))
         return Solution(game, units, Verdict.BRANCH_NOT_CERTIFIED, None, 0, empty, 0.0)
     nodes: list[Node] = []
     branch = follow(pair, first, radius, latest)
-    changes, work = 0, branch.work
+    changes = 0
+    work = branch.work
     while branch.ending in (Ending.CAPTURE, Ending.FOLD) and changes < _MAX_BRANCHES:
         if not (change_branch if branch.ending is Ending.FOLD else all_directions):
             break
@@ -44,7 +55,8 @@ def solve(game: Game, *, change_branch: bool = True, all_directions: bool = Fals
             break
         nodes += branch.nodes if branch.ending is Ending.FOLD else branch.nodes[:-1]
         branch = follow(pair, better, radius, latest, MAX_WORK - work)
-        changes, work = changes + 1, work + branch.work
+        changes = changes + 1
+        work = work + branch.work
     nodes += branch.nodes
     curve = DistanceCurve(
         np.array([node.duration for node in nodes]) * units.time_s,
@@ -88,7 +100,8 @@ def _capture(game: Game, units: Units, node: Node) -> Capture:
 
 def _uncaptured(game: Game) -> tuple[Verdict, str | None]:
     """Return the verdict if there is no capture within the examined time."""
-    pursuer, evader = game.pursuer, game.evader
+    pursuer = game.pursuer
+    evader = game.evader
     end_s = horizon_s(game)
     slack = 1.0 - 2e-3
     if evader.burn_time_s * slack <= end_s and evader.burn_time_s < pursuer.burn_time_s:

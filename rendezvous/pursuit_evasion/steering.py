@@ -12,7 +12,9 @@ import numpy as np
 from infoset.rendezvous._arrays import Floats
 
 Steering = Callable[[float, Floats], Floats]
-"""Direction of thrust, shape (3,), of the time (s) and the evader's state (m, m/s): any length, zero to coast."""
+"""Direction of thrust, shape (3,), of the time (s) and the evader's state (m, m/s): any length,
+zero to coast.
+"""
 
 
 class Policy(Enum):
@@ -27,7 +29,9 @@ class Policy(Enum):
     INWARD = "inward"
 
     def direction(self, _time: float, state: Floats) -> Floats:
-        """Return the direction of thrust, shape (3,), at a `state` of position and velocity in any units."""
+        """Return the direction of thrust, shape (3,), at a `state` of position and velocity in any
+        units.
+        """
         sign = -1.0 if self in (Policy.RETROGRADE, Policy.ANTINORMAL, Policy.INWARD) else 1.0
         if self is Policy.COAST:
             return np.zeros(3)
@@ -40,7 +44,9 @@ class Policy(Enum):
 
 @dataclass(frozen=True)
 class RandomSteering:
-    """Random directions, uniform over the sphere, each constant for `hold_s`; seed and run number determine them."""
+    """Random directions, uniform over the sphere, each constant for `hold_s`; seed and run number
+    determine them.
+    """
 
     seed: int
     run: int

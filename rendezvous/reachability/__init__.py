@@ -1,11 +1,18 @@
-"""Rendezvous through reachable sets: every optimal control of a linear system under constraints on its states.
+"""Rendezvous through reachable sets: every optimal control of a linear system under constraints on
+its states.
 
-A problem is built from a motion. Its solution contains the sets of states and the set of optimal controls. Controls are
-selected from this set and simulated.
+A problem is built from a motion. Its solution contains the sets of states and the set of optimal
+controls. Controls are selected from this set and simulated.
 """
 
 from infoset.rendezvous.reachability.closed_loop import Flight, replan
-from infoset.rendezvous.reachability.motion import MotionModel, NonlinearMotion, between_periods, discretised, motion_of
+from infoset.rendezvous.reachability.motion import (
+    MotionModel,
+    NonlinearMotion,
+    between_periods,
+    discretised,
+    motion_of,
+)
 from infoset.rendezvous.reachability.optimum import EmptyTubeError
 from infoset.rendezvous.reachability.problem import (
     MAX_PERIODS,
@@ -13,7 +20,12 @@ from infoset.rendezvous.reachability.problem import (
     ReachabilityProblem,
     ThrustShape,
 )
-from infoset.rendezvous.reachability.robust import FeedbackPlan, NoRobustPlanError, feedback_plan, tightened
+from infoset.rendezvous.reachability.robust import (
+    FeedbackPlan,
+    NoRobustPlanError,
+    feedback_plan,
+    tightened,
+)
 from infoset.rendezvous.reachability.selection import (
     Effort,
     analytic_centre,
@@ -27,8 +39,21 @@ from infoset.rendezvous.reachability.selection import (
     samples,
     vertices,
 )
-from infoset.rendezvous.reachability.sets import ReachableSets, SetCounts, SetKind, ThinSetError, TooManyVerticesError
-from infoset.rendezvous.reachability.solve import OptimalControls, Route, Solution, min_periods, optimal_controls, solve
+from infoset.rendezvous.reachability.sets import (
+    ReachableSets,
+    SetCounts,
+    SetKind,
+    ThinSetError,
+    TooManyVerticesError,
+)
+from infoset.rendezvous.reachability.solve import (
+    OptimalControls,
+    Route,
+    Solution,
+    min_periods,
+    optimal_controls,
+    solve,
+)
 
 __all__ = [
     "MAX_PERIODS",

@@ -17,19 +17,21 @@ Constraints = tuple[Floats, Floats, Places, Places]
 
 _BROKEN = 3e-10
 _STILL = 1e-9
-"""A thrust, as a part of its bound, that moves by less than this in a direction counts as constant there: a change of
-this size is the maximum violation of a constraint (`MAX_VIOLATION`)."""
+"""A thrust, as a part of its bound, that moves by less than this in a direction counts as constant
+there: a change of this size is the maximum violation of a constraint (`MAX_VIOLATION`)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Lifted:
-    """{v: rows v <= limits, equal v = levels}, with |u(t)| <= 1 for a ball; states and controls are affine in v.
+    """{v: rows v <= limits, equal v = levels}, with |u(t)| <= 1 for a ball; states and controls are
+    affine in v.
 
-    States are x(t) = free[t] + response[t] v, of shapes (T + 1, n) and (T + 1, n, p). `control_free` and
-    `control_response`, of shapes (T m,) and (T m, p), are the same for all controls, those of the first period first.
-    Of the r rows, `moments` are the times that they refer to, and `labels` the indices of the block's constraints; both
-    are -1 for a bound on a control. `ball` is the number m of controls of a period if their norm is bounded; 0 for a
-    box, whose bounds are among the rows.
+    States are x(t) = free[t] + response[t] v, of shapes (T + 1, n) and (T + 1, n, p).
+    `control_free` and `control_response`, of shapes (T m,) and (T m, p), are the same for all
+    controls, those of the first period first. Of the r rows, `moments` are the times that they
+    refer to, and `labels` the indices of the block's constraints; both are -1 for a bound on a
+    control. `ball` is the number m of controls of a period if their norm is bounded; 0 for a box,
+    whose bounds are among the rows.
     """
 
     free: Floats
@@ -60,15 +62,23 @@ class Lifted:
     def only(self, kept: Places) -> Lifted:
         """Return the set with some of its rows."""
         return replace(
-            self, rows=self.rows[kept], limits=self.limits[kept], moments=self.moments[kept], labels=self.labels[kept]
+            self,
+            rows=self.rows[kept],
+            limits=self.limits[kept],
+            moments=self.moments[kept],
+            labels=self.labels[kept],
         )
 
     def where(self, equal: Floats, levels: Floats) -> Lifted:
         """Return the set with more equations."""
-        return replace(self, equal=np.vstack([self.equal, equal]), levels=np.concatenate([self.levels, levels]))
+        return replace(
+            self, equal=np.vstack([self.equal, equal]), levels=np.concatenate([self.levels, levels])
+        )
 
     def within(self, point: Floats, basis: Floats) -> Lifted:
-        """Return the set in coordinates z of an affine subspace v = point + basis z in which the equations hold."""
+        """Return the set in coordinates z of an affine subspace v = point + basis z in which the
+        equations hold.
+        """
         return replace(
             self,
             free=self.free + self.response @ point,
@@ -84,9 +94,12 @@ class Lifted:
 
 def lift(block: Block) -> Lifted:
     """Return the admissible controls of a block, v = all its controls; O(T^2 n^2 m), dense."""
-    periods, n, m = block.periods, block.size, len(block.controls)
+    periods = block.periods
+    n = block.size
+    m = len(block.controls)
     width = periods * m
-    free, response = np.zeros((periods + 1, n)), np.zeros((periods + 1, n, width))
+    free = np.zeros((periods + 1, n))
+    response = np.zeros((periods + 1, n, width))
     free[0] = block.initial
     for t in range(periods):
         free[t + 1] = block.transition[t] @ free[t]
@@ -98,24 +111,31 @@ def lift(block: Block) -> Lifted:
 
 
 def lift_with_states(block: Block) -> Lifted:
-    """Return the set of `lift` with v = all controls, then all states x(1)..x(T), which T n equations determine.
+    """Return the set of `lift` with v = all controls, then all states x(1)..x(T), which T n
+    equations determine.
 
     Its rows are sparse, which speeds up an interior-point method.
     """
-    periods, n, m = block.periods, block.size, len(block.controls)
+    periods = block.periods
+    n = block.size
+    m = len(block.controls)
     width = periods * m
     total = width + periods * n
-    free, response = np.zeros((periods + 1, n)), np.zeros((periods + 1, n, total))
+    free = np.zeros((periods + 1, n))
+    response = np.zeros((periods + 1, n, total))
     free[0] = block.initial
     for t in range(1, periods + 1):
         response[t][:, width + (t - 1) * n : width + t * n] = np.eye(n)
-    equal, levels = np.zeros((periods, n, total)), np.zeros((periods, n))
+    equal = np.zeros((periods, n, total))
+    levels = np.zeros((periods, n))
     for t in range(periods):
         equal[t] = response[t + 1] - block.transition[t] @ response[t]
         equal[t][:, t * m : (t + 1) * m] = -block.control[t]
     levels[0] = block.transition[0] @ block.initial
     whole, between = _state_constraints(block, free, response)
-    constraints = [rows for at_end, inner in zip(whole, between, strict=True) for rows in (at_end, *inner)]
+    constraints = [
+        rows for at_end, inner in zip(whole, between, strict=True) for rows in (at_end, *inner)
+    ]
     return _lifted(block, free, response, constraints, equal.reshape(-1, total), levels.ravel())
 
 
@@ -123,7 +143,9 @@ def _state_constraints(
     block: Block, free: Floats, response: Floats
 ) -> tuple[list[Constraints], list[list[Constraints]]]:
     """Constraints on the states at the end of each period, and at the instants within each."""
-    periods, n, m = block.periods, block.size, len(block.controls)
+    periods = block.periods
+    n = block.size
+    m = len(block.controls)
     whole: list[Constraints] = []
     between: list[list[Constraints]] = []
     for t in range(periods):
@@ -143,7 +165,12 @@ def _state_constraints(
 
 
 def _lifted(
-    block: Block, free: Floats, response: Floats, constraints: list[Constraints], equal: Floats, levels: Floats
+    block: Block,
+    free: Floats,
+    response: Floats,
+    constraints: list[Constraints],
+    equal: Floats,
+    levels: Floats,
 ) -> Lifted:
     """Add the bounds on controls, the first variables."""
     width = block.periods * len(block.controls)
@@ -151,19 +178,25 @@ def _lifted(
     if not block.ball:
         hard = np.full(2 * width, -1)
         constraints = [*constraints, (np.vstack([unit, -unit]), np.ones(2 * width), hard, hard)]
-    rows, limits, moments, labels = (np.concatenate(parts) for parts in zip(*constraints, strict=True))
+    rows, limits, moments, labels = (
+        np.concatenate(parts) for parts in zip(*constraints, strict=True)
+    )
     ball = len(block.controls) if block.ball else 0
-    return Lifted(free, response, np.zeros(width), unit, rows, limits, moments, labels, equal, levels, ball)
+    return Lifted(
+        free, response, np.zeros(width), unit, rows, limits, moments, labels, equal, levels, ball
+    )
 
 
 def joined(parts: Sequence[Lifted], controls: Sequence[Places], periods: int, total: int) -> Lifted:
-    """Return several blocks as one set, with controls in the order of the problem and states in that of the blocks.
+    """Return several blocks as one set, with controls in the order of the problem and states in
+    that of the blocks.
 
-    `controls` are the indices of each block's controls among the `total` controls of the problem; other controls are
-    zero.
+    `controls` are the indices of each block's controls among the `total` controls of the problem;
+    other controls are zero.
     """
     order = [t * total + int(j) for places in controls for t in range(periods) for j in places]
-    control_free, control_response = np.zeros(periods * total), np.zeros((periods * total, sum(p.size for p in parts)))
+    control_free = np.zeros(periods * total)
+    control_response = np.zeros((periods * total, sum(p.size for p in parts)))
     control_free[order] = np.concatenate([part.control_free for part in parts])
     control_response[order] = block_diag(*[part.control_response for part in parts])
     return Lifted(
@@ -184,7 +217,8 @@ def joined(parts: Sequence[Lifted], controls: Sequence[Places], periods: int, to
 class _ThrustInAxes(NamedTuple):
     """The thrust of a period, along the directions in which it depends on v and across them.
 
-    Along them it is `free` + `response` v, of shapes (k,) and (k, p); across them it is constant, of length `constant`.
+    Along them it is `free` + `response` v, of shapes (k,) and (k, p); across them it is constant,
+    of length `constant`.
     """
 
     free: Floats
@@ -193,10 +227,12 @@ class _ThrustInAxes(NamedTuple):
 
 
 def _in_own_axes(fixed: Floats, turned: Floats, unit: float = 1.0) -> _ThrustInAxes:
-    """Return the thrust fixed + turned v, of shapes (m,) and (m, p), along and across the directions in which it moves.
+    """Return the thrust fixed + turned v, of shapes (m,) and (m, p), along and across the
+    directions in which it moves.
 
-    Its bound is `unit`. A cone that also has the directions in which the thrust is constant is the same set, but the
-    interior-point method loses digits in it: gaps were 1e-7 in place of 1e-9, and rounding decided what was refused.
+    Its bound is `unit`. A cone that also has the directions in which the thrust is constant is the
+    same set, but the interior-point method loses digits in it: gaps were 1e-7 in place of 1e-9, and
+    rounding decided what was refused.
     """
     axes, movements, _ = np.linalg.svd(turned, full_matrices=False)
     moving = movements > _STILL * unit
@@ -208,7 +244,8 @@ def _in_own_axes(fixed: Floats, turned: Floats, unit: float = 1.0) -> _ThrustInA
 
 
 def with_thrust(program: ConeProgram, lifted: Lifted, *, deep: bool = False) -> ConeProgram:
-    """Add |u(t)| <= 1 to a program whose first variables are those of the set; for thrust in a box add nothing.
+    """Add |u(t)| <= 1 to a program whose first variables are those of the set; for thrust in a box
+    add nothing.
 
     If `deep`, the last variable of the program is the radius of a ball that must also be inside.
     """
@@ -231,9 +268,12 @@ def with_thrust(program: ConeProgram, lifted: Lifted, *, deep: bool = False) -> 
     return program
 
 
-def _bound_norm(program: ConeProgram, thrust: _ThrustInAxes, top: Floats, height: float = 0.0) -> None:
+def _bound_norm(
+    program: ConeProgram, thrust: _ThrustInAxes, top: Floats, height: float = 0.0
+) -> None:
     """Add |thrust| <= top . v + height to a program."""
-    free, response = thrust.free, thrust.response
+    free = thrust.free
+    response = thrust.response
     if thrust.constant > 0.0:
         free = np.append(free, thrust.constant)
         response = np.vstack([response, np.zeros(response.shape[1])])
@@ -241,10 +281,12 @@ def _bound_norm(program: ConeProgram, thrust: _ThrustInAxes, top: Floats, height
 
 
 def min_relaxation(lifted: Lifted) -> tuple[float, Floats]:
-    """Return the minimum relaxation of all rows on states and of the equations with a feasible point, and that point.
+    """Return the minimum relaxation of all rows on states and of the equations with a feasible
+    point, and that point.
 
-    It is at least -1, where the search stops, and not positive if the set is not empty. Bounds on controls are not
-    relaxed. The relaxation of equations is not negative; without equations a negative relaxation is a margin.
+    It is at least -1, where the search stops, and not positive if the set is not empty. Bounds on
+    controls are not relaxed. The relaxation of equations is not negative; without equations a
+    negative relaxation is a margin.
     """
     soft = lifted.moments >= 0
     misfit = -np.ones((len(lifted.equal), 1))
@@ -258,7 +300,9 @@ def min_relaxation(lifted: Lifted) -> tuple[float, Floats]:
             -cost,
         ]
     )
-    limits = np.concatenate([lifted.limits, lifted.levels, -lifted.levels, [0.0 if len(lifted.equal) else 1.0]])
+    limits = np.concatenate(
+        [lifted.limits, lifted.levels, -lifted.levels, [0.0 if len(lifted.equal) else 1.0]]
+    )
     point = _solution(ConeProgram(cost).keep(rows, limits), lifted)
     return float(point[-1]), point[:-1]
 
@@ -272,7 +316,9 @@ def quadratic(lifted: Lifted, matrix: Floats, vector: Floats) -> Floats:
 
 
 def min_sum_of_norms(lifted: Lifted, scale: Floats, group: int) -> Floats:
-    """Minimise the sum over the periods of the norms of the `group` controls of a period; `scale` is their units."""
+    """Minimise the sum over the periods of the norms of the `group` controls of a period; `scale`
+    is their units.
+    """
     periods = len(lifted.control_free) // group
     tops = np.hstack([np.zeros((periods, lifted.size)), np.eye(periods)])
     program = with_thrust(ConeProgram(tops.sum(axis=0)).keep(lifted.rows, lifted.limits), lifted)
@@ -282,8 +328,8 @@ def min_sum_of_norms(lifted: Lifted, scale: Floats, group: int) -> Floats:
 def min_peak(lifted: Lifted, scale: Floats, group: int) -> tuple[float, Floats]:
     """Return the minimum common bound of all controls, and controls that attain it.
 
-    It is a bound of each component, or for thrust in a ball of the norm of the `group` controls of a period; `scale`
-    contains the units of the controls.
+    It is a bound of each component, or for thrust in a ball of the norm of the `group` controls of
+    a period; `scale` contains the units of the controls.
     """
     cost = np.concatenate([np.zeros(lifted.size), [1.0]])
     if lifted.ball:
@@ -301,22 +347,27 @@ def min_l1(lifted: Lifted, scale: Floats) -> Floats:
     rows, limits = _absolute(lifted, scale, np.eye(len(scale)))
     cost = np.concatenate([np.zeros(lifted.size), np.ones(len(scale))])
     wide = np.hstack([lifted.rows, np.zeros((len(lifted.rows), len(scale)))])
-    program = ConeProgram(cost).keep(np.vstack([wide, rows]), np.concatenate([lifted.limits, limits]))
+    program = ConeProgram(cost).keep(
+        np.vstack([wide, rows]), np.concatenate([lifted.limits, limits])
+    )
     return _solution(program, lifted)[: lifted.size]
 
 
 def deep_point(lifted: Lifted) -> tuple[Floats, float]:
-    """Return a point far from the boundary of a set with thrust in a ball, and the radius of a ball inside around it.
+    """Return a point far from the boundary of a set with thrust in a ball, and the radius of a ball
+    inside around it.
 
-    The effect of the radius on the thrust of a period is bounded by the norm of its response: the ball is inside, but
-    may not be the largest.
+    The effect of the radius on the thrust of a period is bounded by the norm of its response: the
+    ball is inside, but may not be the largest.
     """
     if not lifted.size:
         return np.zeros(0), 0.0
     cost = np.concatenate([np.zeros(lifted.size), [-1.0]])
     rows = np.column_stack([lifted.rows, np.linalg.norm(lifted.rows, axis=1)])
     # The minimum bound on the radius keeps the program bounded where no row depends on v.
-    program = ConeProgram(cost).keep(np.vstack([rows, -cost]), np.concatenate([lifted.limits, [1.0]]))
+    program = ConeProgram(cost).keep(
+        np.vstack([rows, -cost]), np.concatenate([lifted.limits, [1.0]])
+    )
     optimum = with_thrust(program, lifted, deep=True).solve()
     return optimum.point[:-1], float(optimum.point[-1])
 
@@ -326,12 +377,19 @@ def _solution(program: ConeProgram, lifted: Lifted) -> Floats:
 
 
 def _absolute(lifted: Lifted, scale: Floats, tops: Floats) -> tuple[Floats, Floats]:
-    """Rows for |controls| <= tops w, in the units of the controls, w being the variables after those of the set."""
-    turned, fixed = scale[:, None] * lifted.control_response, scale * lifted.control_free
-    return np.vstack([np.hstack([turned, -tops]), np.hstack([-turned, -tops])]), np.concatenate([-fixed, fixed])
+    """Rows for |controls| <= tops w, in the units of the controls, w being the variables after
+    those of the set.
+    """
+    turned = scale[:, None] * lifted.control_response
+    fixed = scale * lifted.control_free
+    return np.vstack([np.hstack([turned, -tops]), np.hstack([-turned, -tops])]), np.concatenate(
+        [-fixed, fixed]
+    )
 
 
-def _with_norms_below(program: ConeProgram, lifted: Lifted, scale: Floats, tops: Floats) -> ConeProgram:
+def _with_norms_below(
+    program: ConeProgram, lifted: Lifted, scale: Floats, tops: Floats
+) -> ConeProgram:
     """Add |u(t)| <= tops[t] . v, in the units of the controls."""
     group = len(scale) // len(tops)
     for t, top in enumerate(tops):
@@ -345,8 +403,9 @@ def _with_norms_below(program: ConeProgram, lifted: Lifted, scale: Floats, tops:
 class Maximiser:
     """Maximise many linear functions over one set of controls, which is not empty.
 
-    An interior-point method (Clarabel) reuses the factors that depend on the constraints only. Programs on which it
-    fails are solved by the simplex method (HiGHS), or, for thrust in a ball, as programs of their own.
+    An interior-point method (Clarabel) reuses the factors that depend on the constraints only.
+    Programs on which it fails are solved by the simplex method (HiGHS), or, for thrust in a ball,
+    as programs of their own.
     """
 
     def __init__(self, lifted: Lifted) -> None:
@@ -356,7 +415,9 @@ class Maximiser:
             self._solver = self._program.solver()
 
     def maximise(self, cost: Floats, max_gap: float = MAX_GAP) -> Floats:
-        """Return a maximiser of a linear function, both of shape (p,), with at most this duality gap."""
+        """Return a maximiser of a linear function, both of shape (p,), with at most this duality
+        gap.
+        """
         return self._solved(cost, max_gap).point
 
     def maximise_all(self, costs: Floats) -> Floats:
@@ -364,12 +425,14 @@ class Maximiser:
         return np.array([self.maximise(cost) for cost in costs]).reshape(costs.shape)
 
     def maximise_sharply(self, cost: Floats) -> Floats:
-        """Return a maximiser that is on its active rows to rounding; for thrust in a ball, to the program's tolerance.
+        """Return a maximiser that is on its active rows to rounding; for thrust in a ball, to the
+        program's tolerance.
 
-        The solution takes the shortest step onto the rows whose multipliers are above their slacks: one more
-        least-squares problem.
+        The solution takes the shortest step onto the rows whose multipliers are above their slacks:
+        one more least-squares problem.
         """
-        lifted, optimum = self._lifted, self._solved(cost)
+        lifted = self._lifted
+        optimum = self._solved(cost)
         if not lifted.size or lifted.ball:
             return optimum.point
         active = optimum.multipliers > lifted.limits - lifted.rows @ optimum.point
@@ -381,7 +444,9 @@ class Maximiser:
 
     def _with_cost(self, cost: Floats) -> ConeProgram:
         lifted = self._lifted
-        program = ConeProgram(cost).meet(lifted.equal, lifted.levels).keep(lifted.rows, lifted.limits)
+        program = (
+            ConeProgram(cost).meet(lifted.equal, lifted.levels).keep(lifted.rows, lifted.limits)
+        )
         return with_thrust(program, lifted)
 
     def _solved(self, cost: Floats, max_gap: float = MAX_GAP) -> Optimum:

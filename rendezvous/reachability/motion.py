@@ -10,7 +10,12 @@ from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
 from infoset.rendezvous._arrays import Floats
-from infoset.rendezvous.relative_motion import EllipticOrbit, HeldMotion, TimeVaryingMotion, TschaunerHempel
+from infoset.rendezvous.relative_motion import (
+    EllipticOrbit,
+    HeldMotion,
+    TimeVaryingMotion,
+    TschaunerHempel,
+)
 
 _RELATIVE = 1e-12
 _ABSOLUTE = 1e-9
@@ -33,11 +38,14 @@ def motion_of(orbit: EllipticOrbit, model: MotionModel) -> HeldMotion:
     return TschaunerHempel(orbit)
 
 
-def discretised(motion: HeldMotion, periods: int, period_s: float, acceleration_m_s2: float) -> tuple[Floats, Floats]:
-    """Return A(t) and B(t) of x(t + 1) = A(t) x(t) + B(t) u(t), exact for controls held over a period.
+def discretised(
+    motion: HeldMotion, periods: int, period_s: float, acceleration_m_s2: float
+) -> tuple[Floats, Floats]:
+    """Return A(t) and B(t) of x(t + 1) = A(t) x(t) + B(t) u(t), exact for controls held over a
+    period.
 
-    A(t), shape (periods, 6, 6), is of states in m and m/s of the `motion`; B(t), shape (periods, 6, 3), is in m and m/s
-    for a unit control, of acceleration `acceleration_m_s2`.
+    A(t), shape (periods, 6, 6), is of states in m and m/s of the `motion`; B(t), shape (periods, 6,
+    3), is in m and m/s for a unit control, of acceleration `acceleration_m_s2`.
 
     Equation (3).
     """
@@ -49,49 +57,59 @@ def discretised(motion: HeldMotion, periods: int, period_s: float, acceleration_
 def between_periods(
     motion: HeldMotion, periods: int, period_s: float, acceleration_m_s2: float, instants: int
 ) -> Floats:
-    """Return the matrices of states within the periods, x = matrix (x(t), u(t)), shape (periods, instants, 6, 9).
+    """Return the matrices of states within the periods, x = matrix (x(t), u(t)), shape (periods,
+    instants, 6, 9).
 
-    `motion`, `periods`, `period_s` and `acceleration_m_s2` are those of `discretised`; `instants` are evenly spaced
-    within a period.
+    `motion`, `periods`, `period_s` and `acceleration_m_s2` are those of `discretised`; `instants`
+    are evenly spaced within a period.
     """
     starts = period_s * np.arange(periods)[:, None]
-    segment = motion.segment(starts, starts + period_s * np.arange(1, instants + 1) / (instants + 1))
+    segment = motion.segment(
+        starts, starts + period_s * np.arange(1, instants + 1) / (instants + 1)
+    )
     return np.concatenate([segment.transition, acceleration_m_s2 * segment.held], axis=-1)
 
 
 @dataclass(frozen=True)
 class NonlinearMotion:
-    """Relative motion in a central field, in Hill's axes: x radially outward, y along the motion, z completes.
+    """Relative motion in a central field, in Hill's axes: x radially outward, y along the motion, z
+    completes.
 
-    Equations (1) of Shorikov and Goranov (2021), whose x is -y here and whose y is x, with w^2 r^4 / p = mu; DOP853 to
-    1e-12. The passive craft is on the `orbit`.
+    Equations (1) of Shorikov and Goranov (2021), whose x is -y here and whose y is x, with w^2 r^4
+    / p = mu; DOP853 to 1e-12. The passive craft is on the `orbit`.
     """
 
     orbit: EllipticOrbit
     semi_major_axis_m: float
 
-    def paths(self, start_s: float, states: ArrayLike, accelerations: ArrayLike, times_s: ArrayLike) -> Floats:
+    def paths(
+        self, start_s: float, states: ArrayLike, accelerations: ArrayLike, times_s: ArrayLike
+    ) -> Floats:
         """Return the states at `times_s`, shape (k, s, 6), of motion under constant accelerations.
 
-        Initial `states` have shape (k, 6), in m and m/s; `accelerations`, in the rotating axes, shape (k, 3), m/s^2;
-        `times_s`, shape (s,), rise and are not before `start_s`.
+        Initial `states` have shape (k, 6), in m and m/s; `accelerations`, in the rotating axes,
+        shape (k, 3), m/s^2; `times_s`, shape (s,), rise and are not before `start_s`.
 
         Raises
         ------
         ArithmeticError
             If a path cannot be integrated, for example because it passes too near the centre.
         """
-        initial, push = np.atleast_2d(np.asarray(states, float)), np.atleast_2d(np.asarray(accelerations, float))
+        initial = np.atleast_2d(np.asarray(states, float))
+        push = np.atleast_2d(np.asarray(accelerations, float))
         times = np.asarray(times_s, dtype=float)
         count = len(initial)
-        e, k2 = self.orbit.eccentricity, self.orbit.semi_latus_rate_rad_s
+        e = self.orbit.eccentricity
+        k2 = self.orbit.semi_latus_rate_rad_s
         parameter = self.semi_major_axis_m * (1.0 - e * e)
         gravity = k2 * k2 * parameter**3
 
         def slope(_time: float, flat: Floats) -> Floats:
-            anomaly, state = flat[0], flat[1:].reshape(6, count)
+            anomaly = flat[0]
+            state = flat[1:].reshape(6, count)
             rho = 1.0 + e * np.cos(anomaly)
-            r, w = parameter / rho, k2 * rho * rho
+            r = parameter / rho
+            w = k2 * rho * rho
             w_dot = -2.0 * k2 * k2 * e * np.sin(anomaly) * rho**3
             x, y, z, vx, vy, vz = state
             pull = gravity / ((r + x) ** 2 + y * y + z * z) ** 1.5
@@ -99,7 +117,9 @@ class NonlinearMotion:
             result[0] = w
             rates = result[1:].reshape(6, count)
             rates[:3] = vx, vy, vz
-            rates[3] = 2.0 * w * vy + w * w * x + w_dot * y + gravity / r**2 - pull * (r + x) + push[:, 0]
+            rates[3] = (
+                2.0 * w * vy + w * w * x + w_dot * y + gravity / r**2 - pull * (r + x) + push[:, 0]
+            )
             rates[4] = -2.0 * w * vx + w * w * y - w_dot * x - pull * y + push[:, 1]
             rates[5] = -pull * z + push[:, 2]
             return result
@@ -108,17 +128,26 @@ class NonlinearMotion:
         if times[-1] == start_s:
             return np.repeat(initial[:, None, :], len(times), axis=1)
         solution = solve_ivp(
-            slope, (start_s, times[-1]), begin, method="DOP853", t_eval=times, rtol=_RELATIVE, atol=_ABSOLUTE
+            slope,
+            (start_s, times[-1]),
+            begin,
+            method="DOP853",
+            t_eval=times,
+            rtol=_RELATIVE,
+            atol=_ABSOLUTE,
         )
         if not solution.success:
             raise ArithmeticError(f"the motion could not be integrated: {solution.message}")
         return np.asarray(solution.y[1:].reshape(6, count, len(times)).transpose(1, 2, 0))
 
-    def fly(self, start: ArrayLike, accelerations: ArrayLike, period_s: float, points: int = 1) -> Floats:
-        """Return the states of craft that hold an acceleration during each period, shape (k, T points + 1, 6).
+    def fly(
+        self, start: ArrayLike, accelerations: ArrayLike, period_s: float, points: int = 1
+    ) -> Floats:
+        """Return the states of craft that hold an acceleration during each period, shape (k, T
+        points + 1, 6).
 
-        All start in the state `start`, shape (6,), at t = 0; `accelerations` have shape (k, T, 3), in m/s^2; `points`
-        instants of each period are returned. Errors are those of `paths`.
+        All start in the state `start`, shape (6,), at t = 0; `accelerations` have shape (k, T, 3),
+        in m/s^2; `points` instants of each period are returned. Errors are those of `paths`.
         """
         push = np.asarray(accelerations, dtype=float)
         state = np.broadcast_to(np.asarray(start, dtype=float), (len(push), 6))

@@ -26,8 +26,8 @@ _PRESSED = 1e-7
 _CLOSE = 1e-12
 """Relative gap between the norm and its lower bound at which the search stops."""
 _ZERO, _ABSOLUTE = 1e-11, 1e-12
-"""Norms below the first part of what the controls can do count as zero, unless their lower bound is above rounding; the
-second is the maximum gap where it is more than the relative one."""
+"""Norms below the first part of what the controls can do count as zero, unless their lower bound is
+above rounding; the second is the maximum gap where it is more than the relative one."""
 _ULP = float(np.finfo(float).eps)
 _RANK = 1e-13
 _ROUNDS = (*ATTEMPTS, *ATTEMPTS[:2])
@@ -38,15 +38,15 @@ _REACH = 1e4
 class EmptyTubeError(ValueError):
     """No control satisfies the constraints.
 
-    `time` is the first time t such that the constraints up to t cannot all be kept, and `names` lists those that
-    conflict there. `relaxation` is the minimum relaxation of all constraints on states, as a fraction of their bounds,
-    with which all can be satisfied.
+    `time` is the first time t such that the constraints up to t cannot all be kept, and `names`
+    lists those that conflict there. `relaxation` is the minimum relaxation of all constraints on
+    states, as a fraction of their bounds, with which all can be satisfied.
     """
 
     def __init__(self, time: int, relaxation: float, names: tuple[str, ...]) -> None:
         super().__init__(
-            f"no control keeps the constraints: they conflict at t = {time} ({', '.join(names)}); a solution exists if "
-            f"all are relaxed by {100.0 * relaxation:.3g} % of their bounds"
+            f"no control keeps the constraints: they conflict at t = {time} ({', '.join(names)}); "
+            f"a solution exists if all are relaxed by {100.0 * relaxation:.3g} % of their bounds"
         )
         self.time = time
         self.relaxation = relaxation
@@ -57,9 +57,10 @@ class EmptyTubeError(ValueError):
 class BlockOptimum:
     """The minimum terminal norm of a `block`, which is relaxed by rounding where needed.
 
-    `terminal`, shape (n,), is the terminal state of minimum norm, which is unique, scaled; exactly zero where that is
-    `reached`. `optimal` contains all optimal controls, in coordinates z of their affine hull; thrust in a ball remains
-    a constraint. `centre`, shape (d,), is a point far from its boundary, in its coordinates.
+    `terminal`, shape (n,), is the terminal state of minimum norm, which is unique, scaled; exactly
+    zero where that is `reached`. `optimal` contains all optimal controls, in coordinates z of their
+    affine hull; thrust in a ball remains a constraint. `centre`, shape (d,), is a point far from
+    its boundary, in its coordinates.
     """
 
     block: Block
@@ -77,12 +78,13 @@ class BlockOptimum:
 def block_optimum(block: Block, *, relative: bool = False) -> BlockOptimum:
     """Return the minimum terminal norm of a block, and all controls that reach it.
 
-    If `relative`, the norm is of states divided by their bounds; otherwise in the units of the problem.
-    `EmptyTubeError` is raised if no control satisfies the constraints.
+    If `relative`, the norm is of states divided by their bounds; otherwise in the units of the
+    problem. `EmptyTubeError` is raised if no control satisfies the constraints.
 
-    A cone program gives the terminal state, which is unique, and multipliers (see `min_norm`). A row with a positive
-    multiplier is tight for every optimal control: with the terminal equations these give a face of the set of
-    admissible controls, whose affine hull is found by linear programs through the solution.
+    A cone program gives the terminal state, which is unique, and multipliers (see `min_norm`). A
+    row with a positive multiplier is tight for every optimal control: with the terminal equations
+    these give a face of the set of admissible controls, whose affine hull is found by linear
+    programs through the solution.
     """
     block = admissible(block)
     lifted = lift(block)
@@ -90,15 +92,24 @@ def block_optimum(block: Block, *, relative: bool = False) -> BlockOptimum:
     # The solution itself must not be outside by rounding.
     lifted = replace(lifted, limits=np.maximum(lifted.limits, lifted.rows @ minimum.point))
     gaps = lifted.limits - lifted.rows @ minimum.point
-    most = max(float(minimum.multipliers.max(initial=0.0)), float(np.abs(minimum.pressures).max(initial=0.0)))
+    most = max(
+        float(minimum.multipliers.max(initial=0.0)),
+        float(np.abs(minimum.pressures).max(initial=0.0)),
+    )
     held = (minimum.multipliers > gaps) & (minimum.multipliers > _REACHED * most)
     fixed = np.zeros(len(lifted.control_free), dtype=bool)
     if lifted.ball:  # on the sphere the thrust of a period is unique
         pressed = np.linalg.norm(minimum.pressures.reshape(-1, lifted.ball), axis=1)
         fixed = np.repeat(pressed > max(_PRESSED * most, 1e-300), lifted.ball)
     across = np.vstack([lifted.rows[held], lifted.control_response[fixed]])
-    terminal = np.zeros(block.size) if minimum.reached else lifted.free[-1] + lifted.response[-1] @ minimum.point
-    face = lifted.where(lifted.response[-1], terminal - lifted.free[-1]).where(across, across @ minimum.point)
+    terminal = (
+        np.zeros(block.size)
+        if minimum.reached
+        else lifted.free[-1] + lifted.response[-1] @ minimum.point
+    )
+    face = lifted.where(lifted.response[-1], terminal - lifted.free[-1]).where(
+        across, across @ minimum.point
+    )
     if lifted.ball:
         optimal = face.within(minimum.point, null_space_basis(face.equal))
         optimal = optimal.only(np.flatnonzero(np.linalg.norm(optimal.rows, axis=1) > _REACHED))
@@ -122,11 +133,12 @@ def block_reaches_zero(block: Block) -> bool:
 
 
 def admissible(block: Block) -> Block:
-    """Return a block whose constraints can be satisfied: the block itself, or one relaxed by rounding.
+    """Return a block whose constraints can be satisfied: the block itself, or one relaxed by
+    rounding.
 
-    If no control satisfies the constraints by 1e-9 of their sizes, all of them are relaxed until one does. Raise
-    `EmptyTubeError` if the relaxation is more than 1e-9. The first time at which constraints conflict is found by
-    bisection, with a linear program per step.
+    If no control satisfies the constraints by 1e-9 of their sizes, all of them are relaxed until
+    one does. Raise `EmptyTubeError` if the relaxation is more than 1e-9. The first time at which
+    constraints conflict is found by bisection, with a linear program per step.
     """
     lifted = lift(block)
     relaxation = min_relaxation(lifted)[0]
@@ -156,10 +168,10 @@ def _relaxed(block: Block, relaxation: float) -> Block:
 class MinimumNorm:
     """The controls of minimum terminal norm.
 
-    `point`, shape (p,), contains the controls, divided by their bounds; `reached` says that the norm is zero to
-    rounding. `multipliers`, shape (r,), are those of the rows, a box included: the derivative of the norm by a limit,
-    sign reversed. `pressures`, shape (p,), is the derivative of the norm, without its constraints' part, by each
-    control: the bounds on controls balance it.
+    `point`, shape (p,), contains the controls, divided by their bounds; `reached` says that the
+    norm is zero to rounding. `multipliers`, shape (r,), are those of the rows, a box included: the
+    derivative of the norm by a limit, sign reversed. `pressures`, shape (p,), is the derivative of
+    the norm, without its constraints' part, by each control: the bounds on controls balance it.
     """
 
     point: Floats
@@ -169,20 +181,22 @@ class MinimumNorm:
 
 
 def min_norm(lifted: Lifted, weights: Floats) -> MinimumNorm:
-    """Minimise |weights x(T)| over all controls of a block, a set without equations; weights, shape (n,), are positive.
+    """Minimise |weights x(T)| over all controls of a block, a set without equations; weights, shape
+    (n,), are positive.
 
-    Raise `NoSolutionError` if the norm found is not within 1e-8 of its lower bound, or 1e-12 of what the controls can
-    do, or the controls violate a constraint by more than 1e-9.
+    Raise `NoSolutionError` if the norm found is not within 1e-8 of its lower bound, or 1e-12 of
+    what the controls can do, or the controls violate a constraint by more than 1e-9.
 
-    The cone program minimises t with |weights x(T)| <= t, not the square of the norm, whose multipliers vanish with
-    it. A solver finds t to its tolerance times the size of the states; the program is therefore solved again about its
-    own solution, in units of the norm found, until both bounds meet (iterative refinement).
+    The cone program minimises t with |weights x(T)| <= t, not the square of the norm, whose
+    multipliers vanish with it. A solver finds t to its tolerance times the size of the states; the
+    program is therefore solved again about its own solution, in units of the norm found, until both
+    bounds meet (iterative refinement).
 
-    The lower bound is that of weak duality. For any direction d with |d| <= 1 and any multipliers l >= 0 of the
-    constraints on states, |y| >= d . y, and d . y is not below d . free - l . limits - the norm of
-    R' d + rows' l that is dual to the bound on the controls: a bound whether or not d and l are optimal. They are
-    first moved to where R' d + rows' l vanishes for each control that is not at its bound, so that the error of the
-    bound is of the order of the square of theirs.
+    The lower bound is that of weak duality. For any direction d with |d| <= 1 and any multipliers l
+    >= 0 of the constraints on states, |y| >= d . y, and d . y is not below d . free - l . limits -
+    the norm of R' d + rows' l that is dual to the bound on the controls: a bound whether or not d
+    and l are optimal. They are first moved to where R' d + rows' l vanishes for each control that
+    is not at its bound, so that the error of the bound is of the order of the square of theirs.
     """
     search = _Search(lifted, weights)
     search.solve()
@@ -202,7 +216,8 @@ class _Search:
         self._point = np.zeros(lifted.size)
         self.value = self._merit = np.inf
         self.violation = 0.0
-        self._bound, self._error = -np.inf, 0.0
+        self._bound = -np.inf
+        self._error = 0.0
         self._direction = np.zeros(len(self._free))
         self._multipliers = np.zeros(len(lifted.rows))
 
@@ -239,13 +254,15 @@ class _Search:
         allowed = max(MAX_GAP * self.value, _ABSOLUTE * self._reach)
         if not (self._gap <= allowed and self.violation <= MAX_VIOLATION):
             raise NoSolutionError(
-                f"the minimum terminal norm was not solved to {MAX_GAP:g}: relative gap {self._gap / self.value:.2g}, "
-                f"constraints violated by {self.violation:.2g}"
+                f"the minimum terminal norm was not solved to {MAX_GAP:g}: relative gap "
+                f"{self._gap / self.value:.2g}, constraints violated by {self.violation:.2g}"
             )
         residual = self._residual(self._direction, self._multipliers)
         if self.at_zero and self._bound < -_ZERO * self._reach:
             # Zero is inside the set reached: no constraint is active.
-            return MinimumNorm(self._point, True, np.zeros(len(self._multipliers)), np.zeros(self._lifted.size))
+            return MinimumNorm(
+                self._point, True, np.zeros(len(self._multipliers)), np.zeros(self._lifted.size)
+            )
         multipliers = self._multipliers.copy()
         if not self._lifted.ball and self._lifted.size:
             # The rows of a box, which hold a control at its bound.
@@ -254,7 +271,9 @@ class _Search:
         return MinimumNorm(self._point, self.at_zero, multipliers, residual)
 
     def _improve(self, scale: float, settings: SolverSettings) -> None:
-        """Solve the cone program about the point, in units of `scale`, and offer its point and multipliers."""
+        """Solve the cone program about the point, in units of `scale`, and offer its point and
+        multipliers.
+        """
         program, kept = self._program(self._point, scale)
         inner, dual = program.answer(settings)
         if not (np.isfinite(inner).all() and np.isfinite(dual).all()):
@@ -266,9 +285,15 @@ class _Search:
         point = self._point + scale * inner[:-1]
         self._offer_point(point)
         self._offer_bound(direction, multipliers)
-        # A bound is active where its multiplier is above its slack, both in the units of the program.
-        active = np.flatnonzero(self._soft & (multipliers > (self._lifted.limits - self._lifted.rows @ point) / scale))
-        held = self._norms(self._residual(direction, multipliers * self._soft)) > (1.0 - self._norms(point)) / scale
+        # A bound is active where its multiplier is above its slack, both in the units of the
+        # program.
+        active = np.flatnonzero(
+            self._soft & (multipliers > (self._lifted.limits - self._lifted.rows @ point) / scale)
+        )
+        held = (
+            self._norms(self._residual(direction, multipliers * self._soft))
+            > (1.0 - self._norms(point)) / scale
+        )
         self._offer_bound(*self._sharpened(direction, multipliers, active, held))
         # The solution itself, to rounding, if these bounds are those that are active.
         polished = self._polished(point, active, held)
@@ -280,7 +305,8 @@ class _Search:
 
     def _program(self, start: Floats, scale: float) -> tuple[ConeProgram, Places]:
         """The cone program in v = start + scale z, without the constraints that z cannot reach."""
-        lifted, size = self._lifted, self._lifted.size
+        lifted = self._lifted
+        size = self._lifted.size
         slack = (lifted.limits - lifted.rows @ start) / scale
         kept = np.flatnonzero(slack < _REACH * self._lengths)
         cost = np.zeros(size + 1)
@@ -295,7 +321,9 @@ class _Search:
         return program, kept
 
     def _bound_thrust(self, program: ConeProgram, start: Floats, scale: float) -> None:
-        """|start + scale z| <= 1 as |z|^2 <= 2 w with an affine w, which is accurate for any scale."""
+        """|start + scale z| <= 1 as |z|^2 <= 2 w with an affine w, which is accurate for any
+        scale.
+        """
         group = self._lifted.ball
         for first in range(0, self._lifted.size, group):
             mine = slice(first, first + group)
@@ -310,7 +338,9 @@ class _Search:
             block[group] = np.sqrt(0.5) * top
             free = np.zeros(group + 1)
             free[group] = np.sqrt(0.5) * (room / size - 1.0)
-            program.bound(block, free, np.sqrt(0.5) * top, float(np.sqrt(0.5) * (room / size + 1.0)))
+            program.bound(
+                block, free, np.sqrt(0.5) * top, float(np.sqrt(0.5) * (room / size + 1.0))
+            )
 
     def _residual(self, direction: Floats, multipliers: Floats) -> Floats:
         """R' d + rows' l."""
@@ -323,27 +353,45 @@ class _Search:
         direction = direction / length
         multipliers = np.where(self._soft, np.maximum(multipliers, 0.0), 0.0) / length
         pressed = self._norms(self._residual(direction, multipliers))
-        bound = float(direction @ self._free - multipliers @ self._lifted.limits) - float(pressed.sum())
+        bound = float(direction @ self._free - multipliers @ self._lifted.limits) - float(
+            pressed.sum()
+        )
         if bound > self._bound:
-            turned, held = np.abs(direction), np.abs(self._lifted.rows).T @ multipliers
+            turned = np.abs(direction)
+            held = np.abs(self._lifted.rows).T @ multipliers
             parts = turned @ np.abs(self._free) + multipliers @ np.abs(self._lifted.limits)
-            self._error = 8.0 * _ULP * float(parts + (np.abs(self._response).T @ turned + held).sum() + self._reach)
-            self._bound, self._direction, self._multipliers = bound, direction, multipliers
+            self._error = (
+                8.0
+                * _ULP
+                * float(parts + (np.abs(self._response).T @ turned + held).sum() + self._reach)
+            )
+            self._bound = bound
+            self._direction = direction
+            self._multipliers = multipliers
 
     def _offer_point(self, point: Floats) -> None:
-        """Use a point of smaller norm; a violation of constraints is added, times what it can gain."""
+        """Use a point of smaller norm; a violation of constraints is added, times what it can
+        gain.
+        """
         outside = float((self._lifted.rows @ point - self._lifted.limits).max(initial=0.0))
         if self._lifted.ball:
             outside = max(outside, float(self._norms(point).max()) - 1.0)
         value = float(np.linalg.norm(self._free + self._response @ point))
         merit = value + outside * self._reach
         if merit < self._merit:
-            self._point, self.value, self.violation, self._merit = point, value, outside, merit
+            self._point = point
+            self.value = value
+            self.violation = outside
+            self._merit = merit
 
-    def _sharpened(self, direction: Floats, multipliers: Floats, active: Places, held: Flags) -> tuple[Floats, Floats]:
+    def _sharpened(
+        self, direction: Floats, multipliers: Floats, active: Places, held: Flags
+    ) -> tuple[Floats, Floats]:
         """Move multipliers to where controls that are not at their bounds are stationary."""
         moving = np.repeat(~held, self._lifted.ball or 1)
-        system = np.hstack([self._response[:, moving].T, self._lifted.rows[np.ix_(active, moving)].T])
+        system = np.hstack(
+            [self._response[:, moving].T, self._lifted.rows[np.ix_(active, moving)].T]
+        )
         both = np.concatenate([direction, multipliers[active]])
         both = both - np.linalg.lstsq(system, system @ both, rcond=_RANK)[0]
         sharp = np.zeros(len(multipliers))
@@ -351,7 +399,9 @@ class _Search:
         return both[: len(direction)], sharp
 
     def _polished(self, point: Floats, active: Places, held: Flags) -> Floats:
-        """Return the controls of minimum norm on the active rows, with those at their bounds fixed there."""
+        """Return the controls of minimum norm on the active rows, with those at their bounds fixed
+        there.
+        """
         lifted = self._lifted
         moving = np.repeat(~held, lifted.ball or 1)
         polished = point.copy()
@@ -364,7 +414,9 @@ class _Search:
 
         along = null_space_basis(rows)
         state = self._free + self._response @ polished
-        polished[moving] -= along @ np.linalg.lstsq(self._response[:, moving] @ along, state, rcond=_RANK)[0]
+        polished[moving] -= (
+            along @ np.linalg.lstsq(self._response[:, moving] @ along, state, rcond=_RANK)[0]
+        )
         return polished
 
     def _norms(self, controls: Floats) -> Floats:

@@ -1,4 +1,6 @@
-"""Terminal control of a linear system in discrete time under constraints, and the independent blocks of a problem."""
+"""Terminal control of a linear system in discrete time under constraints, and the independent
+blocks of a problem.
+"""
 
 from __future__ import annotations
 
@@ -15,18 +17,24 @@ from infoset.rendezvous._arrays import Floats, Places
 
 MAX_PERIODS = 256
 _MAX_GROWTH = 1e10
-"""Growth of a deviation, relative to the bounds, from which rounding exceeds about 1e-9 of the bounds."""
+"""Growth of a deviation, relative to the bounds, from which rounding exceeds about 1e-9 of the
+bounds.
+"""
 
 
 class ThrustShape(Enum):
-    """Meaning of the bounds on a control: of each component (box), or of its Euclidean norm (ball)."""
+    """Meaning of the bounds on a control: of each component (box), or of its Euclidean norm
+    (ball).
+    """
 
     BOX = "box"
     BALL = "ball"
 
 
 class InadmissibleStartError(ValueError):
-    """The initial state violates constraints; `broken` contains their names, each with its violation."""
+    """The initial state violates constraints; `broken` contains their names, each with its
+    violation.
+    """
 
     def __init__(self, broken: tuple[tuple[str, float], ...]) -> None:
         listed = ", ".join(f"{name} by {excess:.6g}" for name, excess in broken)
@@ -36,7 +44,8 @@ class InadmissibleStartError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class ReachabilityProblem:
-    """Minimise |x(T)| for x(t+1) = A(t) x(t) + B(t) u(t) from x(0), and find all minimising controls.
+    """Minimise |x(T)| for x(t+1) = A(t) x(t) + B(t) u(t) from x(0), and find all minimising
+    controls.
 
     Parameters
     ----------
@@ -59,15 +68,16 @@ class ReachabilityProblem:
     constraint_names : tuple of str
         Names of these k constraints in messages.
     between : ndarray, shape (T, s, n, n + m) or None
-        States within the periods, x = between[t, i] (x(t), u(t)), at which the constraints also apply.
+        States within the periods, x = between[t, i] (x(t), u(t)), at which the constraints also
+        apply.
     state_names : tuple of str
         Names of the states in messages.
 
     Raises
     ------
     ValueError
-        If bounds on thrust in a ball differ, or A(T-1)...A(0) multiplies deviations by over 1e10, relative to the
-        bounds.
+        If bounds on thrust in a ball differ, or A(T-1)...A(0) multiplies deviations by over 1e10,
+        relative to the bounds.
     InadmissibleStartError
         If x(0) breaks a constraint.
     """
@@ -98,8 +108,9 @@ class ReachabilityProblem:
             growth = float(np.abs(moved / self.state_bounds[:, None]).max())
         if not growth <= _MAX_GROWTH:
             raise ValueError(
-                f"the linear model multiplies deviations by over {_MAX_GROWTH:g}, so rounding decides the result; "
-                "use fewer or shorter periods, or a time-varying model in place of a frozen one"
+                f"the linear model multiplies deviations by over {_MAX_GROWTH:g}, so rounding "
+                "decides the result; use fewer or shorter periods, or a time-varying model in "
+                "place of a frozen one"
             )
 
     def _check_start(self) -> None:
@@ -108,13 +119,19 @@ class ReachabilityProblem:
         normals, offsets = self.further
         excess = normals @ self.initial - offsets[0]
         slack = 1e-12 * np.abs(normals) @ self.state_bounds
-        broken += [(self.name_of(k), float(excess[k])) for k in np.flatnonzero(excess > slack).tolist()]
+        broken += [
+            (self.name_of(k), float(excess[k])) for k in np.flatnonzero(excess > slack).tolist()
+        ]
         if broken:
             raise InadmissibleStartError(tuple(broken))
 
     def name_of(self, constraint: int) -> str:
         """Return the name of a `constraint` beyond the bounds, by its index."""
-        return self.constraint_names[constraint] if self.constraint_names else f"constraint {constraint + 1}"
+        return (
+            self.constraint_names[constraint]
+            if self.constraint_names
+            else f"constraint {constraint + 1}"
+        )
 
     def state_name(self, state: int) -> str:
         """Return the name of a `state`, by its index."""
@@ -133,7 +150,8 @@ class ReachabilityProblem:
 
         Together they contain all states, and all controls that affect a state.
         """
-        n, m = self.states, self.controls
+        n = self.states
+        m = self.controls
         linked = np.zeros((n + m, n + m), dtype=bool)
         linked[:n, :n] = (self.transition != 0.0).any(axis=0)
         linked[:n, n:] = (self.control != 0.0).any(axis=0)
@@ -172,7 +190,8 @@ class ReachabilityProblem:
         return np.stack(states, axis=-2)
 
     def excess(self, controls: ArrayLike) -> Floats:
-        """Return the maximum violation of a constraint by `controls`, shape (..., T, m), relative to the bounds.
+        """Return the maximum violation of a constraint by `controls`, shape (..., T, m), relative
+        to the bounds.
 
         It is at most 0 if all constraints are satisfied.
         """
@@ -187,11 +206,15 @@ class ReachabilityProblem:
             both = np.concatenate([states[..., :-1, :], thrust], axis=-1)
             inner = np.einsum("tsij,...tj->...tsi", self.between, both)
             for instant in range(self.between.shape[1]):
-                worst = np.maximum(worst, self._state_excess(inner[..., instant, :], np.arange(self.periods)))
+                worst = np.maximum(
+                    worst, self._state_excess(inner[..., instant, :], np.arange(self.periods))
+                )
         return np.asarray(worst)
 
     def _state_excess(self, states: Floats, times: Places) -> Floats:
-        """Worst over the last two axes (time, state); a constraint holds between t and t + 1 where it does at t."""
+        """Worst over the last two axes (time, state); a constraint holds between t and t + 1 where
+        it does at t.
+        """
         worst = (np.abs(states) / self.state_bounds).max(axis=(-1, -2)) - 1.0
         normals, offsets = self.further
         beyond = (states @ normals.T - offsets[times]) / (np.abs(normals) @ self.state_bounds)
@@ -202,7 +225,8 @@ class ReachabilityProblem:
         return self._part(0, periods, self.initial)
 
     def rest(self, start: int, state: ArrayLike) -> ReachabilityProblem:
-        """Return the problem that begins at time `start`, from 0 to T - 1, in a `state`, shape (n,).
+        """Return the problem that begins at time `start`, from 0 to T - 1, in a `state`, shape
+        (n,).
 
         `InadmissibleStartError` is raised if the state violates a constraint.
         """
@@ -223,9 +247,10 @@ class ReachabilityProblem:
 class Block:
     """An independent part of a problem, with states and controls divided by their bounds.
 
-    `states` and `controls` are indices in the problem, and `scale`, shape (n,), the bounds on the states in their own
-    units. `normals`, of unit length, `offsets` and `names` are those of all constraints on states, the bounds first, of
-    shapes (k, n), (T + 1, k) and (k,). If `ball`, |u(t)| <= 1 in the Euclidean norm; otherwise for each component.
+    `states` and `controls` are indices in the problem, and `scale`, shape (n,), the bounds on the
+    states in their own units. `normals`, of unit length, `offsets` and `names` are those of all
+    constraints on states, the bounds first, of shapes (k, n), (T + 1, k) and (k,). If `ball`,
+    |u(t)| <= 1 in the Euclidean norm; otherwise for each component.
     """
 
     states: Places
@@ -263,10 +288,15 @@ class Block:
 
 def _block(problem: ReachabilityProblem, members: Places) -> Block:
     n = problem.states
-    states, controls = members[members < n], members[members >= n] - n
-    scale, reach = problem.state_bounds[states], problem.control_bounds[controls]
-    square, oblong = np.ix_(states, states), np.ix_(states, controls)
-    transition = np.array([matrix[square] for matrix in problem.transition]) / scale[:, None] * scale
+    states = members[members < n]
+    controls = members[members >= n] - n
+    scale = problem.state_bounds[states]
+    reach = problem.control_bounds[controls]
+    square = np.ix_(states, states)
+    oblong = np.ix_(states, controls)
+    transition = (
+        np.array([matrix[square] for matrix in problem.transition]) / scale[:, None] * scale
+    )
     control = np.array([matrix[oblong] for matrix in problem.control]) / scale[:, None] * reach
     unit = np.eye(len(states))
     normals, offsets = problem.further

@@ -1,4 +1,6 @@
-"""Bounded disturbances: constraints tightened by the accumulated disturbance, and plans with disturbance feedback."""
+"""Bounded disturbances: constraints tightened by the accumulated disturbance, and plans with
+disturbance feedback.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,8 @@ class NoRobustPlanError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class FeedbackPlan:
-    """Controls u(t) = nominal(t) + sum over s < t of gains[t, s] w(s), for a problem with a disturbance.
+    """Controls u(t) = nominal(t) + sum over s < t of gains[t, s] w(s), for a problem with a
+    disturbance.
 
     Parameters
     ----------
@@ -54,8 +57,8 @@ class FeedbackPlan:
 def accumulated(problem: ReachabilityProblem, disturbance: Floats) -> Floats:
     """Return the effect of each disturbance at each time, without feedback, shape (T + 1, T, n, q).
 
-    That of w(s) at t is A(t - 1) ... A(s + 1) disturbance[s], zero for s >= t. Raise `ValueError` if the problem has
-    constraints within periods.
+    That of w(s) at t is A(t - 1) ... A(s + 1) disturbance[s], zero for s >= t. Raise `ValueError`
+    if the problem has constraints within periods.
     """
     if problem.between is not None:
         raise ValueError("disturbances need constraints at whole periods only")
@@ -68,11 +71,13 @@ def accumulated(problem: ReachabilityProblem, disturbance: Floats) -> Floats:
 
 
 def tightened(problem: ReachabilityProblem, disturbance: Floats) -> ReachabilityProblem:
-    """Return the problem whose controls keep the constraints of a `problem` under every disturbance, without feedback.
+    """Return the problem whose controls keep the constraints of a `problem` under every
+    disturbance, without feedback.
 
-    The problem has constraints at whole periods only. x(t + 1) = A x + B u + disturbance[t] w(t), |w_k(t)| <= 1, with a
-    `disturbance` of shape (T, n, q); states of the new problem are those without disturbance. Each constraint is
-    tightened by the support of the accumulated disturbance along its normal, which is exact.
+    The problem has constraints at whole periods only. x(t + 1) = A x + B u + disturbance[t] w(t),
+    |w_k(t)| <= 1, with a `disturbance` of shape (T, n, q); states of the new problem are those
+    without disturbance. Each constraint is tightened by the support of the accumulated disturbance
+    along its normal, which is exact.
     """
     effect = accumulated(problem, disturbance)
     normals, offsets, names = _all_constraints(problem)
@@ -81,14 +86,16 @@ def tightened(problem: ReachabilityProblem, disturbance: Floats) -> Reachability
 
 
 def feedback_plan(problem: ReachabilityProblem, disturbance: Floats) -> FeedbackPlan:
-    """Return the plan with affine feedback from past disturbances whose worst terminal state is smallest.
+    """Return the plan with affine feedback from past disturbances whose worst terminal state is
+    smallest.
 
-    The `problem`, with thrust in a box, and the `disturbance` are as for `tightened`; w(t) is known from t + 1 on, by
-    the state.
+    The `problem`, with thrust in a box, and the `disturbance` are as for `tightened`; w(t) is known
+    from t + 1 on, by the state.
 
-    With affine feedback all constraints are linear in (nominal, gains) except for absolute values, each of which needs
-    an additional variable. The result is one linear program (HiGHS) with about T^2 (n + m) q / 2 additional variables,
-    whose solution is checked. It minimises the sum of the maximum terminal states, divided by their bounds.
+    With affine feedback all constraints are linear in (nominal, gains) except for absolute values,
+    each of which needs an additional variable. The result is one linear program (HiGHS) with about
+    T^2 (n + m) q / 2 additional variables, whose solution is checked. It minimises the sum of the
+    maximum terminal states, divided by their bounds.
 
     Raises
     ------
@@ -103,24 +110,30 @@ def feedback_plan(problem: ReachabilityProblem, disturbance: Floats) -> Feedback
         raise ValueError("feedback from disturbances needs thrust in a box")
     if problem.periods > MAX_PERIODS_WITH_FEEDBACK:
         raise ValueError(
-            f"a plan with feedback from disturbances can have at most {MAX_PERIODS_WITH_FEEDBACK} periods, found "
-            f"{problem.periods}"
+            f"a plan with feedback from disturbances can have at most {MAX_PERIODS_WITH_FEEDBACK} "
+            f"periods, found {problem.periods}"
         )
     cost, matrix, limits = _program(problem, accumulated(problem, disturbance))
-    optimum = linprog(cost, A_ub=matrix, b_ub=limits, bounds=(None, None), method="highs-ipm", options=HIGHS)
+    optimum = linprog(
+        cost, A_ub=matrix, b_ub=limits, bounds=(None, None), method="highs-ipm", options=HIGHS
+    )
     if optimum.status == 2:
         raise NoRobustPlanError(
-            "no plan with affine feedback keeps the constraints under every disturbance; reduce the disturbance, "
-            "or relax the bounds"
+            "no plan with affine feedback keeps the constraints under every disturbance; reduce "
+            "the disturbance, or relax the bounds"
         )
     if optimum.status != 0:
         raise NoSolutionError(f"HiGHS: {optimum.message}")
     ConeProgram(cost).keep(matrix, limits).checked(optimum.x, -optimum.ineqlin.marginals)
     (periods, n, m), q, (at, earlier) = problem.control.shape, disturbance.shape[2], _pairs(problem)
     nominal, own, _ = np.split(optimum.x, np.cumsum([periods * m, q * len(at) * m]))
-    nominal, gains = nominal.reshape(periods, m) * problem.control_bounds, np.zeros((periods, periods, m, q))
-    gains[at, earlier] = np.moveaxis(own.reshape(q, len(at), m), 0, -1) * problem.control_bounds[:, None]
-    centre, total = problem.run(nominal), np.zeros((periods + 1, periods, n, q))
+    nominal = nominal.reshape(periods, m) * problem.control_bounds
+    gains = np.zeros((periods, periods, m, q))
+    gains[at, earlier] = (
+        np.moveaxis(own.reshape(q, len(at), m), 0, -1) * problem.control_bounds[:, None]
+    )
+    centre = problem.run(nominal)
+    total = np.zeros((periods + 1, periods, n, q))
     for t in range(periods):  # the effect of w(s) at t, directly and through the controls
         total[t + 1] = problem.transition[t] @ total[t] + problem.control[t] @ gains[t]
         total[t + 1, t] += disturbance[t]
@@ -146,23 +159,28 @@ def _pairs(problem: ReachabilityProblem) -> tuple[Places, Places]:
 def _program(problem: ReachabilityProblem, effect: Floats) -> tuple[Floats, csr_array, Floats]:
     """Return the cost, the rows and the limits of the linear program of a plan.
 
-    Its variables are the nominal controls; the gains of all (t, s), by component of w; absolute values of the effect of
-    each w(s) on each constraint, and of each gain, by component; and the maximum terminal states. Controls are divided
-    by their bounds, and constraints by their sizes.
+    Its variables are the nominal controls; the gains of all (t, s), by component of w; absolute
+    values of the effect of each w(s) on each constraint, and of each gain, by component; and the
+    maximum terminal states. Controls are divided by their bounds, and constraints by their sizes.
     """
     (periods, n, m), q, (at, earlier) = problem.control.shape, effect.shape[3], _pairs(problem)
     pairs = len(at)
     # x(t) by the nominal controls, and the effect of w(s) on x(t) by the gains of one component.
-    response, through = np.zeros((periods + 1, n, periods * m)), np.zeros((periods + 1, periods, n, pairs * m))
+    response = np.zeros((periods + 1, n, periods * m))
+    through = np.zeros((periods + 1, periods, n, pairs * m))
     for t in range(periods):
         push = problem.control[t] * problem.control_bounds
-        response[t + 1], through[t + 1] = problem.transition[t] @ response[t], problem.transition[t] @ through[t]
+        response[t + 1], through[t + 1] = (
+            problem.transition[t] @ response[t],
+            problem.transition[t] @ through[t],
+        )
         response[t + 1, :, t * m : (t + 1) * m] += push
         for pair in np.flatnonzero(at == t):
             through[t + 1, earlier[pair], :, pair * m : (pair + 1) * m] += push
     normals, offsets, _ = _all_constraints(problem)
     sizes = np.abs(normals) @ problem.state_bounds
-    rows, ends = normals / sizes[:, None], offsets / sizes
+    rows = normals / sizes[:, None]
+    ends = offsets / sizes
     times, kinds = np.nonzero(np.isfinite(ends) & (np.arange(periods + 1) > 0)[:, None])
     nominal = np.einsum("cn,cnu->cu", rows[kinds], response[times])
     coasting = np.einsum("cn,cn->c", rows[kinds], problem.run(np.zeros((periods, m)))[times])
@@ -173,10 +191,13 @@ def _program(problem: ReachabilityProblem, effect: Floats) -> tuple[Floats, csr_
     sums = (at_time == times[:, None]) & (of_kind == np.where(kinds < n, kinds, kinds - n)[:, None])
     gains_at = np.kron(at == np.arange(periods)[:, None], np.eye(m))
     spread = np.kron(np.ones(q), block_diag(sums, gains_at))
-    spread_states, spread_controls = spread[: len(times)], spread[len(times) :]
+    spread_states = spread[: len(times)]
+    spread_controls = spread[len(times) :]
     inner = kron(np.eye(q), csr_array(np.vstack([by_gains[kept], np.eye(pairs * m)])))
     constant = np.vstack([fixed[kept], np.zeros((pairs * m, q))]).T.ravel()
-    last, unit, ones = (times == periods) & (kinds < 2 * n), np.eye(periods * m), np.ones(periods * m)
+    last = (times == periods) & (kinds < 2 * n)
+    unit = np.eye(periods * m)
+    ones = np.ones(periods * m)
     matrix = block_array(
         [
             [nominal, None, spread_states, None],
@@ -188,7 +209,9 @@ def _program(problem: ReachabilityProblem, effect: Floats) -> tuple[Floats, csr_
         ],
         format="csr",
     )
-    limits = np.concatenate([ends[times, kinds] - coasting, ones, ones, -coasting[last], -constant, constant])
+    limits = np.concatenate(
+        [ends[times, kinds] - coasting, ones, ones, -coasting[last], -constant, constant]
+    )
     # Of equally good plans, the one with small gains.
     cost = np.repeat([0.0, _TIDY, 1.0], [periods * m + inner.shape[1], len(constant), n])
     return cost, matrix, limits

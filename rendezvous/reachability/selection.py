@@ -1,4 +1,6 @@
-"""Members of the set of optimal controls: those that minimise a cost, centres, vertices and random ones."""
+"""Members of the set of optimal controls: those that minimise a cost, centres, vertices and random
+ones.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,13 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from infoset.rendezvous._arrays import Floats
-from infoset.rendezvous.reachability.admissible import Lifted, min_l1, min_peak, min_sum_of_norms, quadratic
+from infoset.rendezvous.reachability.admissible import (
+    Lifted,
+    min_l1,
+    min_peak,
+    min_sum_of_norms,
+    quadratic,
+)
 from infoset.rendezvous.reachability.conic import NoSolutionError
 from infoset.rendezvous.reachability.relative_interior import relative_interior
 from infoset.rendezvous.reachability.sets import TooManyVerticesError, combined, optimal_polytope
@@ -26,8 +34,8 @@ _INSIDE = 1.0 - 1e-12
 class Effort:
     """Costs of a control, dimensionless.
 
-    `energy` is the sum of squares of all components, `l1` that of their absolute values, `norms` that of the Euclidean
-    norms over the periods, and `peak` the maximum absolute value.
+    `energy` is the sum of squares of all components, `l1` that of their absolute values, `norms`
+    that of the Euclidean norms over the periods, and `peak` the maximum absolute value.
     """
 
     energy: float
@@ -47,17 +55,22 @@ def effort(controls: Floats) -> Effort:
 
 
 def minimum_energy(optimal: OptimalControls) -> Floats:
-    """Return the `optimal` control of minimum sum of squares, shape (T, m), which is unique, by a quadratic program."""
+    """Return the `optimal` control of minimum sum of squares, shape (T, m), which is unique, by a
+    quadratic program.
+    """
     return optimal.at(_nearest(optimal.space, optimal.scale))
 
 
 def minimum_l1(optimal: OptimalControls) -> Floats:
-    """Return an `optimal` control of minimum sum of absolute values, shape (T, m), by a linear program."""
+    """Return an `optimal` control of minimum sum of absolute values, shape (T, m), by a linear
+    program.
+    """
     return optimal.at(min_l1(optimal.space, optimal.scale) if optimal.dimension else np.zeros(0))
 
 
 def minimum_norms(optimal: OptimalControls) -> Floats:
-    """Return an `optimal` control of minimum sum, over periods, of Euclidean norms, shape (T, m), by a cone program.
+    """Return an `optimal` control of minimum sum, over periods, of Euclidean norms, shape (T, m),
+    by a cone program.
 
     The sum is the propellant of a single thruster.
     """
@@ -67,19 +80,22 @@ def minimum_norms(optimal: OptimalControls) -> Floats:
 
 
 def minimum_peak(optimal: OptimalControls) -> Floats:
-    """Return, of the `optimal` controls of minimax component, the one of minimum energy, shape (T, m).
+    """Return, of the `optimal` controls of minimax component, the one of minimum energy, shape (T,
+    m).
 
-    For thrust in a ball it is a control of minimax norm. A linear program gives the bound, and a quadratic one
-    the control on the face of the set that keeps the bound.
+    For thrust in a ball it is a control of minimax norm. A linear program gives the bound, and a
+    quadratic one the control on the face of the set that keeps the bound.
     """
-    space, scale = optimal.space, optimal.scale
+    space = optimal.space
+    scale = optimal.scale
     if not space.size:
         return optimal.at(np.zeros(0))
     bound, point = min_peak(space, scale, optimal.problem.controls)
     if space.ball:
         return optimal.at(point)
     moving = np.linalg.norm(space.control_response, axis=1) > _STILL
-    turned, fixed = (scale[:, None] * space.control_response)[moving], (scale * space.control_free)[moving]
+    turned = (scale[:, None] * space.control_response)[moving]
+    fixed = (scale * space.control_free)[moving]
     rows = np.vstack([space.rows, turned, -turned])
     limits = np.concatenate([space.limits, bound - fixed, bound + fixed])
     face = relative_interior(rows, limits, space.equal, space.levels, point)
@@ -88,15 +104,18 @@ def minimum_peak(optimal: OptimalControls) -> Floats:
 
 
 def nearest(optimal: OptimalControls, control: Floats) -> Floats:
-    """Return the `optimal` control nearest to a `control`, both of shape (T, m), by a quadratic program."""
+    """Return the `optimal` control nearest to a `control`, both of shape (T, m), by a quadratic
+    program.
+    """
     return optimal.at(_nearest(optimal.space, optimal.scale, control.ravel()))
 
 
 def chebyshev_centre(optimal: OptimalControls) -> Floats:
-    """Return a centre of a largest ball, within the affine hull, of `optimal` controls, shape (T, m).
+    """Return a centre of a largest ball, within the affine hull, of `optimal` controls, shape (T,
+    m).
 
-    Controls are compared after division by their bounds. For thrust in a ball the ball is inside, but may not be the
-    largest.
+    Controls are compared after division by their bounds. For thrust in a ball the ball is inside,
+    but may not be the largest.
     """
     return optimal.at(optimal.centre)
 
@@ -107,19 +126,22 @@ def analytic_centre(optimal: OptimalControls) -> Floats:
 
 
 def analytic_point(space: Lifted, start: Floats) -> tuple[Floats, Floats]:
-    """Return the analytic centre, shape (d,), of a set without equations, and a root of its barrier's Hessian there.
+    """Return the analytic centre, shape (d,), of a set without equations, and a root of its
+    barrier's Hessian there.
 
-    `start`, shape (d,), is inside. The root R, shape (d, d), is upper triangular with a positive diagonal; the Hessian
-    is R' R. Newton's method with halved steps on - sum log(slack) - sum log(1 - |u(t)|^2), which is self-concordant.
-    Raise `NoSolutionError` if Newton's method does not converge.
+    `start`, shape (d,), is inside. The root R, shape (d, d), is upper triangular with a positive
+    diagonal; the Hessian is R' R. Newton's method with halved steps on - sum log(slack) - sum log(1
+    - |u(t)|^2), which is self-concordant. Raise `NoSolutionError` if Newton's method does not
+    converge.
     """
     point = start.copy()
     if not space.size:
         return point, np.zeros((0, 0))
     barrier = _barrier(space, point)
     for _ in range(_NEWTON_STEPS):
-        # The Hessian is factor' factor and the gradient factor' ones: R comes from the factor itself, whose condition
-        # is the root of the Hessian's, so that a set 1e-10 thick has a Newton step.
+        # The Hessian is factor' factor and the gradient factor' ones: R comes from the factor
+        # itself, whose condition is the root of the Hessian's, so that a set 1e-10 thick has a
+        # Newton step.
         orthogonal, root = np.linalg.qr(barrier.factor)
         descent = orthogonal.T @ barrier.ones
         step = solve_triangular(root, -descent)
@@ -192,22 +214,30 @@ def vertices(optimal: OptimalControls, most: int = MAX_VERTICES) -> Floats:
     Raises
     ------
     TooManyVerticesError
-        If there are more than `most`, if the set has too many dimensions, or if thrust is in a ball.
+        If there are more than `most`, if the set has too many dimensions, or if thrust is in a
+        ball.
     ThinSetError
         If the set is so thin that rounding leaves nothing of it.
     """
-    corners = [optimal_polytope(part).vertices if part.optimal.size else np.zeros((1, 0)) for part in optimal.blocks]
+    corners = [
+        optimal_polytope(part).vertices if part.optimal.size else np.zeros((1, 0))
+        for part in optimal.blocks
+    ]
     count = int(np.prod([len(block) for block in corners]))
     if count > most:
-        raise TooManyVerticesError(f"the optimal controls have {count} vertices, more than the limit of {most}")
+        raise TooManyVerticesError(
+            f"the optimal controls have {count} vertices, more than the limit of {most}"
+        )
     return optimal.at(combined(corners))
 
 
 def samples(optimal: OptimalControls, count: int, generator: np.random.Generator) -> Floats:
-    """Draw `count` random members, at least 1, of the set of `optimal` controls, shape (count, T, m).
+    """Draw `count` random members, at least 1, of the set of `optimal` controls, shape (count, T,
+    m).
 
-    Hit-and-run: for each sample a chain of 20 d steps from the analytic centre; the `generator` draws directions, which
-    are scaled by the Hessian of the barrier. The distribution is uniform in the limit. O(count r d) per step.
+    Hit-and-run: for each sample a chain of 20 d steps from the analytic centre; the `generator`
+    draws directions, which are scaled by the Hessian of the barrier. The distribution is uniform in
+    the limit. O(count r d) per step.
     """
     space = optimal.space
     start, root = analytic_point(space, optimal.centre)
@@ -236,7 +266,9 @@ def _chord(space: Lifted, points: Floats, directions: Floats) -> tuple[Floats, F
         shape = (len(points), -1, space.ball)
         thrust = (space.control_free + points @ space.control_response.T).reshape(shape)
         change = (directions @ space.control_response.T).reshape(shape)
-        a, b, c = (change**2).sum(axis=2), (thrust * change).sum(axis=2), (thrust**2).sum(axis=2) - 1.0
+        a = (change**2).sum(axis=2)
+        b = (thrust * change).sum(axis=2)
+        c = (thrust**2).sum(axis=2) - 1.0
         moving = a > 1e-18
         root = np.sqrt(np.maximum(b * b - a * c, 0.0))
         divisor = np.where(moving, a, 1.0)

@@ -1,4 +1,6 @@
-"""Forward sets and the tube of a problem: exact polytopes, or programs over the admissible controls."""
+"""Forward sets and the tube of a problem: exact polytopes, or programs over the admissible
+controls.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ _GAP = 1e-3
 
 
 class SetKind(Enum):
-    """Set of states at a time: those on paths of admissible controls (forward), or of optimal controls (tube)."""
+    """Set of states at a time: those on paths of admissible controls (forward), or of optimal
+    controls (tube).
+    """
 
     FORWARD = "forward"
     TUBE = "tube"
@@ -52,21 +56,29 @@ class SetCounts:
 
 @dataclass(frozen=True, eq=False)
 class ReachableSets:
-    """Sets of states at t = 0..T, in the units of the problem; `parts` are those of each block of the problem."""
+    """Sets of states at t = 0..T, in the units of the problem; `parts` are those of each block of
+    the problem.
+    """
 
     problem: ReachabilityProblem
     parts: tuple[BlockSets, ...]
 
     def bounds(self, kind: SetKind) -> Floats:
-        """Return the minimum and maximum value of each state at each time, shape (T + 1, n, 2), of sets of a `kind`."""
+        """Return the minimum and maximum value of each state at each time, shape (T + 1, n, 2), of
+        sets of a `kind`.
+        """
         result = np.zeros((self.problem.periods + 1, self.problem.states, 2))
         for block, part in zip(self.problem.blocks, self.parts, strict=True):
             result[:, block.states] = part.bounds(kind) * block.scale[:, None]
         return result
 
     def counts(self, kind: SetKind, time: int) -> SetCounts | None:
-        """Return the counts of the set of a `kind` at a `time`; None if its vertices are not known."""
-        sets = [polytope for part in self.parts if (polytope := part.polytope(kind, time)) is not None]
+        """Return the counts of the set of a `kind` at a `time`; None if its vertices are not
+        known.
+        """
+        sets = [
+            polytope for part in self.parts if (polytope := part.polytope(kind, time)) is not None
+        ]
         if len(sets) < len(self.parts):
             return None
         return SetCounts(
@@ -75,20 +87,29 @@ class ReachableSets:
             sum(polytope.dimension for polytope in sets),
         )
 
-    def projection(self, kind: SetKind, time: int, axes: Sequence[int], tolerance: float = 1e-9) -> Floats:
-        """Return the vertices of the projection of a set on two or three states, shape (v, len(axes)), in no order.
+    def projection(
+        self, kind: SetKind, time: int, axes: Sequence[int], tolerance: float = 1e-9
+    ) -> Floats:
+        """Return the vertices of the projection of a set on two or three states, shape (v,
+        len(axes)), in no order.
 
-        `axes` are indices of states, `time` is from 0 to T, and `tolerance` is the relative error of the projection of
-        a set that is represented by programs.
+        `axes` are indices of states, `time` is from 0 to T, and `tolerance` is the relative error
+        of the projection of a set that is represented by programs.
         """
         order: list[int] = []
         points = []
         for block, part in zip(self.problem.blocks, self.parts, strict=True):
-            mine = [int(np.flatnonzero(block.states == axis)[0]) for axis in axes if axis in block.states]
+            mine = [
+                int(np.flatnonzero(block.states == axis)[0])
+                for axis in axes
+                if axis in block.states
+            ]
             if not mine:
                 continue
             order += [int(block.states[index]) for index in mine]
-            points.append(part.projection(kind, time, np.eye(block.size)[mine], tolerance) * block.scale[mine])
+            points.append(
+                part.projection(kind, time, np.eye(block.size)[mine], tolerance) * block.scale[mine]
+            )
         return combined(points)[:, [order.index(axis) for axis in axes]]
 
 
@@ -102,7 +123,9 @@ def combined(parts: Sequence[Floats]) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class ExactSets:
-    """Sets of a block with all vertices and facets, for thrust in a box and constraints at whole periods only."""
+    """Sets of a block with all vertices and facets, for thrust in a box and constraints at whole
+    periods only.
+    """
 
     forward: tuple[Polytope, ...]
     tube: tuple[Polytope, ...]
@@ -124,9 +147,10 @@ class ExactSets:
 def exact_sets(optimum: BlockOptimum) -> ExactSets:
     """Compute the sets of a block with their vertices and facets.
 
-    Shorikov and Goranov (2021): G+(t + 1) = (A G+(t) + B U) cut by X. The states of the tube X_e(t) are those of G+(t)
-    with A x + B u in X_e(t + 1) for some u: A x is in X_e(t + 1) - B U, whose half-spaces need no inverse of A. Where
-    zero is not reached the tube is a face of G+ that rounding would lose; it is then the image of the optimal controls.
+    Shorikov and Goranov (2021): G+(t + 1) = (A G+(t) + B U) cut by X. The states of the tube X_e(t)
+    are those of G+(t) with A x + B u in X_e(t + 1) for some u: A x is in X_e(t + 1) - B U, whose
+    half-spaces need no inverse of A. Where zero is not reached the tube is a face of G+ that
+    rounding would lose; it is then the image of the optimal controls.
 
     Raises
     ------
@@ -143,9 +167,16 @@ def exact_sets(optimum: BlockOptimum) -> ExactSets:
             forward.append(reached.cut(block.normals, upper=block.offsets[t + 1]).needed())
         if not optimum.reached:
             if not optimum.optimal.size:
-                return ExactSets(tuple(forward), tuple(Polytope.from_vertices(x[None]) for x in optimum.optimal.free))
-            controls, maps = optimal_polytope(optimum), zip(optimum.optimal.response, optimum.optimal.free, strict=True)
-            return ExactSets(tuple(forward), tuple(controls.affine_map(response, free) for response, free in maps))
+                return ExactSets(
+                    tuple(forward),
+                    tuple(Polytope.from_vertices(x[None]) for x in optimum.optimal.free),
+                )
+            controls = optimal_polytope(optimum)
+            maps = zip(optimum.optimal.response, optimum.optimal.free, strict=True)
+            return ExactSets(
+                tuple(forward),
+                tuple(controls.affine_map(response, free) for response, free in maps),
+            )
         tube = [Polytope.from_vertices(np.zeros((1, block.size)))]
         for t in range(block.periods - 1, 0, -1):
             rows, limits = _with_thrust(tube[0], block.control[t]).constraints()
@@ -165,7 +196,8 @@ def _with_thrust(states: Polytope, control: Floats) -> Polytope:
 
 
 def optimal_polytope(optimum: BlockOptimum) -> Polytope:
-    """Return the set of optimal controls of a block, in its coordinates z, of which there is at least one.
+    """Return the set of optimal controls of a block, in its coordinates z, of which there is at
+    least one.
 
     Raises
     ------
@@ -179,21 +211,23 @@ def optimal_polytope(optimum: BlockOptimum) -> Polytope:
         raise TooManyVerticesError("with thrust in a ball the optimal controls have no vertices")
     if optimal.size > _MAX_DIMENSIONS:
         raise TooManyVerticesError(
-            f"the optimal controls of a block span {optimal.size} dimensions, more than the limit of {_MAX_DIMENSIONS} "
-            "for vertices"
+            f"the optimal controls of a block span {optimal.size} dimensions, more than the limit "
+            f"of {_MAX_DIMENSIONS} for vertices"
         )
     try:
         return Polytope.from_constraints(optimal.rows, optimal.limits).needed().bounded()
     except EmptyPolytopeError as error:  # the centre is inside
-        raise ThinSetError("the set of optimal controls of a block is too thin: it is empty") from error
+        raise ThinSetError(
+            "the set of optimal controls of a block is too thin: it is empty"
+        ) from error
 
 
 class LiftedSets:
     """Sets of a block, represented by programs over its admissible controls.
 
-    Each direction needs a linear program, or a cone program for thrust in a ball. The only error is the tolerance of
-    the programs, at most 1e-8 of the bounds. The variables are the controls; if there are many, states are variables
-    too, because the rows are then sparse.
+    Each direction needs a linear program, or a cone program for thrust in a ball. The only error is
+    the tolerance of the programs, at most 1e-8 of the bounds. The variables are the controls; if
+    there are many, states are variables too, because the rows are then sparse.
     """
 
     def __init__(self, optimum: BlockOptimum) -> None:
@@ -202,7 +236,8 @@ class LiftedSets:
 
     def bounds(self, kind: SetKind) -> Floats:
         """Return the minimum and maximum value of each state at each time, shape (T + 1, n, 2)."""
-        size, periods = self._optimum.block.size, self._optimum.block.periods
+        size = self._optimum.block.size
+        periods = self._optimum.block.periods
         result = np.zeros((periods + 1, size, 2))
         result[0] = self._optimum.block.initial[:, None]
         if kind is SetKind.FORWARD:
@@ -216,7 +251,8 @@ class LiftedSets:
         # If a state on the path of an optimal control is at its bound, no program is needed.
         lifted, program = self._set(kind, periods)
         best = np.full((periods + 1, size, 2), -np.inf)
-        # Multiples of the maximum powers of two first: any first part of the times is evenly spread.
+        # Multiples of the maximum powers of two first: any first part of the times is evenly
+        # spread.
         for t in sorted(range(1, periods), key=lambda t: (-(t & -t), t)):
             for i in range(size):
                 for side, sign in enumerate((-1.0, 1.0)):
@@ -234,12 +270,15 @@ class LiftedSets:
         if time == 0:
             return np.asarray(rows @ self._optimum.block.initial)[None, :]
         lifted, program = self._set(kind, time)
-        free, response = rows @ lifted.free[time], rows @ lifted.response[time]
+        free = rows @ lifted.free[time]
+        response = rows @ lifted.response[time]
 
         def furthest(direction: Floats) -> Floats:
             cost = direction @ response
             if tolerance > _SHARP:
-                return np.asarray(free + response @ program.maximise(cost, max(MAX_GAP, _GAP * tolerance)))
+                return np.asarray(
+                    free + response @ program.maximise(cost, max(MAX_GAP, _GAP * tolerance))
+                )
             return np.asarray(free + response @ program.maximise_sharply(cost))
 
         return polytope_from_support(furthest, len(rows), tolerance).vertices

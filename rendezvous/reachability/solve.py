@@ -1,4 +1,6 @@
-"""Solution of a problem: the minimum terminal norm, all controls that attain it, and the sets of states."""
+"""Solution of a problem: the minimum terminal norm, all controls that attain it, and the sets of
+states.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +34,9 @@ AGREEMENT = 1e-9
 
 
 class Route(Enum):
-    """Representation of sets of states: all vertices and facets, or programs over the admissible controls."""
+    """Representation of sets of states: all vertices and facets, or programs over the admissible
+    controls.
+    """
 
     EXACT = "exact"
     LIFTED = "lifted"
@@ -40,7 +44,9 @@ class Route(Enum):
 
 @dataclass(frozen=True, eq=False)
 class OptimalControls:
-    """{u: |x(T)| is minimal and all constraints kept}, from the blocks: a polytope for thrust in a box."""
+    """{u: |x(T)| is minimal and all constraints kept}, from the blocks: a polytope for thrust in a
+    box.
+    """
 
     problem: ReachabilityProblem
     blocks: tuple[BlockOptimum, ...]
@@ -76,15 +82,20 @@ class OptimalControls:
         return float(np.linalg.norm([part.miss for part in self.blocks]))
 
     def at(self, point: Floats) -> Floats:
-        """Return the controls, shape (..., T, m), of a `point` z of the set, shape (..., dimension)."""
+        """Return the controls, shape (..., T, m), of a `point` z of the set, shape (...,
+        dimension).
+        """
         scaled = self.space.control_free + np.asarray(point) @ self.space.control_response.T
-        return np.asarray((scaled * self.scale).reshape(*np.shape(point)[:-1], self.problem.periods, -1))
+        return np.asarray(
+            (scaled * self.scale).reshape(*np.shape(point)[:-1], self.problem.periods, -1)
+        )
 
     def excess(self, controls: ArrayLike) -> Floats:
-        """Return the deviation of `controls`, shape (..., T, m), from the set, relative to the bounds; shape (...).
+        """Return the deviation of `controls`, shape (..., T, m), from the set, relative to the
+        bounds; shape (...).
 
-        It is the maximum violation of a constraint, or the distance of the terminal state from the optimal one; for
-        members of the set it is at most rounding.
+        It is the maximum violation of a constraint, or the distance of the terminal state from the
+        optimal one; for members of the set it is at most rounding.
         """
         thrust = np.asarray(controls, dtype=float)
         best = np.zeros(self.problem.states)
@@ -95,7 +106,9 @@ class OptimalControls:
         return np.asarray(np.maximum(self.problem.excess(thrust), away))
 
     def ranges(self) -> Floats:
-        """Return the minimum and maximum of each control over the set, shape (T, m, 2), by 2 T m linear programs."""
+        """Return the minimum and maximum of each control over the set, shape (T, m, 2), by 2 T m
+        linear programs.
+        """
         periods = self.problem.periods
         result = np.zeros((periods, self.problem.controls, 2))
         for part in self.blocks:
@@ -103,18 +116,24 @@ class OptimalControls:
             costs = np.vstack([-lifted.control_response, lifted.control_response])
             moving = np.abs(costs).max(axis=1, initial=0.0) > 1e-12
             best = np.zeros(len(costs))
-            best[moving] = np.einsum("kp,kp->k", costs[moving], Maximiser(lifted).maximise_all(costs[moving]))
+            best[moving] = np.einsum(
+                "kp,kp->k", costs[moving], Maximiser(lifted).maximise_all(costs[moving])
+            )
             count = len(lifted.control_free)
-            ends = np.stack([lifted.control_free - best[:count], lifted.control_free + best[count:]], axis=-1)
+            ends = np.stack(
+                [lifted.control_free - best[:count], lifted.control_free + best[count:]], axis=-1
+            )
             result[:, part.block.controls] = ends.reshape(periods, -1, 2)
         return result * self.problem.control_bounds[:, None]
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The solution of a problem: all controls of minimum terminal norm, and the forward sets and the tube.
+    """The solution of a problem: all controls of minimum terminal norm, and the forward sets and
+    the tube.
 
-    The `route` is EXACT if the vertices and facets of all blocks are known; `reason` explains its choice.
+    The `route` is EXACT if the vertices and facets of all blocks are known; `reason` explains its
+    choice.
     """
 
     problem: ReachabilityProblem
@@ -125,16 +144,21 @@ class Solution:
 
 
 def optimal_controls(problem: ReachabilityProblem, *, relative: bool = False) -> OptimalControls:
-    """Return all controls of minimum terminal norm; see `block_optimum` for `relative` and errors."""
-    return OptimalControls(problem, tuple(block_optimum(block, relative=relative) for block in problem.blocks))
+    """Return all controls of minimum terminal norm; see `block_optimum` for `relative` and
+    errors.
+    """
+    return OptimalControls(
+        problem, tuple(block_optimum(block, relative=relative) for block in problem.blocks)
+    )
 
 
 def solve(problem: ReachabilityProblem) -> Solution:
-    """Compute the minimum terminal norm, all controls that attain it, and the forward sets and tube.
+    """Compute the minimum terminal norm, all controls that attain it, and the forward sets and
+    tube.
 
-    The route is exact if blocks and their number of periods are small, thrust is in a box, constraints apply at whole
-    periods only, and rounding does not decide; otherwise it is the lifted one. `EmptyTubeError` is raised if no control
-    keeps the constraints.
+    The route is exact if blocks and their number of periods are small, thrust is in a box,
+    constraints apply at whole periods only, and rounding does not decide; otherwise it is the
+    lifted one. `EmptyTubeError` is raised if no control keeps the constraints.
     """
     optimal = optimal_controls(problem)
     lifted = tuple(LiftedSets(optimum) for optimum in optimal.blocks)
@@ -157,7 +181,10 @@ def _need_agreement(exact: tuple[BlockSets, ...], lifted: tuple[BlockSets, ...])
         for kind in SetKind:
             apart = float(np.abs(one.bounds(kind) - other.bounds(kind)).max())
             if apart > AGREEMENT:
-                raise ThinSetError(f"{kind.value} sets from hulls and from programs differ by {apart:.2g} of a bound")
+                raise ThinSetError(
+                    f"{kind.value} sets from hulls and from programs differ by {apart:.2g} of a "
+                    "bound"
+                )
 
 
 def _refusal(problem: ReachabilityProblem) -> str:
@@ -175,17 +202,20 @@ def _refusal(problem: ReachabilityProblem) -> str:
 
 
 def min_periods(problem: ReachabilityProblem) -> int | None:
-    """Return the minimum number of periods in which zero can be reached, or None if those of the `problem` are too few.
+    """Return the minimum number of periods in which zero can be reached, or None if those of the
+    `problem` are too few.
 
-    If the zero state satisfies all constraints, it can be held, and the minimum number is computed by bisection;
-    otherwise all numbers are tried. Each block and number needs a linear program.
+    If the zero state satisfies all constraints, it can be held, and the minimum number is computed
+    by bisection; otherwise all numbers are tried. Each block and number needs a linear program.
     """
 
     def reached(periods: int) -> bool:
         return all(block_reaches_zero(block.first(periods)) for block in problem.blocks)
 
     if not all((block.offsets >= 0.0).all() for block in problem.blocks):
-        return next((periods for periods in range(1, problem.periods + 1) if reached(periods)), None)
+        return next(
+            (periods for periods in range(1, problem.periods + 1) if reached(periods)), None
+        )
     if not reached(problem.periods):
         return None
     return 1 + bisect_left(range(1, problem.periods), True, key=reached)

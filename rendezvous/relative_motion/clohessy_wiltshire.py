@@ -1,4 +1,6 @@
-"""Motion about a circular orbit (Hill, Clohessy and Wiltshire), in closed forms that keep their digits."""
+"""Motion about a circular orbit (Hill, Clohessy and Wiltshire), in closed forms that keep their
+digits.
+"""
 
 from __future__ import annotations
 
@@ -21,8 +23,8 @@ NODES, WEIGHTS = (rule.astype(np.float64) for rule in np.polynomial.legendre.leg
 class ClohessyWiltshire(LinearMotion):
     """Relative motion about a circular orbit, whose mean motion n is `rate_rad_s`.
 
-    Barseghyan and Stepanyan (2008), (1.8), X[T, t] and (2.3), corrected and in Hill's axes. A transition takes about
-    0.1 microseconds, a Gramian at most 1.
+    Barseghyan and Stepanyan (2008), (1.8), X[T, t] and (2.3), corrected and in Hill's axes. A
+    transition takes about 0.1 microseconds, a Gramian at most 1.
     """
 
     rate_rad_s: float
@@ -30,7 +32,9 @@ class ClohessyWiltshire(LinearMotion):
     stationary = True
 
     def dynamics(self, time_s: ArrayLike) -> Floats:
-        """A, the same at all times, shape (..., 6, 6): x'' = 3 n^2 x + 2 n y', y'' = -2 n x', z'' = -n^2 z."""
+        """A, the same at all times, shape (..., 6, 6): x'' = 3 n^2 x + 2 n y', y'' = -2 n x', z'' =
+        -n^2 z.
+        """
         n = self.rate_rad_s
         matrix = np.zeros((*np.shape(time_s), 6, 6))
         matrix[..., 0, 3] = matrix[..., 1, 4] = matrix[..., 2, 5] = 1.0
@@ -48,8 +52,8 @@ class ClohessyWiltshire(LinearMotion):
     def gramian(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Gramian, shape (..., 6, 6); end >= start.
 
-        Below two radians, where the closed forms cancel, by Gauss and Legendre's rule, beyond by the closed forms. Each
-        entry is within 1e-14 of its size up to 50 radians.
+        Below two radians, where the closed forms cancel, by Gauss and Legendre's rule, beyond by
+        the closed forms. Each entry is within 1e-14 of its size up to 50 radians.
         """
         durations = np.asarray(end_s, dtype=np.float64) - np.asarray(start_s, dtype=np.float64)
         matrices = np.zeros((durations.size, 6, 6))
@@ -67,10 +71,13 @@ class ClohessyWiltshire(LinearMotion):
 
 @compiled
 def angle_less_sine(theta: float) -> float:
-    """Return theta - sin(theta) to full relative accuracy: nine terms of the series up to one radian."""
+    """Return theta - sin(theta) to full relative accuracy: nine terms of the series up to one
+    radian.
+    """
     if abs(theta) >= SERIES_BELOW_RAD:
         return theta - math.sin(theta)
-    squared, tail = theta * theta, 1.0
+    squared = theta * theta
+    tail = 1.0
     for order in range(19, 3, -2):
         tail = 1.0 - squared / (order * (order - 1)) * tail
     return theta * squared / 6.0 * tail
@@ -79,7 +86,8 @@ def angle_less_sine(theta: float) -> float:
 @compiled
 def fill_effect(theta: float, effect: Floats) -> None:
     """Fill Phi B for unit rate, shape (6, 3), whose other entries are zero."""
-    sine, half = math.sin(theta), math.sin(0.5 * theta)
+    sine = math.sin(theta)
+    half = math.sin(0.5 * theta)
     versine = 2.0 * half * half
     effect[0, 0] = effect[2, 2] = sine
     effect[0, 1] = 2.0 * versine
@@ -95,12 +103,14 @@ def fill_effect(theta: float, effect: Floats) -> None:
 def fill_transitions(rate: float, durations: Floats, matrices: Floats) -> None:
     """Fill Phi of durations, shape (k, 6, 6), whose other entries are zero."""
     for row in range(len(durations)):
-        theta, matrix = rate * durations[row], matrices[row]
+        theta = rate * durations[row]
+        matrix = matrices[row]
         fill_effect(theta, matrix[:, 3:])
         for first in range(3):
             for second in range(3, 6):
                 matrix[first, second] /= rate
-        sine, half = math.sin(theta), math.sin(0.5 * theta)
+        sine = math.sin(theta)
+        half = math.sin(0.5 * theta)
         versine = 2.0 * half * half
         matrix[0, 0] = 1.0 + 3.0 * versine
         matrix[1, 0] = -6.0 * angle_less_sine(theta)
@@ -112,17 +122,21 @@ def fill_transitions(rate: float, durations: Floats, matrices: Floats) -> None:
 
 
 @compiled
-def fill_gramians(rate: float, durations: Floats, nodes: Floats, weights: Floats, matrices: Floats) -> None:
+def fill_gramians(
+    rate: float, durations: Floats, nodes: Floats, weights: Floats, matrices: Floats
+) -> None:
     """Fill Gramians of durations, shape (k, 6, 6), whose other entries are zero."""
     effect = np.zeros((6, 3))
     for row in range(len(durations)):
-        theta, matrix = rate * durations[row], matrices[row]
+        theta = rate * durations[row]
+        matrix = matrices[row]
         if theta < QUADRATURE_BELOW_RAD:
             _integrate(theta, nodes, weights, effect, matrix)
         else:
             _close(theta, matrix)
         # These two entries cancel under the integral.
-        half, lag = math.sin(0.5 * theta), angle_less_sine(theta)
+        half = math.sin(0.5 * theta)
+        lag = angle_less_sine(theta)
         matrix[0, 1] = -3.0 * lag * lag
         matrix[3, 4] = -12.0 * half**4
         for first in range(6):
@@ -133,8 +147,12 @@ def fill_gramians(rate: float, durations: Floats, nodes: Floats, weights: Floats
 
 
 @compiled
-def _integrate(theta: float, nodes: Floats, weights: Floats, effect: Floats, matrix: Floats) -> None:
-    """Fill the upper triangle for unit rate by Gauss and Legendre's rule: no entry cancels but two."""
+def _integrate(
+    theta: float, nodes: Floats, weights: Floats, effect: Floats, matrix: Floats
+) -> None:
+    """Fill the upper triangle for unit rate by Gauss and Legendre's rule: no entry cancels but
+    two.
+    """
     half = 0.5 * theta
     for node in range(len(nodes)):
         fill_effect(half * (1.0 + nodes[node]), effect)
@@ -148,9 +166,14 @@ def _integrate(theta: float, nodes: Floats, weights: Floats, effect: Floats, mat
 
 @compiled
 def _close(theta: float, matrix: Floats) -> None:
-    """Fill the upper triangle for unit rate in closed form: (2.3) of the paper with q11 and q44 corrected."""
-    sine, cosine, sine2 = math.sin(theta), math.cos(theta), math.sin(2.0 * theta)
-    versine, climb = 1.0 - cosine, 4.0 * sine - 3.0 * theta
+    """Fill the upper triangle for unit rate in closed form: (2.3) of the paper with q11 and q44
+    corrected.
+    """
+    sine = math.sin(theta)
+    cosine = math.cos(theta)
+    sine2 = math.sin(2.0 * theta)
+    versine = 1.0 - cosine
+    climb = 4.0 * sine - 3.0 * theta
     matrix[0, 0] = 6.5 * theta - 8.0 * sine + 0.75 * sine2
     matrix[0, 3] = 0.5 * (sine * sine + 4.0 * versine * versine)
     matrix[0, 4] = -(11.0 * theta - 14.0 * sine + 1.5 * sine2)

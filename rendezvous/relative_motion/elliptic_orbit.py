@@ -14,7 +14,8 @@ _MAX_STEPS = 60
 
 @dataclass(frozen=True)
 class EllipticOrbit:
-    """An elliptic reference orbit: mean motion n, eccentricity 0 <= e < 1, and true anomaly at t = 0.
+    """An elliptic reference orbit: mean motion n, eccentricity 0 <= e < 1, and true anomaly at t =
+    0.
 
     Raises
     ------
@@ -28,9 +29,13 @@ class EllipticOrbit:
 
     def __post_init__(self) -> None:
         if not self.mean_motion_rad_s > 0.0:
-            raise ValueError(f"the mean motion must be positive, found {self.mean_motion_rad_s!r} rad/s")
+            raise ValueError(
+                f"the mean motion must be positive, found {self.mean_motion_rad_s!r} rad/s"
+            )
         if not 0.0 <= self.eccentricity < 1.0:
-            raise ValueError(f"the eccentricity must be at least 0 and below 1, found {self.eccentricity!r}")
+            raise ValueError(
+                f"the eccentricity must be at least 0 and below 1, found {self.eccentricity!r}"
+            )
 
     @classmethod
     def of_size(
@@ -40,13 +45,16 @@ class EllipticOrbit:
         gravitational_parameter_m3_s2: float,
         true_anomaly_rad: float = 0.0,
     ) -> EllipticOrbit:
-        """Return the orbit of a semi-major axis and an eccentricity; `true_anomaly_rad` is that at t = 0."""
+        """Return the orbit of a semi-major axis and an eccentricity; `true_anomaly_rad` is that at
+        t = 0.
+        """
         rate = float(np.sqrt(gravitational_parameter_m3_s2 / semi_major_axis_m**3))
         return cls(rate, eccentricity, true_anomaly_rad)
 
     @property
     def semi_latus_rate_rad_s(self) -> float:
-        """Mean motion of a circular orbit at the semi-latus rectum p: sqrt(mu / p^3) = h / p^2, rad/s.
+        """Mean motion of a circular orbit at the semi-latus rectum p: sqrt(mu / p^3) = h / p^2,
+        rad/s.
 
         Yamanaka and Ankersen (2002) call it k^2.
         """
@@ -55,36 +63,54 @@ class EllipticOrbit:
     def eccentric_anomaly(self, time_s: ArrayLike) -> Floats:
         """Return the eccentric anomaly at times, rad; it increases without bound."""
         start = self._eccentric_of_true(self.true_anomaly_rad)
-        mean = start - self.eccentricity * np.sin(start) + self.mean_motion_rad_s * np.asarray(time_s, dtype=np.float64)
+        mean = (
+            start
+            - self.eccentricity * np.sin(start)
+            + self.mean_motion_rad_s * np.asarray(time_s, dtype=np.float64)
+        )
         return eccentric_of_mean(mean, self.eccentricity)
 
     def time_of_eccentric(self, eccentric_rad: Floats) -> Floats:
-        """Return the times of eccentric anomalies, s: Kepler's equation, the inverse of `eccentric_anomaly`."""
+        """Return the times of eccentric anomalies, s: Kepler's equation, the inverse of
+        `eccentric_anomaly`.
+        """
         start = self._eccentric_of_true(self.true_anomaly_rad)
         e = self.eccentricity
         return np.asarray(
-            (eccentric_rad - start - e * (np.sin(eccentric_rad) - np.sin(start))) / self.mean_motion_rad_s
+            (eccentric_rad - start - e * (np.sin(eccentric_rad) - np.sin(start)))
+            / self.mean_motion_rad_s
         )
 
     def true_anomaly(self, time_s: ArrayLike) -> Floats:
         """Return the true anomaly at times, rad; it increases without bound."""
-        eccentric, e = self.eccentric_anomaly(time_s), self.eccentricity
+        eccentric = self.eccentric_anomaly(time_s)
+        e = self.eccentricity
         fraction = e / (1.0 + np.sqrt(1.0 - e * e))
         return np.asarray(
-            eccentric + 2.0 * np.arctan2(fraction * np.sin(eccentric), 1.0 - fraction * np.cos(eccentric))
+            eccentric
+            + 2.0 * np.arctan2(fraction * np.sin(eccentric), 1.0 - fraction * np.cos(eccentric))
         )
 
     def dynamics(self, time_s: ArrayLike) -> Floats:
         """Return A(t), shape (..., 6, 6), of states in m and m/s in Hill's axes.
 
-        Equation (2) of Shorikov and Goranov (2021), whose x is -y here and whose y is x; mu / r^3 = w^2 r / p.
+        Equation (2) of Shorikov and Goranov (2021), whose x is -y here and whose y is x; mu / r^3 =
+        w^2 r / p.
         """
-        anomaly, e, k2 = self.true_anomaly(time_s), self.eccentricity, self.semi_latus_rate_rad_s
+        anomaly = self.true_anomaly(time_s)
+        e = self.eccentricity
+        k2 = self.semi_latus_rate_rad_s
         rho = 1.0 + e * np.cos(anomaly)
-        w, w_dot, gravity = k2 * rho**2, -2.0 * k2**2 * e * np.sin(anomaly) * rho**3, k2**2 * rho**3
+        w = k2 * rho**2
+        w_dot = -2.0 * k2**2 * e * np.sin(anomaly) * rho**3
+        gravity = k2**2 * rho**3
         matrix = np.zeros((*anomaly.shape, 6, 6))
         matrix[..., 0, 3] = matrix[..., 1, 4] = matrix[..., 2, 5] = 1.0
-        matrix[..., 3, 0], matrix[..., 3, 1], matrix[..., 3, 4] = w**2 + 2.0 * gravity, w_dot, 2.0 * w
+        matrix[..., 3, 0], matrix[..., 3, 1], matrix[..., 3, 4] = (
+            w**2 + 2.0 * gravity,
+            w_dot,
+            2.0 * w,
+        )
         matrix[..., 4, 0], matrix[..., 4, 1], matrix[..., 4, 3] = -w_dot, w**2 - gravity, -2.0 * w
         matrix[..., 5, 2] = -gravity
         return matrix
@@ -92,17 +118,23 @@ class EllipticOrbit:
     def _eccentric_of_true(self, true_rad: float) -> float:
         e = self.eccentricity
         fraction = e / (1.0 + np.sqrt(1.0 - e * e))
-        return float(true_rad - 2.0 * np.arctan2(fraction * np.sin(true_rad), 1.0 + fraction * np.cos(true_rad)))
+        return float(
+            true_rad
+            - 2.0 * np.arctan2(fraction * np.sin(true_rad), 1.0 + fraction * np.cos(true_rad))
+        )
 
 
 def eccentric_of_mean(mean_rad: ArrayLike, eccentricity: ArrayLike) -> Floats:
     """Solve Kepler's equation E - e sin E = M for E, rad; E increases with M without bound.
 
-    Newton's method from above, where the function is convex: it decreases to the root and cannot overshoot.
+    Newton's method from above, where the function is convex: it decreases to the root and cannot
+    overshoot.
     """
-    mean, e = np.asarray(mean_rad, dtype=np.float64), np.asarray(eccentricity, dtype=np.float64)
+    mean = np.asarray(mean_rad, dtype=np.float64)
+    e = np.asarray(eccentricity, dtype=np.float64)
     turns = 2.0 * np.pi * np.round(mean / (2.0 * np.pi))
-    sign, rest = np.where(mean < turns, -1.0, 1.0), np.abs(mean - turns)
+    sign = np.where(mean < turns, -1.0, 1.0)
+    rest = np.abs(mean - turns)
     eccentric = np.minimum(np.minimum(rest + e, rest / (1.0 - e)), np.pi)
     for _ in range(_MAX_STEPS):
         excess = eccentric - e * np.sin(eccentric) - rest

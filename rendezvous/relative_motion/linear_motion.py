@@ -27,7 +27,9 @@ class Segment:
 
 @dataclass(frozen=True)
 class HeldSegment(Segment):
-    """Motion between two times, with the effect at the end of a unit control held from the start, shape (..., 6, 3)."""
+    """Motion between two times, with the effect at the end of a unit control held from the start,
+    shape (..., 6, 3).
+    """
 
     held: Floats
 
@@ -35,7 +37,8 @@ class HeldSegment(Segment):
 class LinearMotion(ABC):
     """x' = A(t) x + B u, x = (position, velocity), with B = (0, 1)'.
 
-    Times are scalars or arrays, in seconds, broadcast against each other; the results have their shape in front.
+    Times are scalars or arrays, in seconds, broadcast against each other; the results have their
+    shape in front.
     """
 
     stationary: ClassVar[bool] = False
@@ -51,14 +54,18 @@ class LinearMotion(ABC):
 
     @abstractmethod
     def breaks(self, start_s: float, end_s: float) -> Floats:
-        """Times from start to end, inclusive, between which the motion turns by about a radian at most."""
+        """Times from start to end, inclusive, between which the motion turns by about a radian at
+        most.
+        """
 
     def transition(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Phi(end, start), shape (..., 6, 6); the end may be before the start."""
         return self.segment(start_s, end_s).transition
 
     def gramian(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-        """Gramian, int Phi(end, t) B B' Phi(end, t)' dt from start to end, shape (..., 6, 6); end >= start."""
+        """Gramian, int Phi(end, t) B B' Phi(end, t)' dt from start to end, shape (..., 6, 6); end
+        >= start.
+        """
         return self.segment(start_s, end_s).gramian
 
 
@@ -71,14 +78,17 @@ class HeldMotion(LinearMotion):
 
 
 def state_scales(durations: Floats) -> Floats:
-    """Return (T, T, T, 1, 1, 1) of each interval, shape (..., 6), from durations in s; T = 1 s for an empty one."""
+    """Return (T, T, T, 1, 1, 1) of each interval, shape (..., 6), from durations in s; T = 1 s for
+    an empty one.
+    """
     scale = np.ones((*durations.shape, 6))
     scale[..., :3] = np.where(durations == 0.0, 1.0, np.abs(durations))[..., None]
     return scale
 
 
 def even_breaks(start_s: float, end_s: float, radians: float) -> Floats:
-    """Return times, s, of panels of equal length and at most one radian, for a motion that turns by `radians` in all.
+    """Return times, s, of panels of equal length and at most one radian, for a motion that turns by
+    `radians` in all.
 
     Raise `ValueError` if there are more than 200 000 panels.
     """
@@ -87,9 +97,11 @@ def even_breaks(start_s: float, end_s: float, radians: float) -> Floats:
 
 
 def need_panels(start_s: float, end_s: float, radians: float) -> None:
-    """Raise `ValueError` if a motion that turns by `radians` between two times has more than 200 000 panels."""
+    """Raise `ValueError` if a motion that turns by `radians` between two times has more than 200
+    000 panels.
+    """
     if not radians <= MAX_PANELS:
         raise ValueError(
-            f"the motion turns by {radians:.3g} rad from {start_s:g} s to {end_s:g} s; at most {MAX_PANELS} rad can "
-            "be divided into panels; check the units"
+            f"the motion turns by {radians:.3g} rad from {start_s:g} s to {end_s:g} s; at most "
+            f"{MAX_PANELS} rad can be divided into panels; check the units"
         )

@@ -25,7 +25,8 @@ MAX_BREAKS = 200_000
 class TimeVaryingMotion(HeldMotion):
     """x' = A(t) x + B u; `matrix_at` returns A of times of shape (k,), s: shape (k, 6, 6).
 
-    The adjoint Psi' = -A' Psi, Psi(end) = 1, is collocated backwards at 8 Gauss points a panel (order 16); Phi(end, t)
+    The adjoint Psi' = -A' Psi, Psi(end) = 1, is collocated backwards at 8 Gauss points a panel
+    (order 16); Phi(end, t)
     = Psi(t)' at the nodes gives the Gramian and the held control as sums of positive weights. Panels are doubled until
     two solutions agree to 2e-13, or differ by rounding only. A panel is a 48 x 48 system.
     """
@@ -35,22 +36,30 @@ class TimeVaryingMotion(HeldMotion):
     def dynamics(self, time_s: ArrayLike) -> Floats:
         """A(t), shape (..., 6, 6)."""
         times = np.asarray(time_s, dtype=np.float64)
-        return np.asarray(self.matrix_at(times.ravel()), dtype=np.float64).reshape(*times.shape, 6, 6)
+        return np.asarray(self.matrix_at(times.ravel()), dtype=np.float64).reshape(
+            *times.shape, 6, 6
+        )
 
     def segment(self, start_s: ArrayLike, end_s: ArrayLike) -> HeldSegment:
-        """Transition, Gramian and the effect of a held control together; end >= start, except for the transition.
+        """Transition, Gramian and the effect of a held control together; end >= start, except for
+        the transition.
 
         Raises
         ------
         ValueError
             If two solutions do not agree.
         """
-        starts, ends = np.broadcast_arrays(np.asarray(start_s, dtype=np.float64), np.asarray(end_s, dtype=np.float64))
+        starts, ends = np.broadcast_arrays(
+            np.asarray(start_s, dtype=np.float64), np.asarray(end_s, dtype=np.float64)
+        )
         solution = _refined(self.dynamics, starts.ravel(), ends.ravel())
-        return HeldSegment(*(part.reshape(*starts.shape, *part.shape[1:]) for part in vars(solution).values()))
+        return HeldSegment(
+            *(part.reshape(*starts.shape, *part.shape[1:]) for part in vars(solution).values())
+        )
 
     def breaks(self, start_s: float, end_s: float) -> Floats:
-        """Times from start to end, inclusive, a radian of the fastest motion seen in between apart at most.
+        """Times from start to end, inclusive, a radian of the fastest motion seen in between apart
+        at most.
 
         Panels are halved where A at their Gauss points turns by more than a radian over them.
 
@@ -59,38 +68,56 @@ class TimeVaryingMotion(HeldMotion):
         ValueError
             If A(t) is not finite, or there are more than 200 000 panels.
         """
-        starts, ends = np.array([start_s]), np.array([end_s])
+        starts = np.array([start_s])
+        ends = np.array([end_s])
         nodes = _gauss_collocation()[0]
         settled = [np.array([start_s, end_s])]
         while len(starts):
             if len(starts) > MAX_BREAKS:
-                raise ValueError(f"A(t) turns too often from {start_s:g} s to {end_s:g} s; check the units")
+                raise ValueError(
+                    f"A(t) turns too often from {start_s:g} s to {end_s:g} s; check the units"
+                )
             times = starts[:, None] + (ends - starts)[:, None] * nodes
-            long = (_rates(self.dynamics(times)).max(axis=1) * (ends - starts) > 1.0) & (ends > starts)
+            long = (_rates(self.dynamics(times)).max(axis=1) * (ends - starts) > 1.0) & (
+                ends > starts
+            )
             settled.append(ends[~long])
             middles = 0.5 * (starts[long] + ends[long])
-            starts, ends = np.concatenate([starts[long], middles]), np.concatenate([middles, ends[long]])
+            starts = np.concatenate([starts[long], middles])
+            ends = np.concatenate([middles, ends[long]])
         return np.unique(np.concatenate(settled))
 
 
 def _refined(dynamics: OfTime, starts: Floats, ends: Floats) -> HeldSegment:
-    """Double the panels until two solutions agree, or differ by rounding only; many intervals in parts."""
+    """Double the panels until two solutions agree, or differ by rounding only; many intervals in
+    parts.
+    """
     panels = _first_panels(dynamics, starts, ends)
     if len(starts) > 1 and panels * len(starts) > MAX_PANELS:
         half = len(starts) // 2
-        parts = [_refined(dynamics, starts[part], ends[part]) for part in (slice(None, half), slice(half, None))]
+        parts = [
+            _refined(dynamics, starts[part], ends[part])
+            for part in (slice(None, half), slice(half, None))
+        ]
         return HeldSegment(
-            *(np.concatenate(arrays) for arrays in zip(*(vars(part).values() for part in parts), strict=True))
+            *(
+                np.concatenate(arrays)
+                for arrays in zip(*(vars(part).values() for part in parts), strict=True)
+            )
         )
-    coarse, apart = _collocated(dynamics, starts, ends, panels), np.inf
+    coarse = _collocated(dynamics, starts, ends, panels)
+    apart = np.inf
     while 2 * panels <= MAX_PANELS:
         panels *= 2
         fine = _collocated(dynamics, starts, ends, panels)
-        before, apart = apart, _difference(coarse, fine, ends - starts)
+        before = apart
+        apart = _difference(coarse, fine, ends - starts)
         if apart <= AGREEMENT or (apart <= ROUNDING and apart > 0.1 * before):
             return fine
         coarse = fine
-    raise ValueError(f"A(t) changes too fast: {MAX_PANELS} panels an interval do not agree to {AGREEMENT:g}")
+    raise ValueError(
+        f"A(t) changes too fast: {MAX_PANELS} panels an interval do not agree to {AGREEMENT:g}"
+    )
 
 
 def _first_panels(dynamics: OfTime, starts: Floats, ends: Floats) -> int:
@@ -115,15 +142,21 @@ def _rates(matrices: Floats) -> Floats:
 
 @lru_cache(maxsize=1)
 def _gauss_collocation() -> tuple[Floats, Floats, Floats]:
-    """Nodes and weights on [0, 1], and the integrals of the Lagrange polynomials from 0 to each node."""
+    """Nodes and weights on [0, 1], and the integrals of the Lagrange polynomials from 0 to each
+    node.
+    """
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
     values = np.polynomial.legendre.legvander(nodes, NODES - 1)
-    integrals = np.polynomial.legendre.legval(nodes, np.polynomial.legendre.legint(np.eye(NODES), lbnd=-1.0)).T
+    integrals = np.polynomial.legendre.legval(
+        nodes, np.polynomial.legendre.legint(np.eye(NODES), lbnd=-1.0)
+    ).T
     return 0.5 * (nodes + 1.0), 0.5 * weights, 0.5 * integrals @ np.linalg.inv(values)
 
 
 def _collocated(dynamics: OfTime, starts: Floats, ends: Floats, panels: int) -> HeldSegment:
-    """Solve on equal panels, from the end to the start; states are divided by (T, T, T, 1, 1, 1)."""
+    """Solve on equal panels, from the end to the start; states are divided by (T, T, T, 1, 1,
+    1).
+    """
     nodes, weights, integrals = _gauss_collocation()
     durations = ends - starts
     positions = (np.arange(panels)[:, None] + nodes) / panels
@@ -134,14 +167,17 @@ def _collocated(dynamics: OfTime, starts: Floats, ends: Floats, panels: int) -> 
     ratio = (scale[:, None, :] / scale[:, :, None])[:, None, None]
     adjoint = np.swapaxes(dynamics(places) * ratio, -1, -2) * steps[..., None, None]
     # (1 - h a_jk A_k') Psi_k = 1, for the 8 nodes of each panel at once.
-    system = -np.einsum("jk,npkab->npjakb", integrals, adjoint).reshape(len(durations), panels, 6 * NODES, 6 * NODES)
+    system = -np.einsum("jk,npkab->npjakb", integrals, adjoint).reshape(
+        len(durations), panels, 6 * NODES, 6 * NODES
+    )
     system[..., np.arange(6 * NODES), np.arange(6 * NODES)] += 1.0
     right = np.broadcast_to(np.tile(np.eye(6), (NODES, 1)), (len(durations), panels, 6 * NODES, 6))
     psi = np.linalg.solve(system, right).reshape(len(durations), panels, NODES, 6, 6)
     last = np.eye(6) + np.einsum("k,npkab->npab", weights, adjoint @ psi)
     effect = np.swapaxes(psi[..., 3:, :], -1, -2)  # Phi B; velocities are not scaled
     power = np.broadcast_to(np.eye(6), (len(durations), 6, 6))
-    gramian, held = np.zeros((len(durations), 6, 6)), np.zeros((len(durations), 6, 3))
+    gramian = np.zeros((len(durations), 6, 6))
+    held = np.zeros((len(durations), 6, 3))
     for panel in range(panels):
         turned = power[:, None] @ effect[:, panel]
         gramian = gramian + np.einsum("nk,nkai,nkbi->nab", spans[:, panel], turned, turned)
@@ -156,7 +192,9 @@ def _collocated(dynamics: OfTime, starts: Floats, ends: Floats, panels: int) -> 
 
 
 def _difference(first: HeldSegment, second: HeldSegment, durations: Floats) -> float:
-    """Maximum difference of two solutions, relative to each part, in states divided by (T, T, T, 1, 1, 1)."""
+    """Maximum difference of two solutions, relative to each part, in states divided by (T, T, T, 1,
+    1, 1).
+    """
     if not len(durations):
         return 0.0
     scale = state_scales(durations)

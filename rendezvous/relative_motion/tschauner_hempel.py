@@ -11,21 +11,35 @@ from numpy.typing import ArrayLike
 
 from infoset.rendezvous._arrays import Floats
 from infoset.rendezvous.relative_motion.elliptic_orbit import EllipticOrbit
-from infoset.rendezvous.relative_motion.linear_motion import HeldMotion, HeldSegment, even_breaks, need_panels
-from infoset.rendezvous.relative_motion.yamanaka_ankersen import Ellipse, fill_integrals, fill_transitions
+from infoset.rendezvous.relative_motion.linear_motion import (
+    HeldMotion,
+    HeldSegment,
+    even_breaks,
+    need_panels,
+)
+from infoset.rendezvous.relative_motion.yamanaka_ankersen import (
+    Ellipse,
+    fill_integrals,
+    fill_transitions,
+)
 
 MAX_ECCENTRICITY = 1.0 - 1e-6
-"""A time has 16 digits of a revolution, and the motion at perigee takes the share (1 - e)^(3/2) of it."""
+"""A time has 16 digits of a revolution, and the motion at perigee takes the share (1 - e)^(3/2) of
+it.
+"""
 LONGEST_PANEL_RAD = 1.0
 """Longest panel of eccentric anomaly where the poles of the motion are farther away."""
 NODES, WEIGHTS = (rule.astype(np.float64) for rule in np.polynomial.legendre.leggauss(16))
-"""Gauss and Legendre's rule of a panel. The nearest pole is at least the panel's length d away from its middle: the
-half-axes of the ellipse through it, whose foci are the ends of the panel, have a sum of (2 + sqrt(5)) d / 2, so that
-the error decreases as 4.24^(-2 n), which is 9e-21 for 16 nodes. With 12, 9e-16, the order of the pole is seen."""
+"""Gauss and Legendre's rule of a panel. The nearest pole is at least the panel's length d away from
+its middle: the half-axes of the ellipse through it, whose foci are the ends of the panel, have a
+sum of (2 + sqrt(5)) d / 2, so that the error decreases as 4.24^(-2 n), which is 9e-21 for 16 nodes.
+With 12, 9e-16, the order of the pole is seen."""
 
 
 class _Intervals(NamedTuple):
-    """n intervals: the shape of the arrays of times, starts, E at the starts, what passes of it, and durations."""
+    """n intervals: the shape of the arrays of times, starts, E at the starts, what passes of it,
+    and durations.
+    """
 
     shape: tuple[int, ...]
     starts_s: Floats
@@ -38,10 +52,11 @@ class _Intervals(NamedTuple):
 class TschaunerHempel(HeldMotion):
     """Relative motion about an elliptic `orbit`, from e = 0 on.
 
-    Transitions are those of Yamanaka and Ankersen (2002), in closed form: about 1 microsecond each. The Gramian and the
-    effect of a held control are integrals of Phi(end, t) B by Gauss and Legendre's rule of 16 nodes, on panels of
-    eccentric anomaly that are at most a radian long, and not longer than the distance from the poles of the motion at
-    cos E = 1 / e: about 4 microseconds a panel.
+    Transitions are those of Yamanaka and Ankersen (2002), in closed form: about 1 microsecond each.
+    The Gramian and the effect of a held control are integrals of Phi(end, t) B by Gauss and
+    Legendre's rule of 16 nodes, on panels of eccentric anomaly that are at most a radian long, and
+    not longer than the distance from the poles of the motion at cos E = 1 / e: about 4 microseconds
+    a panel.
 
     Raises
     ------
@@ -54,8 +69,9 @@ class TschaunerHempel(HeldMotion):
     def __post_init__(self) -> None:
         if self.orbit.eccentricity > MAX_ECCENTRICITY:
             raise ValueError(
-                f"the eccentricity must be at most {MAX_ECCENTRICITY:g}, found {self.orbit.eccentricity!r}: the motion "
-                "at perigee is too short a part of a revolution for the digits of a time"
+                f"the eccentricity must be at most {MAX_ECCENTRICITY:g}, found "
+                f"{self.orbit.eccentricity!r}: the motion at perigee is too short a part of a "
+                "revolution for the digits of a time"
             )
 
     def dynamics(self, time_s: ArrayLike) -> Floats:
@@ -84,7 +100,9 @@ class TschaunerHempel(HeldMotion):
 
         gramians = np.zeros((count, 6, 6))
         helds = np.zeros((count, 6, 3))
-        fill_integrals(self._ellipse, *intervals[2:], self._panel_rad, NODES, WEIGHTS, gramians, helds)
+        fill_integrals(
+            self._ellipse, *intervals[2:], self._panel_rad, NODES, WEIGHTS, gramians, helds
+        )
         return HeldSegment(
             self._transitions(intervals),
             gramians.reshape(*intervals.shape, 6, 6),
@@ -96,16 +114,25 @@ class TschaunerHempel(HeldMotion):
 
         The motion has poles at cos E = 1 / e; panels are no longer than the distance to them.
         """
-        first, last = (float(anomaly) for anomaly in self.orbit.eccentric_anomaly(np.array([start_s, end_s])))
-        times = self.orbit.time_of_eccentric(even_breaks(first, last, (last - first) / self._panel_rad))
-        times[0], times[-1] = start_s, end_s
+        first, last = (
+            float(anomaly) for anomaly in self.orbit.eccentric_anomaly(np.array([start_s, end_s]))
+        )
+        times = self.orbit.time_of_eccentric(
+            even_breaks(first, last, (last - first) / self._panel_rad)
+        )
+        times[0] = start_s
+        times[-1] = end_s
         return np.maximum.accumulate(np.minimum(times, end_s))
 
     def _intervals(self, start_s: ArrayLike, end_s: ArrayLike) -> _Intervals:
-        starts, ends = np.broadcast_arrays(np.asarray(start_s, dtype=np.float64), np.asarray(end_s, dtype=np.float64))
+        starts, ends = np.broadcast_arrays(
+            np.asarray(start_s, dtype=np.float64), np.asarray(end_s, dtype=np.float64)
+        )
         starts_rad = self.orbit.eccentric_anomaly(starts.ravel())
         ends_rad = self.orbit.eccentric_anomaly(ends.ravel())
-        return _Intervals(starts.shape, starts.ravel(), starts_rad, ends_rad - starts_rad, (ends - starts).ravel())
+        return _Intervals(
+            starts.shape, starts.ravel(), starts_rad, ends_rad - starts_rad, (ends - starts).ravel()
+        )
 
     def _transitions(self, intervals: _Intervals) -> Floats:
         matrices = np.zeros((len(intervals.durations_s), 6, 6))
@@ -114,7 +141,8 @@ class TschaunerHempel(HeldMotion):
 
     @property
     def _ellipse(self) -> Ellipse:
-        n, e = self.orbit.mean_motion_rad_s, self.orbit.eccentricity
+        n = self.orbit.mean_motion_rad_s
+        e = self.orbit.eccentricity
         # 1 - e^2 would lose the digits that 1 - e has.
         root = math.sqrt((1.0 - e) * (1.0 + e))
         return Ellipse(n, e, root, n / root**3)

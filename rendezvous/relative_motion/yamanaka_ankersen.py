@@ -1,18 +1,21 @@
-"""Yamanaka and Ankersen's transition of motion about an elliptic orbit, in a form that keeps its digits: compiled.
+"""Yamanaka and Ankersen's transition of motion about an elliptic orbit, in a form that keeps its
+digits: compiled.
 
-Tschauner and Hempel's variables are x = rho r and x' = dx / d nu with the true anomaly nu and rho = 1 + e cos nu:
+Tschauner and Hempel's variables are x = rho r and x' = dx / d nu with the true anomaly nu and rho =
+1 + e cos nu:
 
     x'' = 3 x / rho + 2 y',  y'' = -2 x',  z'' = -z.
 
-The motion has six constants, linear in the state (equation (82)), of which the state at any other place is a linear
-function (84). The secular part contains k^2 (t - t_0), with t_0 the start of the interval. Here the *change* of the
-state is computed, from changes of sin nu, cos nu and rho that are products with the sine of half the change of nu: over
-a short interval the large terms of (84) would cancel.
+The motion has six constants, linear in the state (equation (82)), of which the state at any other
+place is a linear function (84). The secular part contains k^2 (t - t_0), with t_0 the start of the
+interval. Here the *change* of the state is computed, from changes of sin nu, cos nu and rho that
+are products with the sine of half the change of nu: over a short interval the large terms of (84)
+would cancel.
 
 References
 ----------
-Yamanaka and Ankersen, "New state transition matrix for relative motion on an arbitrary elliptical orbit", J. Guid.
-Control Dyn. 25 (2002) 60-66, whose x is y here, and whose z is -x.
+Yamanaka and Ankersen, "New state transition matrix for relative motion on an arbitrary elliptical
+orbit", J. Guid. Control Dyn. 25 (2002) 60-66, whose x is y here, and whose z is -x.
 """
 
 from __future__ import annotations
@@ -27,8 +30,9 @@ from infoset.rendezvous._compile import allocation_free, compiled
 from infoset.rendezvous.relative_motion.clohessy_wiltshire import angle_less_sine
 
 KEPLER_STEPS = 2
-"""Newton's steps for the anomaly between two times, from a guess that has the rounding of both anomalies. The first one
-leaves the square of that error; the second one matters only near the greatest eccentricity."""
+"""Newton's steps for the anomaly between two times, from a guess that has the rounding of both
+anomalies. The first one leaves the square of that error; the second one matters only near the
+greatest eccentricity."""
 
 
 class Ellipse(NamedTuple):
@@ -41,7 +45,9 @@ class Ellipse(NamedTuple):
 
 
 class Place(NamedTuple):
-    """A place on the orbit: E, r / a = 1 - e cos E, and sine and cosine of half the true anomaly."""
+    """A place on the orbit: E, r / a = 1 - e cos E, and sine and cosine of half the true
+    anomaly.
+    """
 
     eccentric_rad: float
     distance: float
@@ -52,8 +58,8 @@ class Place(NamedTuple):
 class Leg(NamedTuple):
     """Motion from a place to another one.
 
-    sin nu, cos nu and rho at the first place, by how much the sine and the cosine change, sine and cosine of the change
-    of nu, and the secular k^2 (t - t_0).
+    sin nu, cos nu and rho at the first place, by how much the sine and the cosine change, sine and
+    cosine of the change of nu, and the secular k^2 (t - t_0).
     """
 
     sine: float
@@ -70,9 +76,11 @@ class Leg(NamedTuple):
 def fill_transitions(
     ellipse: Ellipse, starts_rad: Floats, guesses_rad: Floats, durations_s: Floats, matrices: Floats
 ) -> None:
-    """Fill Phi, shape (k, 6, 6), whose other entries are zero, of intervals from eccentric anomalies E.
+    """Fill Phi, shape (k, 6, 6), whose other entries are zero, of intervals from eccentric
+    anomalies E.
 
-    `guesses_rad` are guesses of the anomalies that pass in the durations, exact but for the rounding of E.
+    `guesses_rad` are guesses of the anomalies that pass in the durations, exact but for the
+    rounding of E.
     """
     for row in range(len(durations_s)):
         mean_rad = ellipse.mean_motion_rad_s * durations_s[row]
@@ -103,7 +111,8 @@ def fill_integrals(
 ) -> None:
     """Add Gramians, shape (k, 6, 6), and effects of held controls, shape (k, 6, 3), to zeros.
 
-    The rule of `nodes` on [-1, 1] and `weights` is applied to panels of eccentric anomaly of at most `panel_rad`.
+    The rule of `nodes` on [-1, 1] and `weights` is applied to panels of eccentric anomaly of at
+    most `panel_rad`.
     """
     effect = np.zeros((6, 3))
     for row in range(len(durations_s)):
@@ -117,7 +126,9 @@ def fill_integrals(
             for node in range(len(nodes)):
                 to_go_rad = half_rad * (2 * panel + 1 + nodes[node])
                 place = place_at(ellipse, end.eccentric_rad - to_go_rad)
-                mean_to_go_rad = mean_anomaly(ellipse, end.eccentric_rad - 0.5 * to_go_rad, to_go_rad)
+                mean_to_go_rad = mean_anomaly(
+                    ellipse, end.eccentric_rad - 0.5 * to_go_rad, to_go_rad
+                )
                 leg = leg_between(ellipse, place, end, to_go_rad, mean_to_go_rad)
                 fill_effect(ellipse, leg, effect)
                 time_s = half_rad * weights[node] * place.distance / ellipse.mean_motion_rad_s
@@ -138,10 +149,11 @@ def place_at(ellipse: Ellipse, eccentric_rad: float) -> Place:
 
 @allocation_free
 def mean_anomaly(ellipse: Ellipse, middle_rad: float, passed_rad: float) -> float:
-    """Return the mean anomaly that passes with an eccentric one, from its middle: Kepler's equation of a difference.
+    """Return the mean anomaly that passes with an eccentric one, from its middle: Kepler's equation
+    of a difference.
 
-    With h half of what passes, 2 h - 2 e cos(E) sin(h), as 2 (h - sin h) + 2 (1 - e cos E) sin(h): nothing cancels
-    if h is small.
+    With h half of what passes, 2 h - 2 e cos(E) sin(h), as 2 (h - sin h) + 2 (1 - e cos E) sin(h):
+    nothing cancels if h is small.
     """
     half = 0.5 * passed_rad
     middle_sine = math.sin(0.5 * middle_rad)
@@ -151,7 +163,9 @@ def mean_anomaly(ellipse: Ellipse, middle_rad: float, passed_rad: float) -> floa
 
 @allocation_free
 def passed_anomaly(ellipse: Ellipse, start_rad: float, guess_rad: float, mean_rad: float) -> float:
-    """Return the eccentric anomaly that passes with a mean one, near a guess: its digits are those of its own size."""
+    """Return the eccentric anomaly that passes with a mean one, near a guess: its digits are those
+    of its own size.
+    """
     passed_rad = guess_rad
     for _ in range(KEPLER_STEPS):
         excess = mean_anomaly(ellipse, start_rad + 0.5 * passed_rad, passed_rad) - mean_rad
@@ -160,12 +174,16 @@ def passed_anomaly(ellipse: Ellipse, start_rad: float, guess_rad: float, mean_ra
 
 
 @allocation_free
-def leg_between(ellipse: Ellipse, start: Place, end: Place, passed_rad: float, mean_rad: float) -> Leg:
+def leg_between(
+    ellipse: Ellipse, start: Place, end: Place, passed_rad: float, mean_rad: float
+) -> Leg:
     """Return the leg between two places, between which an eccentric and a mean anomaly pass.
 
     Half the change of nu has the sine sqrt(1 - e^2) sin(dE / 2) / sqrt(d_0 d_1) with d = r / a.
     """
-    half_turn_sine = ellipse.root * math.sin(0.5 * passed_rad) / math.sqrt(start.distance * end.distance)
+    half_turn_sine = (
+        ellipse.root * math.sin(0.5 * passed_rad) / math.sqrt(start.distance * end.distance)
+    )
     half_turn_cosine = start.half_cosine * end.half_cosine + start.half_sine * end.half_sine
     middle_sine = start.half_sine * end.half_cosine + start.half_cosine * end.half_sine
     middle_cosine = start.half_cosine * end.half_cosine - start.half_sine * end.half_sine
@@ -183,7 +201,9 @@ def leg_between(ellipse: Ellipse, start: Place, end: Place, passed_rad: float, m
 
 @allocation_free
 def fill_effect(ellipse: Ellipse, leg: Leg, effect: Floats) -> None:
-    """Fill Phi B, shape (6, 3), whose other entries are zero: a velocity v is x' = v / (k^2 rho)."""
+    """Fill Phi B, shape (6, 3), whose other entries are zero: a velocity v is x' = v / (k^2
+    rho).
+    """
     rate = 1.0 / (ellipse.latus_rate_rad_s * leg.rho)
     fill_column(ellipse, leg, 0.0, 0.0, rate, 0.0, effect[:, 0])
     fill_column(ellipse, leg, 0.0, 0.0, 0.0, rate, effect[:, 1])
@@ -191,15 +211,24 @@ def fill_effect(ellipse: Ellipse, leg: Leg, effect: Floats) -> None:
 
 
 @allocation_free
-def fill_column(ellipse: Ellipse, leg: Leg, x: float, y: float, x_rate: float, y_rate: float, column: Floats) -> None:
-    """Fill position and velocity in the orbit's plane at the end of a leg, of a scaled state at its start."""
-    e, rest = ellipse.eccentricity, ellipse.root * ellipse.root
-    sine, cosine, rho = leg.sine, leg.cosine, leg.rho
+def fill_column(
+    ellipse: Ellipse, leg: Leg, x: float, y: float, x_rate: float, y_rate: float, column: Floats
+) -> None:
+    """Fill position and velocity in the orbit's plane at the end of a leg, of a scaled state at its
+    start.
+    """
+    e = ellipse.eccentricity
+    rest = ellipse.root * ellipse.root
+    sine = leg.sine
+    cosine = leg.cosine
+    rho = leg.rho
     s = rho * sine
     c = rho * cosine
 
     # (82): the constants; that of y alone does not change the state.
-    by_s = (-3.0 * sine * (1.0 + e * e / rho) * x + (c - 2.0 * e) * x_rate - sine * (rho + 1.0) * y_rate) / rest
+    by_s = (
+        -3.0 * sine * (1.0 + e * e / rho) * x + (c - 2.0 * e) * x_rate - sine * (rho + 1.0) * y_rate
+    ) / rest
     by_c = (-3.0 * (cosine + e) * x - s * x_rate - (cosine * (rho + 1.0) + e) * y_rate) / rest
     drift = ((3.0 * rho - rest) * x + e * s * x_rate + rho * rho * y_rate) / rest
 
@@ -214,7 +243,9 @@ def fill_column(ellipse: Ellipse, leg: Leg, x: float, y: float, x_rate: float, y
     c_rate_change = -s_change - e * (sine_end * leg.cosine_change + cosine * leg.sine_change)
     s_end = rho_end * sine_end
     s_rate_end = rho_end * cosine_end - e * sine_end * sine_end
-    drift_rate = s_rate_end * leg.secular + (leg.sine_change * rho - sine * rho_change) / (rho * rho_end)
+    drift_rate = s_rate_end * leg.secular + (leg.sine_change * rho - sine * rho_change) / (
+        rho * rho_end
+    )
 
     x_change = by_s * s_change + by_c * c_change - 3.0 * e * s_end * leg.secular * drift
     y_change = (
@@ -229,7 +260,9 @@ def fill_column(ellipse: Ellipse, leg: Leg, x: float, y: float, x_rate: float, y
 
 @allocation_free
 def fill_normal(ellipse: Ellipse, leg: Leg, z: float, z_rate: float, column: Floats) -> None:
-    """Fill position and velocity across the orbit's plane at the end of a leg, of a scaled state at its start."""
+    """Fill position and velocity across the orbit's plane at the end of a leg, of a scaled state at
+    its start.
+    """
     z_end = z * leg.turn_cosine + z_rate * leg.turn_sine
     z_rate_end = z_rate * leg.turn_cosine - z * leg.turn_sine
     rho_end = leg.rho + ellipse.eccentricity * leg.cosine_change
@@ -237,15 +270,21 @@ def fill_normal(ellipse: Ellipse, leg: Leg, z: float, z_rate: float, column: Flo
 
 
 @allocation_free
-def fill_axis(ellipse: Ellipse, sine: float, rho: float, scaled: float, scaled_rate: float, parts: Floats) -> None:
-    """Fill a position and its velocity, shape (2,), from scaled ones where sin nu and rho are known."""
+def fill_axis(
+    ellipse: Ellipse, sine: float, rho: float, scaled: float, scaled_rate: float, parts: Floats
+) -> None:
+    """Fill a position and its velocity, shape (2,), from scaled ones where sin nu and rho are
+    known.
+    """
     parts[0] = scaled / rho
     parts[1] = ellipse.latus_rate_rad_s * (ellipse.eccentricity * sine * scaled + rho * scaled_rate)
 
 
 @allocation_free
 def add_integrand(effect: Floats, time_s: float, gramian: Floats, held: Floats) -> None:
-    """Add the product of a time and the integrands of the Gramian, shape (6, 6), and of the held control, (6, 3)."""
+    """Add the product of a time and the integrands of the Gramian, shape (6, 6), and of the held
+    control, (6, 3).
+    """
     for first in range(6):
         for axis in range(3):
             held[first, axis] += time_s * effect[first, axis]

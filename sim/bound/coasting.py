@@ -1,4 +1,6 @@
-"""Relative motion without impulses under gravity, and small differences of the object's motion from it."""
+"""Relative motion without impulses under gravity, and small differences of the object's motion from
+it.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,9 @@ from infoset.sim.scenario import Sun
 TOLERANCE = 1e-12
 """Relative tolerance of the integrator, in units in which range and flight time are one."""
 LONGEST_FLIGHT = 3.0
-"""Time, in units of range by closing speed, after which a motion counts as one that does not arrive."""
+"""Time, in units of range by closing speed, after which a motion counts as one that does not
+arrive.
+"""
 
 
 MIN_RANGE = 1e-9
@@ -28,10 +32,11 @@ class NoArrivalError(ValueError):
 
 @dataclass(frozen=True)
 class Coasting:
-    """A motion without impulses, and the state-transition matrices of the object's motion around it.
+    """A motion without impulses, and the state-transition matrices of the object's motion around
+    it.
 
-    States are positions and then velocities along the lateral axes and x: (z, x, V_z, V_x) in a plane, (y, z, x, V_y,
-    V_z, V_x) in space; n times.
+    States are positions and then velocities along the lateral axes and x: (z, x, V_z, V_x) in a
+    plane, (y, z, x, V_y, V_z, V_x) in space; n times.
 
     Parameters
     ----------
@@ -44,8 +49,8 @@ class Coasting:
     pushed : ndarray, shape (n, 2 C, C - 1)
         Integral of Phi^-1 over time for a unit acceleration along each lateral axis.
     nearest_m, speed_m_s : float
-        Minimum distance of the segment between spacecraft and object from the Sun, and maximum velocity of the two
-        relative to it, at these times; infinite and zero in free space.
+        Minimum distance of the segment between spacecraft and object from the Sun, and maximum
+        velocity of the two relative to it, at these times; infinite and zero in free space.
     """
 
     times_s: Floats
@@ -78,7 +83,9 @@ class Coasting:
 
     @cached_property
     def back(self) -> Floats:
-        """Inverses of the transition matrices, which are symplectic because the gravity gradient is symmetric."""
+        """Inverses of the transition matrices, which are symplectic because the gravity gradient is
+        symmetric.
+        """
         c = self.axes
         transposed = np.swapaxes(self.transition, 1, 2)
         inverse = np.empty_like(transposed)
@@ -86,14 +93,18 @@ class Coasting:
         inverse[:, :c, c:], inverse[:, c:, :c] = -transposed[:, c:, :c], -transposed[:, :c, c:]
         return inverse
 
-    def difference(self, offset_m: Floats, velocity_m_s: Floats, acceleration_m_s2: Floats) -> Floats:
-        """Return a difference of two motions of the object at all times, to first order, shape (2 C, n).
+    def difference(
+        self, offset_m: Floats, velocity_m_s: Floats, acceleration_m_s2: Floats
+    ) -> Floats:
+        """Return a difference of two motions of the object at all times, to first order, shape (2
+        C, n).
 
-        `offset_m` and `velocity_m_s`, shape (C - 1,), are its lateral parts at t = 0; it has no part along x there.
-        `acceleration_m_s2`, shape (C - 1, n - 1), is that over each step.
+        `offset_m` and `velocity_m_s`, shape (C - 1,), are its lateral parts at t = 0; it has no
+        part along x there. `acceleration_m_s2`, shape (C - 1, n - 1), is that over each step.
         """
         start = np.zeros(2 * self.axes)
-        start[: self.axes - 1], start[self.axes : -1] = offset_m, velocity_m_s
+        start[: self.axes - 1] = offset_m
+        start[self.axes : -1] = velocity_m_s
         shares = np.einsum("nsw,wn->ns", np.diff(self.pushed, axis=0), acceleration_m_s2)
         from_start = start + np.vstack([np.zeros_like(start), np.cumsum(shares, axis=0)])
         return np.asarray(np.einsum("nrs,ns->rn", self.transition, from_start))
@@ -131,7 +142,8 @@ def _straight(position_m: Floats, velocity_m_s: Floats, step_s: float) -> Coasti
     axes = len(position_m)
     times_s = _times(-position_m[-1] / velocity_m_s[-1], step_s)
     transition = np.tile(np.eye(2 * axes), (len(times_s), 1, 1))
-    time, lateral = times_s[:, None, None], np.eye(axes)[:, :-1]
+    time = times_s[:, None, None]
+    lateral = np.eye(axes)[:, :-1]
     transition[:, :axes, axes:] = time * np.eye(axes)
     pushed = np.concatenate([-0.5 * time**2 * lateral, time * lateral], axis=1)
     speeds = np.repeat(velocity_m_s[:, None], len(times_s), axis=1)
@@ -141,11 +153,14 @@ def _straight(position_m: Floats, velocity_m_s: Floats, step_s: float) -> Coasti
 
 
 def _kepler(position_m: Floats, velocity_m_s: Floats, sun: Sun, step_s: float) -> Coasting:
-    """Integrate spacecraft, relative motion, transition matrices and `pushed` together, always in space."""
+    """Integrate spacecraft, relative motion, transition matrices and `pushed` together, always in
+    space.
+    """
     from scipy.integrate import solve_ivp  # takes long to load
 
     axes = len(position_m)
-    metres, seconds = float(position_m[-1]), float(-position_m[-1] / velocity_m_s[-1])
+    metres = float(position_m[-1])
+    seconds = float(-position_m[-1] / velocity_m_s[-1])
     parameter = sun.gravitational_parameter_m3_s2 * seconds**2 / metres**3
     toward_sun, along_orbit = sun_and_orbit(sun)
     distance = sun.distance_m / metres
@@ -170,20 +185,30 @@ def _kepler(position_m: Floats, velocity_m_s: Floats, sun: Sun, step_s: float) -
     along_x.terminal = True  # type: ignore[attr-defined]
     tolerances = {"rtol": TOLERANCE, "atol": 0.1 * TOLERANCE}
     flown = solve_ivp(
-        rates, (0.0, LONGEST_FLIGHT), start, method="DOP853", events=along_x, dense_output=True, **tolerances
+        rates,
+        (0.0, LONGEST_FLIGHT),
+        start,
+        method="DOP853",
+        events=along_x,
+        dense_output=True,
+        **tolerances,
     )
     if not len(flown.t_events[0]):
         raise NoArrivalError(f"x does not reach zero within {LONGEST_FLIGHT * seconds:g} s")
     times_s = _times(float(flown.t_events[0][0]) * seconds, step_s)
     found = flown.sol(times_s / seconds)
-    own, apart, transition = found[:6], found[6:12], found[12:48].reshape(6, 6, -1)
+    own = found[:6]
+    apart = found[6:12]
+    transition = found[12:48].reshape(6, 6, -1)
     chosen = np.concatenate([np.arange(3 - axes, 3), np.arange(6 - axes, 6)])
     units = np.repeat([metres, metres / seconds], axes)
     states = units[:, None] * apart[chosen]
     states[axes - 1, -1] = 0.0
     share = np.clip(-(own[:3] * apart[:3]).sum(axis=0) / (apart[:3] ** 2).sum(axis=0), 0.0, 1.0)
     nearest = float(np.linalg.norm(own[:3] + share * apart[:3], axis=0).min())
-    fastest = max(float(np.linalg.norm(each, axis=0).max()) for each in (own[3:], own[3:] + apart[3:]))
+    fastest = max(
+        float(np.linalg.norm(each, axis=0).max()) for each in (own[3:], own[3:] + apart[3:])
+    )
     return Coasting(
         times_s,
         states,

@@ -1,12 +1,15 @@
-"""The set of differences of two motions along one axis with equal measurements, and its farthest member.
+"""The set of differences of two motions along one axis with equal measurements, and its farthest
+member.
 
-The difference of two motions with the same impulses, pulled back to t = 0, is a vector s of offset and velocity. To
-first order, the differences with equal measurements are (Theorem 5a of docs/guarantee.md)
+The difference of two motions with the same impulses, pulled back to t = 0, is a vector s of offset
+and velocity. To first order, the differences with equal measurements are (Theorem 5a of
+docs/guarantee.md)
 
     S_0 = box,    S_(k+1) = (S_k cut by the strips of step k) + [-1, 1] g_k.
 
-These sets are sums of segments [-1, 1] a_i. Their farthest member has one sign for each segment, and each segment keeps
-the numbers of the segments that it consists of: the start and the accelerations of the member.
+These sets are sums of segments [-1, 1] a_i. Their farthest member has one sign for each segment,
+and each segment keeps the numbers of the segments that it consists of: the start and the
+accelerations of the member.
 """
 
 from __future__ import annotations
@@ -25,7 +28,9 @@ from infoset.sim.bound.coasting import Coasting
 MARGIN = 1e-6
 """Reserve as a share of each limit, for rounding in flights of the two motions."""
 POSITION, PREDICTED_MISS = 0, 1
-"""Columns of the strips of a step: limits of the difference of the positions w, and of that of w + V_w x/c."""
+"""Columns of the strips of a step: limits of the difference of the positions w, and of that of w +
+V_w x/c.
+"""
 
 
 class FarthestDifference(NamedTuple):
@@ -34,7 +39,8 @@ class FarthestDifference(NamedTuple):
     Parameters
     ----------
     farthest : ndarray, shape (common + 1,)
-        Maximum at the arrival of the differences whose measurements are equal in the first 0, 1, ..., common steps.
+        Maximum at the arrival of the differences whose measurements are equal in the first 0, 1,
+        ..., common steps.
     start : ndarray, shape (2,)
         Offset and velocity of the last of these maxima, in units of their widths, in [-1, 1].
     pushes : ndarray, shape (steps,)
@@ -47,18 +53,21 @@ class FarthestDifference(NamedTuple):
 
 
 class Segments(NamedTuple):
-    """Segments [-1, 1] (x, y) whose sum is a set, in the order of their angles from 0 to pi, and their origin.
+    """Segments [-1, 1] (x, y) whose sum is a set, in the order of their angles from 0 to pi, and
+    their origin.
 
     Parameters
     ----------
     x, y : ndarray
         What is left of each segment of the sum.
     number, share : ndarray
-        Number of the segment that it was, in the order in which segments were made, and the share of it that is left.
+        Number of the segment that it was, in the order in which segments were made, and the share
+        of it that is left.
     first_part : ndarray
         First of the parts of each segment ever made, by its number.
     part, part_share : ndarray
-        Number of the segment of each part, and the share of it that is the part, negative if it is reversed.
+        Number of the segment of each part, and the share of it that is the part, negative if it is
+        reversed.
     """
 
     x: Floats
@@ -85,7 +94,9 @@ def find_place(segments: Segments, count: int, x: float, y: float) -> int:
 
 
 @allocation_free
-def insert_segment(segments: Segments, count: int, place: int, x: float, y: float, number: int) -> int:
+def insert_segment(
+    segments: Segments, count: int, place: int, x: float, y: float, number: int
+) -> int:
     """Insert a whole segment at an index and return the number of segments."""
     for i in range(count, place, -1):
         segments.x[i] = segments.x[i - 1]
@@ -101,7 +112,9 @@ def insert_segment(segments: Segments, count: int, place: int, x: float, y: floa
 
 @allocation_free
 def add_segment(segments: Segments, count: int, made: int, x: float, y: float) -> tuple[int, float]:
-    """Add a segment to the sum; return the number of segments and the sign of its direction from 0 to pi."""
+    """Add a segment to the sum; return the number of segments and the sign of its direction from 0
+    to pi.
+    """
     sign = 1.0
     if y < 0.0 or (y == 0.0 and x < 0.0):
         sign = -1.0
@@ -116,12 +129,14 @@ def add_segment(segments: Segments, count: int, made: int, x: float, y: float) -
 def cut_by_strip(
     segments: Segments, count: int, made: int, normal_x: float, normal_y: float, limit: float
 ) -> tuple[int, int]:
-    """Cut the sum by abs(normal s) <= limit; return the number of its segments and of those made so far.
+    """Cut the sum by abs(normal s) <= limit; return the number of its segments and of those made so
+    far.
 
-    Lemma 20a: the corner is the vertex where abs(normal s) is greatest. On each side of it segments are removed, the
-    last one in part, until each side has lost half of the excess of the corner over the limit. The new segment along
-    the border is the sum of what was removed. Its signs follow from the order of the segments, because that of a height
-    is rounded if a segment is parallel to the border. Cost: O(count).
+    Lemma 20a: the corner is the vertex where abs(normal s) is greatest. On each side of it segments
+    are removed, the last one in part, until each side has lost half of the excess of the corner
+    over the limit. The new segment along the border is the sum of what was removed. Its signs
+    follow from the order of the segments, because that of a height is rounded if a segment is
+    parallel to the border. Cost: O(count).
     """
     height = 0.0
     for i in range(count):
@@ -237,7 +252,9 @@ def farthest_difference(
         for strip in range(strips):
             if limits[k, strip] < np.inf:
                 normal = normals[k, strip]
-                count, made = cut_by_strip(segments, count, made, normal[0], normal[1], limits[k, strip])
+                count, made = cut_by_strip(
+                    segments, count, made, normal[0], normal[1], limits[k, strip]
+                )
         farthest[k + 1] = later[k]
         for i in range(count):
             farthest[k + 1] += abs(towards[0] * segments.x[i] + towards[1] * segments.y[i])
@@ -246,7 +263,8 @@ def farthest_difference(
             number_of_push[k] = made
             made += 1
 
-    # The signs of the segments of the sum, passed down to the parts of each, the youngest one first.
+    # The signs of the segments of the sum, passed down to the parts of each, the youngest one
+    # first.
     values = np.zeros(made)
     for i in range(count):
         along = towards[0] * segments.x[i] + towards[1] * segments.y[i]
@@ -264,33 +282,44 @@ def farthest_difference(
             number = number_of_push[k]
             chosen[k] = min(1.0, max(-1.0, signs[number] * values[number]))
         else:
-            chosen[k] = 1.0 if towards[0] * pushes[k, 0] + towards[1] * pushes[k, 1] >= 0.0 else -1.0
+            chosen[k] = (
+                1.0 if towards[0] * pushes[k, 0] + towards[1] * pushes[k, 1] >= 0.0 else -1.0
+            )
     return FarthestDifference(farthest, start, chosen)
 
 
 class AxisDifferences:
     """The sets of differences along one lateral axis.
 
-    The difference follows the transition matrices of `motion`, without its small parts along the other axes.
+    The difference follows the transition matrices of `motion`, without its small parts along the
+    other axes.
 
     Attributes
     ----------
     limits_m : ndarray, shape (steps, 2)
-        Maximum differences of the positions and of the predicted misses at each step with the same measurements;
-        infinite where nothing is measured.
+        Maximum differences of the positions and of the predicted misses at each step with the same
+        measurements; infinite where nothing is measured.
     """
 
     def __init__(
-        self, model: SetModel, sensors: Mapping[str, Sensor], due: Mapping[str, Integers], motion: Coasting, axis: int
+        self,
+        model: SetModel,
+        sensors: Mapping[str, Sensor],
+        due: Mapping[str, Integers],
+        motion: Coasting,
+        axis: int,
     ) -> None:
         box = model.bounds
         own = [axis, motion.axes + axis]
         transition = motion.transition[:, own][:, :, own]
-        positions, speeds = transition[:, 0], transition[:, 1]
+        positions = transition[:, 0]
+        speeds = transition[:, 1]
         to_go_s = motion.range_m / motion.closing_speed_m_s[:-1]
         self._widths = np.array([np.ptp(box.z_m), np.ptp(box.vz_m_s)])
         self._pushes = 2.0 * model.disturbance_m_s2 * np.diff(motion.pushed[:, own, axis], axis=0)
-        self._normals = np.stack([positions[:-1], positions[:-1] + to_go_s[:, None] * speeds[:-1]], axis=1)
+        self._normals = np.stack(
+            [positions[:-1], positions[:-1] + to_go_s[:, None] * speeds[:-1]], axis=1
+        )
         self._towards = np.ascontiguousarray(positions[-1])
         self._acceleration_m_s2 = 2.0 * model.disturbance_m_s2
 
@@ -301,21 +330,27 @@ class AxisDifferences:
             band = sensor.band(motion.range_m[measured], speeds_m_s, 2.0 * (1.0 - MARGIN))
             if band is not None:
                 column = PREDICTED_MISS if band[0] else POSITION
-                self.limits_m[measured, column] = np.minimum(self.limits_m[measured, column], band[1])
+                self.limits_m[measured, column] = np.minimum(
+                    self.limits_m[measured, column], band[1]
+                )
 
     def farthest_m(self) -> Floats:
-        """Return the maximum distances at the arrival with equal measurements in the first 0, 1, ..., all steps."""
+        """Return the maximum distances at the arrival with equal measurements in the first 0, 1,
+        ..., all steps.
+        """
         return self._farthest(self.limits_m, len(self.limits_m)).farthest
 
     def member(self, limits_m: Floats, common_steps: int) -> tuple[float, float, Floats]:
         """Return the farthest difference with equal measurements in the first steps.
 
-        `limits_m` replaces the attribute; an infinite limit leaves a measurement out. The difference is an offset and a
-        velocity at t = 0, and the acceleration over each step.
+        `limits_m` replaces the attribute; an infinite limit leaves a measurement out. The
+        difference is an offset and a velocity at t = 0, and the acceleration over each step.
         """
         found = self._farthest(limits_m, common_steps)
         offset_m, velocity_m_s = (found.start * self._widths).tolist()
         return offset_m, velocity_m_s, found.pushes * self._acceleration_m_s2
 
     def _farthest(self, limits_m: Floats, common_steps: int) -> FarthestDifference:
-        return farthest_difference(self._widths, self._pushes, self._normals, limits_m, self._towards, common_steps)
+        return farthest_difference(
+            self._widths, self._pushes, self._normals, limits_m, self._towards, common_steps
+        )

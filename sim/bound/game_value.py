@@ -1,4 +1,6 @@
-"""What separates the lower bound from the value of the game, where Theorem 7 of docs/guarantee.md holds."""
+"""What separates the lower bound from the value of the game, where Theorem 7 of docs/guarantee.md
+holds.
+"""
 
 from __future__ import annotations
 
@@ -21,13 +23,14 @@ MAX_TRIALS = 100
 
 @dataclass(frozen=True)
 class ValueReserve:
-    """Upper limits of what separates the lower bound from the miss that `symmetric-miss` guarantees, m.
+    """Upper limits of what separates the lower bound from the miss that `symmetric-miss`
+    guarantees, m.
 
     Parameters
     ----------
     lower_bound_m : float
-        Reserve of the lower bound itself: the minimum distance in place of that at x = 0, Lemma 20, the accelerations
-        and the steps that the search for pairs examines.
+        Reserve of the lower bound itself: the minimum distance in place of that at x = 0, Lemma 20,
+        the accelerations and the steps that the search for pairs examines.
     tangent_m : float
         Angles that are not small.
     dead_zone_m : float
@@ -48,11 +51,13 @@ class ValueReserve:
 
 
 def why_no_value(scenario: Scenario) -> tuple[str, ...]:
-    """Return the assumptions of Theorem 7, and of its reserve, that a scenario does not meet; empty if it meets all.
+    """Return the assumptions of Theorem 7, and of its reserve, that a scenario does not meet; empty
+    if it meets all.
 
     The budget is missing here: whether it binds follows from the computation of the reserve.
     """
-    model, thruster = scenario.set_model, scenario.thruster
+    model = scenario.set_model
+    thruster = scenario.thruster
     box = model.bounds
     min_m_s, max_m_s = box.vx_m_s
     failed = {
@@ -61,15 +66,18 @@ def why_no_value(scenario: Scenario) -> tuple[str, ...]:
         "gravity": scenario.sun is not None,
         "range not exactly known": box.x_m[0] != box.x_m[1],
         "closing speed not exactly known": min_m_s != max_m_s,
-        # The set widens each impulse by the relative error of the nominal closing speed, also if the true one is known.
+        # The set widens each impulse by the relative error of the nominal closing speed, also if
+        # the true one is known.
         "closing speed not the nominal one": min_m_s == max_m_s != -model.closing_speed_m_s,
         # An impulse must shift all possible misses alike, and before the next measurement.
         "impulses with errors": thruster.execution_error_relative > 0.0,
         "impulses with a delay": thruster.delay_steps > 0,
-        # In the paper's model the set can lose the true state, and symmetric-miss guarantees nothing.
+        # In the paper's model the set can lose the true state, and symmetric-miss guarantees
+        # nothing.
         "model paper": not model.is_guaranteed,
         "starts in a rectangle of angle and rate": not model.starts_as_box,
-        # The pairs of the lower bound get all images; the reserve counts the limits of the angle alone.
+        # The pairs of the lower bound get all images; the reserve counts the limits of the angle
+        # alone.
         "images that can be lost": model.angle_sensor.miss_probability > 0.0,
         "rate sensor": scenario.rate_sensor is not None,
     }
@@ -77,7 +85,8 @@ def why_no_value(scenario: Scenario) -> tuple[str, ...]:
 
 
 def value_reserve(scenario: Scenario, lower: LowerBound) -> ValueReserve | str:
-    """Return what separates the lower bound from the value of the game, or the assumption that the scenario fails.
+    """Return what separates the lower bound from the value of the game, or the assumption that the
+    scenario fails.
 
     Only for scenarios without a reason of `why_no_value`.
 
@@ -85,10 +94,15 @@ def value_reserve(scenario: Scenario, lower: LowerBound) -> ValueReserve | str:
     -----
     docs/guarantee.md, Lemma 22, has the proof. Cost: one information set.
     """
-    course, minimum_m_s = _course(scenario), scenario.thruster.min_impulse_m_s
-    small, tangent, dead_zone = (True, 0.0, 0.0), (False, 0.0, 0.0), (False, minimum_m_s, 0.0)
+    course = _course(scenario)
+    minimum_m_s = scenario.thruster.min_impulse_m_s
+    small = (True, 0.0, 0.0)
+    tangent = (False, 0.0, 0.0)
+    dead_zone = (False, minimum_m_s, 0.0)
     steps = (small, tangent, dead_zone, (False, minimum_m_s, course.threshold_m))
-    misses_m, impulses_m_s = zip(*(_guarantee(scenario, course, *each) for each in steps), strict=True)
+    misses_m, impulses_m_s = zip(
+        *(_guarantee(scenario, course, *each) for each in steps), strict=True
+    )
     if max(impulses_m_s) > scenario.thruster.budget_m_s:
         return f"budget below the {max(impulses_m_s):.3g} m/s that symmetric-miss may need"
     return ValueReserve(*np.diff([lower.bound_m, *misses_m]).tolist())
@@ -98,8 +112,9 @@ def value_reserve(scenario: Scenario, lower: LowerBound) -> ValueReserve | str:
 class _Course:
     """Data of the flight at its steps, shape (n,).
 
-    `half_width_m` is the maximum half-width of the possible misses at a step, for small angles, without accelerations
-    after it; `later_m` is what these add. `first_m` is the maximum possible miss at the start.
+    `half_width_m` is the maximum half-width of the possible misses at a step, for small angles,
+    without accelerations after it; `later_m` is what these add. `first_m` is the maximum possible
+    miss at the start.
     """
 
     range_m: Floats
@@ -113,17 +128,25 @@ class _Course:
 
 def _course(scenario: Scenario) -> _Course:
     model = on_board_model(scenario)
-    box, e, step_s = model.bounds, model.closing_speed_m_s, model.step_s
+    box = model.bounds
+    e = model.closing_speed_m_s
+    step_s = model.step_s
     z_m, vz_m_s = (0.5 * float(np.ptp(ends)) for ends in (box.z_m, box.vz_m_s))
     centred = StateBox((-z_m, z_m), box.x_m, (-vz_m_s, vz_m_s), box.vx_m_s)
-    # Half of the difference of two members of a set is a member of the set from a centred box after measurements of 0.
+    # Half of the difference of two members of a set is a member of the set from a centred box after
+    # measurements of 0.
     nearest_m = CENTROID_ERRORS_AT_THRESHOLD * model.angle_sensor.centroid_error_m
-    widest = InformationSet(replace(model, bounds=centred, range_threshold_m=nearest_m), guarantee=False)
+    widest = InformationSet(
+        replace(model, bounds=centred, range_threshold_m=nearest_m), guarantee=False
+    )
     steps = math.ceil(box.x_m[0] / (e * step_s) * (1.0 - ROUNDING))
     ranges_m: Floats = box.x_m[0] - e * step_s * np.arange(steps, dtype=np.float64)
-    every, half_width_m = model.steps_in(model.angle_sensor.period_s), np.full(steps, np.inf)
+    every = model.steps_in(model.angle_sensor.period_s)
+    half_width_m = np.full(steps, np.inf)
     before_s = (scenario.nominal_arrival_s - step_s * np.arange(steps)).tolist()
-    measured = np.array([i % every == 0 and model.angle_sensor.measures_at(before_s[i]) for i in range(steps)])
+    measured = np.array(
+        [i % every == 0 and model.angle_sensor.measures_at(before_s[i]) for i in range(steps)]
+    )
     for i in range(steps):
         if not widest.tracking.all():
             break  # below the minimum range of a camera, where the set has no label and impulses are not counted
@@ -138,10 +161,14 @@ def _course(scenario: Scenario) -> _Course:
     return _Course(
         range_m=ranges_m,
         measured=measured,
-        may_decide=np.ones(steps, dtype=bool) if given is None else np.isin(np.arange(steps), given),
+        may_decide=np.ones(steps, dtype=bool)
+        if given is None
+        else np.isin(np.arange(steps), given),
         half_width_m=half_width_m,
         later_m=np.cumsum(arms_m[::-1])[::-1] - arms_m,
-        first_m=max(abs(z + v * box.x_m[0] / e) for z in box.z_m for v in box.vz_m_s) + arms_m.sum() - 0.5 * arms_m[0],
+        first_m=max(abs(z + v * box.x_m[0] / e) for z in box.z_m for v in box.vz_m_s)
+        + arms_m.sum()
+        - 0.5 * arms_m[0],
         threshold_m=max(model.min_range_m, nearest_m),
     )
 
@@ -150,17 +177,23 @@ def _guarantee(
     scenario: Scenario, course: _Course, is_small: bool, minimum_m_s: float, threshold_m: float
 ) -> tuple[float, float]:
     """Return the maximum miss of `symmetric-miss`, m, and the maximum sum of its impulses, m/s."""
-    model, maximum_m_s = scenario.set_model, scenario.thruster.max_impulse_m_s
-    e, decides = model.closing_speed_m_s, course.may_decide & (course.range_m >= threshold_m)
-    to_go_s, speed_m_s = course.range_m / e, max(abs(v) for v in model.bounds.vz_m_s)
-    worst_m, wider, last_to_go_s = course.first_m, 1.0, math.inf
+    model = scenario.set_model
+    maximum_m_s = scenario.thruster.max_impulse_m_s
+    e = model.closing_speed_m_s
+    decides = course.may_decide & (course.range_m >= threshold_m)
+    to_go_s = course.range_m / e
+    speed_m_s = max(abs(v) for v in model.bounds.vz_m_s)
+    worst_m = course.first_m
+    wider = 1.0
+    last_to_go_s = math.inf
     by_parts_m_s = spent_m_s = 0.0
     for i in range(len(to_go_s)):
         if course.measured[i] and not is_small:
             slope = (worst_m / to_go_s[i] + speed_m_s) / e
             wider = max(wider, _wider(model.angle_sensor, float(course.range_m[i]), slope))
         if decides[i]:
-            # Impulse i is at most (maximum miss before - after) / tau_i, whose sum is taken by parts, and at most mu2.
+            # Impulse i is at most (maximum miss before - after) / tau_i, whose sum is taken by
+            # parts, and at most mu2.
             by_parts_m_s += worst_m * (1.0 / to_go_s[i] - 1.0 / last_to_go_s)
             spent_m_s = min(by_parts_m_s, spent_m_s + maximum_m_s)
             middle_m = wider * course.half_width_m[i] + course.later_m[i] + minimum_m_s * to_go_s[i]
@@ -172,9 +205,13 @@ def _guarantee(
 
 
 def _wider(sensor: BearingSensor, range_m: float, slope: float) -> float:
-    """Return how much wider than for small angles the band of an angle can be, up to a slope of the line of sight."""
-    bound, true_rad = sensor.error_bound(range_m), math.atan(slope)
-    maximum, seen_rad = max(bound, sensor.error_bound(range_m * math.hypot(1.0, slope))), math.inf
+    """Return how much wider than for small angles the band of an angle can be, up to a slope of the
+    line of sight.
+    """
+    bound = sensor.error_bound(range_m)
+    true_rad = math.atan(slope)
+    maximum = max(bound, sensor.error_bound(range_m * math.hypot(1.0, slope)))
+    seen_rad = math.inf
     for _ in range(MAX_TRIALS):
         # The maximum possible angle depends on the bound at the distances that it allows.
         seen_rad, before_rad = (true_rad + 2.0 * maximum) * (1.0 + ROUNDING), seen_rad

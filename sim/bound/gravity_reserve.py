@@ -1,4 +1,6 @@
-"""What gravity can change in a pair of motions beyond first order, for the lower bound of the miss."""
+"""What gravity can change in a pair of motions beyond first order, for the lower bound of the
+miss.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +41,8 @@ class GravityReserve:
     impulses_m_s : float
         Maximum sum of impulses.
     stretch_per_s2 : float
-        An impulse that acts for the time t displaces by its straight line times at most 1 + stretch t^2.
+        An impulse that acts for the time t displaces by its straight line times at most 1 + stretch
+        t^2.
     """
 
     position_m: float
@@ -80,25 +83,37 @@ def gravity_reserve(
     -----
     docs/guarantee.md, Lemma 21, has the symbols and the proof.
     """
-    axes, arrival_s, closing = motion.axes, motion.arrival_s, motion.closing_speed_m_s
+    axes = motion.axes
+    arrival_s = motion.arrival_s
+    closing = motion.closing_speed_m_s
 
     def impulses_until(end_s: float) -> float:
         steps = math.floor(end_s / step_s * (1.0 + ROUNDING)) + 1
         return min(thruster.budget_m_s, thruster.max_impulse_m_s * steps)
 
     if sun is None:
-        nothing, minimum = np.zeros(len(closing)), float(closing.min())
+        nothing = np.zeros(len(closing))
+        minimum = float(closing.min())
         impulses = impulses_until(arrival_s + reach_m / minimum)
         return GravityReserve(0.0, 0.0, 0.0, minimum, 0.0, nothing, 0.0, 0.0, impulses, 0.0)
-    parameter, near = sun.gravitational_parameter_m3_s2, motion.nearest_m
-    half, rate = (0.5 * np.linalg.norm(part, axis=0) for part in (difference[:axes], difference[axes:]))
-    # The proof needs all bounds until the closest approach, some time after x = 0: gap bounds it, as is checked below.
+    parameter = sun.gravitational_parameter_m3_s2
+    near = motion.nearest_m
+    half, rate = (
+        0.5 * np.linalg.norm(part, axis=0) for part in (difference[:axes], difference[axes:])
+    )
+    # The proof needs all bounds until the closest approach, some time after x = 0: gap bounds it,
+    # as is checked below.
     guess_m = impulses_until(arrival_s) * arrival_s * parameter / near**3 * arrival_s**2
     gap = max(0.5 * step_s, 2.0 * (reach_m + float(half[-1]) + guess_m) / float(closing.min()))
     horizon = arrival_s + gap
     impulses = impulses_until(horizon)
     size = float((half + gap * rate).max()) + 0.5 * disturbance_m_s2 * gap**2
-    nearest = near - motion.speed_m_s * gap - 2.0 * parameter * (gap / near) ** 2 - 2.0 * max(size, impulses * horizon)
+    nearest = (
+        near
+        - motion.speed_m_s * gap
+        - 2.0 * parameter * (gap / near) ** 2
+        - 2.0 * max(size, impulses * horizon)
+    )
     if nearest < 0.5 * near:
         return None
     gradient = parameter / nearest**3
@@ -106,7 +121,9 @@ def gravity_reserve(
     growth = math.cosh(min(math.sqrt(turned), 2.0))
     if growth > 2.0 or gradient * gap**2 > 1.0 / 3.0 or 12.0 * size * (growth - 1.0) > nearest:
         return None
-    distances, speeds = (np.linalg.norm(part, axis=0) for part in (motion.states[:axes], motion.states[axes:]))
+    distances, speeds = (
+        np.linalg.norm(part, axis=0) for part in (motion.states[:axes], motion.states[axes:])
+    )
     between = 3.0 * gradient * float((distances + gap * speeds).max()) * gap
     deviation = 4.0 * gradient * size * horizon + 0.5 * impulses * turned * growth
     lateral = motion.states[axes:-1]
@@ -120,5 +137,9 @@ def gravity_reserve(
     if minimum <= 0.0 or nearer_end + position + float(half[-1]) + reach_m > gap * minimum:
         return None
     late = (nearer_end + 0.5 * position) / minimum
-    drift = late * (2.0 * float(rate[-1]) + speed + (disturbance_m_s2 + 4.0 * gradient * size) * late)
-    return GravityReserve(position, speed, across, minimum, deviation, nearer_m, late, drift, impulses, stretch)
+    drift = late * (
+        2.0 * float(rate[-1]) + speed + (disturbance_m_s2 + 4.0 * gradient * size) * late
+    )
+    return GravityReserve(
+        position, speed, across, minimum, deviation, nearer_m, late, drift, impulses, stretch
+    )

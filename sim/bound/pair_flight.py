@@ -1,4 +1,6 @@
-"""Flight of the two true motions of a lower bound, with any strategy, and the noise that makes them look alike."""
+"""Flight of the two true motions of a lower bound, with any strategy, and the noise that makes them
+look alike.
+"""
 
 from __future__ import annotations
 
@@ -22,10 +24,11 @@ STEPS_BEYOND = 2
 
 
 class PairNoise:
-    """Measurements that are the same for the two truths of a pair up to some step, and exact after it.
+    """Measurements that are the same for the two truths of a pair up to some step, and exact after
+    it.
 
-    Engagements 2k and 2k + 1 of a batch are a pair. Both get the same measurements, so a strategy that uses nothing
-    else acts alike in both.
+    Engagements 2k and 2k + 1 of a batch are a pair. Both get the same measurements, so a strategy
+    that uses nothing else acts alike in both.
 
     Parameters
     ----------
@@ -35,7 +38,8 @@ class PairNoise:
     Attributes
     ----------
     max_share : float
-        Maximum error so far, in units of its bound; at most 1 if all errors are within their bounds.
+        Maximum error so far, in units of its bound; at most 1 if all errors are within their
+        bounds.
     """
 
     def __init__(self, last_common_step: int) -> None:
@@ -46,15 +50,20 @@ class PairNoise:
         """Measure the middle of each pair, or after the last common step the true values."""
         if sight.step > self.last_common_step:
             return {name: sensor.true_value(sight) for name, sensor in sight.sensors.items()}
-        measured = {name: middle(sensor.true_value(sight)) for name, sensor in sight.sensors.items()}
+        measured = {
+            name: middle(sensor.true_value(sight)) for name, sensor in sight.sensors.items()
+        }
         for name, sensor in sight.sensors.items():
-            self.max_share = max(self.max_share, float(np.abs(sensor.error(sight, measured[name])).max()))
+            self.max_share = max(
+                self.max_share, float(np.abs(sensor.error(sight, measured[name])).max())
+            )
         return measured
 
 
 def middle(values: Floats) -> Floats:
     """Return the mean of each pair of neighbours, for both of them; shape (..., B), B even."""
-    first, second = values[..., 0::2], values[..., 1::2]
+    first = values[..., 0::2]
+    second = values[..., 1::2]
     return np.repeat(first + 0.5 * (second - first), 2, axis=-1)
 
 
@@ -78,8 +87,9 @@ def fly_pair(
 ) -> PairFlight:
     """Simulate two motions with the same measurements up to the last common step.
 
-    `strategy` None is the scenario's. The pair replaces the noise of the scenario and the manoeuvre of its target. For
-    every deterministic strategy, the greater one of the two misses is at least `pair.bound_m`.
+    `strategy` None is the scenario's. The pair replaces the noise of the scenario and the manoeuvre
+    of its target. For every deterministic strategy, the greater one of the two misses is at least
+    `pair.bound_m`.
     """
     acceleration_m_s2 = pair.acceleration_m_s2
     nothing = np.zeros((*acceleration_m_s2.shape[:-1], STEPS_BEYOND))

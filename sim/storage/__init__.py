@@ -1,4 +1,6 @@
-"""Campaigns on disk: a manifest, files of runs, one lock. The only package that knows Parquet and pydantic."""
+"""Campaigns on disk: a manifest, files of runs, one lock. The only package that knows Parquet and
+pydantic.
+"""
 
 from infoset.sim.storage.campaign_folder import CampaignFolder, need_free
 from infoset.sim.storage.codec import fingerprint

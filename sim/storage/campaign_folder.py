@@ -9,7 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from infoset.sim.results import Results
-from infoset.sim.storage.files import LOCK, StorageError, is_leftover, locked, reporting, write_whole
+from infoset.sim.storage.files import (
+    LOCK,
+    StorageError,
+    is_leftover,
+    locked,
+    reporting,
+    write_whole,
+)
 from infoset.sim.storage.manifest import MANIFEST, Manifest, read_manifest
 
 if TYPE_CHECKING:
@@ -21,8 +28,8 @@ SHARDS = "shards"
 class CampaignFolder:
     """The stored runs of a campaign or a sweep, finished or not.
 
-    A file is named after its cell and its runs, and is renamed into place once it is complete: the folder needs no list
-    of its files.
+    A file is named after its cell and its runs, and is renamed into place once it is complete: the
+    folder needs no list of its files.
     """
 
     def __init__(self, path: Path, manifest: Manifest) -> None:
@@ -34,10 +41,12 @@ class CampaignFolder:
             self._names = {file.name for file in shards.iterdir()} if shards.is_dir() else set()
 
     def __repr__(self) -> str:
-        manifest, cells = self.manifest, f", {self.manifest.cells} cells" if self.manifest.axes else ""
+        manifest = self.manifest
+        cells = f", {self.manifest.cells} cells" if self.manifest.axes else ""
         return (
-            f"<{manifest.kind} of {manifest.scenario.name} in {self.path}: {manifest.strategy}, {manifest.noise.value} "
-            f"noise, seed {manifest.seed}{cells}, {self.finished_runs} of {self.wanted_runs} runs stored>"
+            f"<{manifest.kind} of {manifest.scenario.name} in {self.path}: {manifest.strategy}, "
+            f"{manifest.noise.value} noise, seed {manifest.seed}{cells}, {self.finished_runs} of "
+            f"{self.wanted_runs} runs stored>"
         )
 
     @classmethod
@@ -73,12 +82,17 @@ class CampaignFolder:
         return self.finished_runs == self.wanted_runs
 
     def runs(self, columns: Sequence[str] | None = None, cell: int | None = None) -> pd.DataFrame:
-        """Return the stored runs, in the order of cells and runs; None is all columns, or all cells.
+        """Return the stored runs, in the order of cells and runs; None is all columns, or all
+        cells.
 
-        Unknown numbers are NaN, unknown flags NA. StorageError, which names the file, if one cannot be read.
+        Unknown numbers are NaN, unknown flags NA. StorageError, which names the file, if one cannot
+        be read.
         """
         chosen = [
-            chunk for number, chunks in enumerate(self.stored_chunks()) if cell in (None, number) for chunk in chunks
+            chunk
+            for number, chunks in enumerate(self.stored_chunks())
+            if cell in (None, number)
+            for chunk in chunks
         ]
         return self.read_chunks(chosen, columns)
 
@@ -103,11 +117,13 @@ class CampaignFolder:
     @classmethod
     @contextlib.contextmanager
     def begin(cls, path: Path, manifest: Manifest, *, resume: bool) -> Iterator[CampaignFolder]:
-        """Start a campaign in a folder, or resume the one in it, and hold the folder's lock until the context ends.
+        """Start a campaign in a folder, or resume the one in it, and hold the folder's lock until
+        the context ends.
 
-        More runs in the `manifest` than in the folder extend the campaign. `resume` is whether the folder may contain
-        this campaign already. StorageError if the folder contains something else or a campaign with different settings,
-        another campaign is running in it, or it cannot be written.
+        More runs in the `manifest` than in the folder extend the campaign. `resume` is whether the
+        folder may contain this campaign already. StorageError if the folder contains something else
+        or a campaign with different settings, another campaign is running in it, or it cannot be
+        written.
         """
         from infoset.sim.storage import tables  # noqa: F401 (fails at once if a library is missing)
 
@@ -147,7 +163,9 @@ class CampaignFolder:
 
 
 def _names(manifest: Manifest) -> set[str]:
-    """Return the names of the files of all chunks, also of those after a rule has stopped their cell."""
+    """Return the names of the files of all chunks, also of those after a rule has stopped their
+    cell.
+    """
     return {_name(*chunk) for chunk in replace(manifest, cell_runs=()).chunks()}
 
 
@@ -162,9 +180,14 @@ def need_free(path: Path, *, resume: bool) -> None:
         if not path.exists():
             return
         if not path.is_dir():
-            raise StorageError(f"{path}: is a file, not a folder; choose another name for the campaign's folder")
+            raise StorageError(
+                f"{path}: is a file, not a folder; choose another name for the campaign's folder"
+            )
         names = {file.name for file in path.iterdir() if not is_leftover(file)} - {LOCK}
     if MANIFEST in names and not resume:
-        raise StorageError(f"{path}: contains a campaign already; continue it with --resume, or choose another folder")
+        raise StorageError(
+            f"{path}: contains a campaign already; continue it with --resume, or choose another "
+            "folder"
+        )
     if names and MANIFEST not in names:
         raise StorageError(f"{path}: is not empty, and contains no campaign; choose another folder")

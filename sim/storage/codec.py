@@ -1,4 +1,6 @@
-"""Frozen dataclasses as JSON and back, strictly: the one codec of manifests, record headers and fingerprints."""
+"""Frozen dataclasses as JSON and back, strictly: the one codec of manifests, record headers and
+fingerprints.
+"""
 
 from __future__ import annotations
 
@@ -16,15 +18,22 @@ _STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
 @functools.cache
 def adapter(kind: Hashable) -> TypeAdapter[Any]:
-    """Return the reader and writer of a tuple with one dataclass, which takes no values but those of its fields."""
+    """Return the reader and writer of a tuple with one dataclass, which takes no values but those
+    of its fields.
+    """
     return TypeAdapter(tuple[kind], config=_STRICT)  # type: ignore[valid-type]  # pydantic takes no config for a dataclass
 
 
 def to_json(value: Any) -> dict[str, Any]:
-    """Return a dataclass as JSON values: enumerations by value, a number as the type of its field."""
-    # `dump_json` would replace a KeyboardInterrupt by another error. The fallback is for NumPy's integers.
+    """Return a dataclass as JSON values: enumerations by value, a number as the type of its
+    field.
+    """
+    # `dump_json` would replace a KeyboardInterrupt by another error. The fallback is for NumPy's
+    # integers.
     codec = adapter(value.__class__)
-    values = codec.dump_python((value,), mode="json", warnings=False, fallback=lambda each: each.item())
+    values = codec.dump_python(
+        (value,), mode="json", warnings=False, fallback=lambda each: each.item()
+    )
     (made,) = codec.validate_json(json.dumps(values))
     (plain,) = codec.dump_python((made,), mode="json")
     return dict(plain)
@@ -33,8 +42,9 @@ def to_json(value: Any) -> dict[str, Any]:
 def from_json(kind: Callable[..., Kind], value: object) -> Kind:
     """Return a dataclass from its JSON values.
 
-    A ValueError is raised if a key is missing or unknown, or a value is not of its field's type; the message names the
-    key. Text with control characters, which could steer a terminal, is refused too.
+    A ValueError is raised if a key is missing or unknown, or a value is not of its field's type;
+    the message names the key. Text with control characters, which could steer a terminal, is
+    refused too.
     """
     if not all(map(str.isprintable, _texts(value))):
         raise ValueError("contains text with control characters")
@@ -66,7 +76,9 @@ def fingerprint(value: Any) -> str:
 
     16 hexadecimal digits, the same for equal values on every machine.
     """
-    values = _exact({key: inner for key, inner in to_json(value).items() if key not in ("name", "description")})
+    values = _exact(
+        {key: inner for key, inner in to_json(value).items() if key not in ("name", "description")}
+    )
     return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
 

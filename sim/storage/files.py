@@ -16,15 +16,18 @@ _TEMPORARY = ".infoset-"
 
 
 class StorageError(Exception):
-    """The folder of a campaign cannot be used; the message gives the problem, the folder or file, and a remedy."""
+    """The folder of a campaign cannot be used; the message gives the problem, the folder or file,
+    and a remedy.
+    """
 
 
 def replace_file(file: Path, content: bytes) -> None:
-    """Write a file atomically: if the process or the machine stops, the file is complete or unchanged.
+    """Write a file atomically: if the process or the machine stops, the file is complete or
+    unchanged.
 
-    The content is written to a temporary file in the same folder and flushed to the disk; then the file is renamed,
-    which is atomic, and the folder is flushed so that the new name is on the disk too. Raises `OSError`; the file is
-    then unchanged.
+    The content is written to a temporary file in the same folder and flushed to the disk; then the
+    file is renamed, which is atomic, and the folder is flushed so that the new name is on the disk
+    too. Raises `OSError`; the file is then unchanged.
     """
     temporary = file.parent / f"{_TEMPORARY}{os.getpid()}-{secrets.token_hex(4)}.tmp"
     try:
@@ -51,19 +54,25 @@ def write_whole(file: Path, content: bytes) -> None:
 
 
 def is_leftover(file: Path) -> bool:
-    """Whether a file is a temporary one of `replace_file`, whose process may have died while writing."""
+    """Whether a file is a temporary one of `replace_file`, whose process may have died while
+    writing.
+    """
     return file.name.startswith(_TEMPORARY) and file.suffix == ".tmp"
 
 
 @contextlib.contextmanager
 def reporting(path: Path) -> Iterator[None]:
-    """Raise an `OSError` during reading or writing of `path` as a StorageError with a message for the user."""
+    """Raise an `OSError` during reading or writing of `path` as a StorageError with a message for
+    the user.
+    """
     try:
         yield
     except OSError as error:
         remedy = "check the folder and the disk"
         if error.errno in (errno.ENOSPC, errno.EDQUOT):
-            remedy = "the files in the folder are complete: free some space and run again with --resume"
+            remedy = (
+                "the files in the folder are complete: free some space and run again with --resume"
+            )
         raise StorageError(f"{path}: {error.strerror or error}; {remedy}") from None
 
 
@@ -71,8 +80,8 @@ def reporting(path: Path) -> Iterator[None]:
 def locked(folder: Path) -> Iterator[None]:
     """Hold the lock of a folder; StorageError if another campaign holds it.
 
-    The lock ends with the process at the latest. A forked child would keep the lock after its parent has ended: use
-    process pools that spawn.
+    The lock ends with the process at the latest. A forked child would keep the lock after its
+    parent has ended: use process pools that spawn.
     """
     with contextlib.ExitStack() as stack:
         with reporting(folder / LOCK):
@@ -80,6 +89,7 @@ def locked(folder: Path) -> Iterator[None]:
                 stack.enter_context(FileLock(folder / LOCK, timeout=0))
             except Timeout:
                 raise StorageError(
-                    f"{folder}: another campaign is running in this folder; wait for it, or choose another folder"
+                    f"{folder}: another campaign is running in this folder; wait for it, or choose "
+                    "another folder"
                 ) from None
         yield

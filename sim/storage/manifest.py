@@ -1,4 +1,6 @@
-"""The manifest of a campaign: all that determines its numbers, so that it can be resumed, read and repeated."""
+"""The manifest of a campaign: all that determines its numbers, so that it can be resumed, read and
+repeated.
+"""
 
 from __future__ import annotations
 
@@ -53,7 +55,8 @@ class Axis:
 
 @dataclass(frozen=True, kw_only=True)
 class Manifest:
-    """All that determines the numbers of a campaign or a sweep, its progress, and its division into chunks.
+    """All that determines the numbers of a campaign or a sweep, its progress, and its division into
+    chunks.
 
     A ValueError is raised if there are too many cells, or `cell_runs` does not fit.
 
@@ -72,17 +75,21 @@ class Manifest:
     scenario : Scenario
         Scenario; for a sweep the one that is varied.
     own_noise : str or None
-        Name of the user's own noise, like that of a strategy in a Python file; None is a noise of `CampaignNoise`.
+        Name of the user's own noise, like that of a strategy in a Python file; None is a noise of
+        `CampaignNoise`.
     strategy : str
-        Name; for a strategy in a Python file with the hash of the file: `mine.py:Mine sha256:0123456789abcdef`.
+        Name; for a strategy in a Python file with the hash of the file: `mine.py:Mine
+        sha256:0123456789abcdef`.
     chunk : int
         Engagements per file; the last file of a cell may have fewer. Results do not depend on it.
     axes : tuple of Axis
-        Keys that a sweep varies, in all combinations of values; the last varies fastest. Empty for a campaign.
+        Keys that a sweep varies, in all combinations of values; the last varies fastest. Empty for
+        a campaign.
     cells_hash : str
         Fingerprint of the scenarios of a sweep's cells; empty for a campaign.
     versions : mapping of str to str
-        Versions of the packages and of Python in the first session; only the latter may differ later.
+        Versions of the packages and of Python in the first session; only the latter may differ
+        later.
     """
 
     runs: Annotated[int, COUNT]
@@ -103,7 +110,9 @@ class Manifest:
 
     def __post_init__(self) -> None:
         if self.cells > MAX_CELLS:
-            raise ValueError(f"axes make {self.cells} cells, more than the {MAX_CELLS} that a sweep may have")
+            raise ValueError(
+                f"axes make {self.cells} cells, more than the {MAX_CELLS} that a sweep may have"
+            )
         if self.cell_runs and len(self.cell_runs) != self.cells:
             raise ValueError(f"cell_runs must contain {self.cells} numbers")
 
@@ -114,7 +123,9 @@ class Manifest:
 
     @property
     def is_watched(self) -> bool:
-        """Whether the number of runs of a sweep may depend on its results (`infoset.sim.requirement.judge`)."""
+        """Whether the number of runs of a sweep may depend on its results
+        (`infoset.sim.requirement.judge`).
+        """
         return bool(self.axes) and (self.extended or self.until is not None)
 
     @property
@@ -128,11 +139,15 @@ class Manifest:
         return self.cell_runs[0] if self.cell_runs and not self.axes else None
 
     def wanted_runs(self, cell: int) -> int:
-        """Return the engagements of a cell that belong to the result: fewer than `runs` where a rule stopped it."""
+        """Return the engagements of a cell that belong to the result: fewer than `runs` where a
+        rule stopped it.
+        """
         return self.cell_runs[cell] if self.cell_runs else self.runs
 
     def chunks(self) -> Iterator[tuple[int, range]]:
-        """Yield the cell and the runs of each chunk of the result: the first chunk of each cell, then the second."""
+        """Yield the cell and the runs of each chunk of the result: the first chunk of each cell,
+        then the second.
+        """
         for first in range(0, self.runs, self.chunk):
             for cell in range(self.cells):
                 if first < self.wanted_runs(cell):
@@ -156,11 +171,13 @@ class Manifest:
         return hashlib.sha256(json.dumps(self.decisive(), sort_keys=True).encode()).hexdigest()[:32]
 
     def continued(self, wanted: Manifest, folder: Path) -> Manifest:
-        """Return the manifest of this campaign, resumed as the `wanted` one, perhaps with more runs or another rule.
+        """Return the manifest of this campaign, resumed as the `wanted` one, perhaps with more runs
+        or another rule.
 
         Raise StorageError, with all differences, if they are different campaigns.
         """
-        there, here = self.decisive(), wanted.decisive()
+        there = self.decisive()
+        here = wanted.decisive()
         lines = [
             f"\n  {key}: {_shown(there, key)} in the folder, {_shown(here, key)} now"
             for key in dict.fromkeys((*there, *here))
@@ -168,18 +185,20 @@ class Manifest:
         ]
         if lines:
             raise StorageError(
-                f"{folder}: contains a campaign with different settings; repeat the command with those of the folder, "
-                f"or choose another folder:{''.join(lines)}"
+                f"{folder}: contains a campaign with different settings; repeat the command with "
+                f"those of the folder, or choose another folder:{''.join(lines)}"
             )
         if wanted.runs < self.runs:
             option = "--max-runs" if wanted.axes and wanted.until else "--runs"
             raise StorageError(
-                f"{folder}: the {self.kind} in this folder has {self.runs} runs, more than {option} {wanted.runs}; "
-                f"give {option} {self.runs} or more"
+                f"{folder}: the {self.kind} in this folder has {self.runs} runs, more than "
+                f"{option} {wanted.runs}; give {option} {self.runs} or more"
             )
         is_same = wanted.runs == self.runs and wanted.until == self.until
         # Once the number of runs may depend on the results, it may in all later sessions.
-        grows = bool(self.axes) and (self.is_watched or wanted.is_watched or wanted.runs > self.runs)
+        grows = bool(self.axes) and (
+            self.is_watched or wanted.is_watched or wanted.runs > self.runs
+        )
         return replace(
             wanted,
             versions=self.versions,
@@ -201,22 +220,25 @@ def read_manifest(folder: Path) -> Manifest:
     file = folder / MANIFEST
     if not file.is_file():
         raise StorageError(
-            f"{folder}: contains no campaign and no sweep (no file {MANIFEST}); name a folder of infoset campaign or "
-            "infoset sweep"
+            f"{folder}: contains no campaign and no sweep (no file {MANIFEST}); name a folder of "
+            "infoset campaign or infoset sweep"
         )
     try:
         with reporting(file):
             return _parsed(file.read_bytes())
     except (ValueError, RecursionError) as error:
         raise StorageError(
-            f"{file}: is not a readable manifest: {str(error)[:300]}; restore it from a copy, or use a new folder"
+            f"{file}: is not a readable manifest: {str(error)[:300]}; restore it from a copy, or "
+            "use a new folder"
         ) from None
 
 
 def _parsed(content: bytes) -> Manifest:
     value = json.loads(content)
     if not isinstance(value, dict) or value.pop("schema", None) != SCHEMA:
-        raise ValueError(f"schema: must be {SCHEMA}, the only one that this version of infoset reads")
+        raise ValueError(
+            f"schema: must be {SCHEMA}, the only one that this version of infoset reads"
+        )
     return from_json(Manifest, value)
 
 

@@ -1,4 +1,6 @@
-"""Files of runs: written as Arrow tables, read as pandas frames. The one module that imports pyarrow."""
+"""Files of runs: written as Arrow tables, read as pandas frames. The one module that imports
+pyarrow.
+"""
 
 from __future__ import annotations
 
@@ -31,28 +33,39 @@ def _type(column: Column) -> pa.DataType:
 
 
 SCHEMA = pa.schema(
-    pa.field(column.name, _type(column), column.nullable, {"unit": column.unit, "meaning": column.meaning})
+    pa.field(
+        column.name,
+        _type(column),
+        column.nullable,
+        {"unit": column.unit, "meaning": column.meaning},
+    )
     for column in _COLUMNS
 )
 
 
-def to_bytes(results: Results, cell: int, noise: CampaignNoise, metadata: Mapping[str, str]) -> bytes:
+def to_bytes(
+    results: Results, cell: int, noise: CampaignNoise, metadata: Mapping[str, str]
+) -> bytes:
     """Return results of a cell as a Parquet file, with `metadata` in its schema."""
     values = {column.name: values_of(results, column) for column in columns_of(Results)}
     values["cell"] = [cell] * len(results)
     values["noise"] = [noise.of_run(run).value for run in results.runs.tolist()]
     table = pa.table(values, SCHEMA.with_metadata(metadata))
     sink = pa.BufferOutputStream()
-    texts = [field.name for field in SCHEMA if pa.types.is_dictionary(field.type)]  # random numbers do not repeat
+    texts = [
+        field.name for field in SCHEMA if pa.types.is_dictionary(field.type)
+    ]  # random numbers do not repeat
     pq.write_table(table, sink, compression="zstd", use_dictionary=texts, write_page_checksum=True)
     return bytes(sink.getvalue().to_pybytes())
 
 
-def read(files: Mapping[Path, Mapping[str, str]], columns: Sequence[str] | None = None) -> pd.DataFrame:
+def read(
+    files: Mapping[Path, Mapping[str, str]], columns: Sequence[str] | None = None
+) -> pd.DataFrame:
     """Return some columns of all files, one after the other; None is all columns.
 
-    Each file must have the schema and its metadata in `files`. A StorageError, which names the file, is raised if one
-    cannot be read or has others.
+    Each file must have the schema and its metadata in `files`. A StorageError, which names the
+    file, is raised if one cannot be read or has others.
     """
     names = SCHEMA.names if columns is None else list(columns)
     parts = [pa.schema([SCHEMA.field(name) for name in names]).empty_table()]
@@ -61,12 +74,15 @@ def read(files: Mapping[Path, Mapping[str, str]], columns: Sequence[str] | None 
             parts.append(_table(file, metadata, names))
         except (pa.ArrowException, OSError, ValueError) as error:
             raise StorageError(
-                f"{file}: cannot be read: {str(error)[:200]}; delete it, and simulate its runs again with --resume"
+                f"{file}: cannot be read: {str(error)[:200]}; delete it, and simulate its runs "
+                "again with --resume"
             ) from None
     table = pa.concat_tables(parts)
     # Without other references, the memory of each column is free once pandas has its copy.
     parts.clear()
-    frame = table.to_pandas(types_mapper={pa.bool_(): pd.BooleanDtype()}.get, split_blocks=True, self_destruct=True)
+    frame = table.to_pandas(
+        types_mapper={pa.bool_(): pd.BooleanDtype()}.get, split_blocks=True, self_destruct=True
+    )
     # Arrow keeps freed memory, here as much as that of the frame.
     pa.default_memory_pool().release_unused()
     return frame
@@ -76,6 +92,8 @@ def _table(file: Path, metadata: Mapping[str, str], names: Sequence[str]) -> pa.
     # A dataset of pyarrow reads the same, and takes twice as long for each file.
     with pq.ParquetFile(file, page_checksum_verification=True) as stored:
         found = stored.schema_arrow
-        if not found.equals(SCHEMA) or found.metadata != {k.encode(): v.encode() for k, v in metadata.items()}:
+        if not found.equals(SCHEMA) or found.metadata != {
+            k.encode(): v.encode() for k, v in metadata.items()
+        }:
             raise ValueError("it is no file of runs of this campaign")
         return stored.read(names)

@@ -1,6 +1,7 @@
 """A real, headless Chromium for the pages, where there is one.
 
-Needs a Chromium of the system and the extra `browser`. Screenshots go to the folder that INFOSET_SCREENSHOTS names.
+Needs a Chromium of the system and the extra `browser`. Screenshots go to the folder that
+INFOSET_SCREENSHOTS names.
 """
 
 from __future__ import annotations
@@ -36,8 +37,13 @@ def browser() -> Iterator[Any]:
     """A headless Chromium; a test that needs it is skipped where there is none."""
     program = next(filter(None, map(shutil.which, NAMES)), None)
     if program is None:
-        pytest.skip(f"needs a Chromium: none of {', '.join(NAMES)} is on the path (Debian: apt-get install chromium)")
-    playwright = pytest.importorskip("playwright.sync_api", reason="needs the extra browser: pip install '.[browser]'")
+        pytest.skip(
+            f"needs a Chromium: none of {', '.join(NAMES)} is on the path (Debian: apt-get install "
+            "chromium)"
+        )
+    playwright = pytest.importorskip(
+        "playwright.sync_api", reason="needs the extra browser: pip install '.[browser]'"
+    )
     with playwright.sync_playwright() as driver:
         # Root, as whom containers run, has no sandbox; the pages are ours.
         found = driver.chromium.launch(executable_path=program, args=["--no-sandbox"])
@@ -67,7 +73,9 @@ class Opened:
         return str(self.page.locator(".player output").inner_text())
 
     def until(self, expression: str, seconds: float = 60.0) -> None:
-        """Wait until an expression of the page is true; the driver's own waiting needs eval, which pages forbid."""
+        """Wait until an expression of the page is true; the driver's own waiting needs eval, which
+        pages forbid.
+        """
         end = monotonic() + seconds
         while not self.page.evaluate(expression):
             assert monotonic() < end, f"{expression} was not true within {seconds} s"
@@ -79,10 +87,13 @@ class Opened:
         return str(self.page.locator("#tip").inner_text())
 
     def point_at(self, canvas: str, place: str) -> None:
-        """Move the pointer to a place on a canvas; both are expressions of the page, the place in its pixels."""
+        """Move the pointer to a place on a canvas; both are expressions of the page, the place in
+        its pixels.
+        """
         self.page.evaluate(f"{canvas}.canvas.scrollIntoView({{block: 'center'}})")
         box = self.page.evaluate(
-            f"(() => {{ const b = {canvas}.canvas.getBoundingClientRect(); return [b.left, b.top]; }})()"
+            f"(() => {{ const b = {canvas}.canvas.getBoundingClientRect(); return [b.left, b.top]; "
+            f"}})()"
         )
         x, y = self.page.evaluate(place)
         self.page.mouse.move(box[0] + x, box[1] + y)
@@ -95,14 +106,18 @@ def numbers(text: str) -> list[float]:
 
 @pytest.fixture
 def open_page(browser: Any, tmp_path: Path) -> Iterator[Callable[..., Opened]]:
-    """Open a page's HTML as a file; afterwards, there must have been no message, no error and no request."""
+    """Open a page's HTML as a file; afterwards, there must have been no message, no error and no
+    request.
+    """
     opened: list[Opened] = []
     contexts: list[Any] = []
 
     def opener(html: str, width: int = 1300, scheme: str = "light") -> Opened:
         file = tmp_path / f"page-{len(opened)}.html"
         file.write_text(html, encoding="utf-8")
-        contexts.append(browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme))
+        contexts.append(
+            browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme)
+        )
         each = Opened(contexts[-1].new_page())
         each.page.on("console", lambda message: each.console.append(message.text))
         each.page.on("pageerror", lambda error: each.console.append(str(error)))

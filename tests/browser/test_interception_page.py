@@ -14,7 +14,8 @@ from infoset.sim import Record
 from tests.browser.conftest import Opened, numbers
 
 Open = Callable[..., Opened]
-STEP, MEASURED = 120, 4 * 120 + 1
+STEP = 120
+MEASURED = 4 * 120 + 1
 SIX_DIGITS = 5e-6
 
 
@@ -30,7 +31,8 @@ def pair(records: list[Record]) -> str:
 
 def test_slider_and_keys_move_the_time(open_page: Open, single: str, records: list[Record]) -> None:
     opened = open_page(single)
-    page, last = opened.page, 4 * records[1].steps - 1
+    page = opened.page
+    last = 4 * records[1].steps - 1
     assert opened.shown_at() == "t = 0 s, before the measurement"
     page.keyboard.press("ArrowRight")
     assert opened.shown_at() == "t = 0 s, after the measurement"
@@ -71,7 +73,9 @@ def test_it_plays_and_pauses(open_page: Open, single: str) -> None:
     opened.until("player.playing && player.frame < 100")  # from the start again
 
 
-def test_hover_shows_the_records_numbers(open_page: Open, single: str, records: list[Record]) -> None:
+def test_hover_shows_the_records_numbers(
+    open_page: Open, single: str, records: list[Record]
+) -> None:
     opened = open_page(single)
     record = records[1]
     time_s = float(record.time_s[STEP])
@@ -104,7 +108,9 @@ def test_hover_shows_the_records_numbers(open_page: Open, single: str, records: 
     assert range_km == pytest.approx(record.true_range_m[STEP] / 1e3, rel=SIX_DIGITS)
 
 
-def test_outlines_are_the_records_within_a_pixel(open_page: Open, single: str, records: list[Record]) -> None:
+def test_outlines_are_the_records_within_a_pixel(
+    open_page: Open, single: str, records: list[Record]
+) -> None:
     opened = open_page(single)
     for step in (0, 50, STEP, 200):
         opened.page.evaluate(f"player.show({4 * step + 1})")
@@ -113,45 +119,65 @@ def test_outlines_are_the_records_within_a_pixel(open_page: Open, single: str, r
         assert [len(outline) for outline in found] == [len(outline) for outline in recorded]
         for outline, wanted in zip(found, recorded, strict=True):
             width = wanted.max(axis=0) - wanted.min(axis=0)
-            assert (np.abs(np.array(outline) - wanted) <= 1e-5 * width + 1e-15 * np.abs(wanted)).all()
+            assert (
+                np.abs(np.array(outline) - wanted) <= 1e-5 * width + 1e-15 * np.abs(wanted)
+            ).all()
 
 
-def test_the_stages_follow_from_each_other(open_page: Open, single: str, records: list[Record]) -> None:
+def test_the_stages_follow_from_each_other(
+    open_page: Open, single: str, records: list[Record]
+) -> None:
     opened = open_page(single)
     impulse_m_s = records[1].impulse_m_s[STEP, 0]
     extents = []
     for stage in range(4):
         opened.page.evaluate(f"player.show({4 * STEP + stage})")
         extents.append(
-            opened.page.evaluate("columns[0].sections.map(({ label, range, box }) => [label, range, ...box])")
+            opened.page.evaluate(
+                "columns[0].sections.map(({ label, range, box }) => [label, range, ...box])"
+            )
         )
     before, measured, fired, predicted = (np.array(each) for each in extents)
     after = np.array([each for each in before if each[0] in measured[:, 0]])
-    assert (after[:, 2] <= measured[:, 2] + 1e-15).all()  # a measurement takes away, and adds nothing
+    assert (
+        after[:, 2] <= measured[:, 2] + 1e-15
+    ).all()  # a measurement takes away, and adds nothing
     assert (after[:, 4] >= measured[:, 4] - 1e-15).all()
     assert impulse_m_s != 0.0
-    np.testing.assert_allclose(fired[:, 2], measured[:, 2] - impulse_m_s / measured[:, 1], rtol=1e-12)
+    np.testing.assert_allclose(
+        fired[:, 2], measured[:, 2] - impulse_m_s / measured[:, 1], rtol=1e-12
+    )
     model = records[1].scenario.set_model
     nearer = model.closing_speed_m_s * model.step_s
     np.testing.assert_allclose(predicted[:, 1], fired[-len(predicted) :, 1] - nearer, rtol=1e-12)
 
 
-def test_two_records_side_by_side(open_page: Open, pair: str, records: list[Record], screenshots: Path) -> None:
+def test_two_records_side_by_side(
+    open_page: Open, pair: str, records: list[Record], screenshots: Path
+) -> None:
     opened = open_page(pair)
     page = opened.page
     page.evaluate(f"player.show({MEASURED})")
     titles = page.locator("h2").all_inner_texts()
     assert titles == ["(a) random noise, range sensor", "(b) game noise, range sensor"]
     left, right = (
-        page.evaluate(f"columns[{k}].plane.canvas.getBoundingClientRect().left") for k in range(len(records))
+        page.evaluate(f"columns[{k}].plane.canvas.getBoundingClientRect().left")
+        for k in range(len(records))
     )
     assert right > left + 400
     for column, record in enumerate(records):
         rows = dict(
-            zip(*[iter(page.locator("table").nth(column).locator("th, td").all_inner_texts())] * 2, strict=True)
+            zip(
+                *[iter(page.locator("table").nth(column).locator("th, td").all_inner_texts())] * 2,
+                strict=True,
+            )
         )
-        assert numbers(rows["predicted miss"]) == pytest.approx(record.predicted_miss_m[STEP, 0], rel=SIX_DIGITS)
-        assert numbers(rows["true range"]) == pytest.approx([record.true_range_m[STEP] / 1e3], rel=SIX_DIGITS)
+        assert numbers(rows["predicted miss"]) == pytest.approx(
+            record.predicted_miss_m[STEP, 0], rel=SIX_DIGITS
+        )
+        assert numbers(rows["true range"]) == pytest.approx(
+            [record.true_range_m[STEP] / 1e3], rel=SIX_DIGITS
+        )
     assert page.evaluate("columns[0].limits === columns[1].limits")
     page.get_by_label("Axes").select_option("each its own")
     assert page.evaluate("columns[0].limits.rates[1] < columns[1].limits.rates[1]")
@@ -165,7 +191,9 @@ CLOSING = "</script><script>alert(2)</script>\u2028<!--<script>"
 def test_html_in_names_is_text(open_page: Open, records: list[Record], screenshots: Path) -> None:
     record = records[0]
     scenario = replace(record.scenario, name=HOSTILE, description=CLOSING)
-    bad = replace(record, scenario=scenario, strategy=f"{HOSTILE}&amp;", noise=f"{CLOSING}{HOSTILE}")
+    bad = replace(
+        record, scenario=scenario, strategy=f"{HOSTILE}&amp;", noise=f"{CLOSING}{HOSTILE}"
+    )
     html = interception_page([bad, records[1]])
     assert HOSTILE not in html
     assert CLOSING not in html
@@ -190,6 +218,8 @@ def test_the_policy_stops_what_is_not_the_pages_own(open_page: Open, single: str
     fetched = opened.page.evaluate("fetch('https://example.org/').then(() => 1, () => 0)")
     assert fetched == 0
     assert len(opened.console) >= 2
-    assert all("Content Security Policy" in message or "Fetch" in message for message in opened.console)
+    assert all(
+        "Content Security Policy" in message or "Fetch" in message for message in opened.console
+    )
     opened.console.clear()
     opened.requests[:] = opened.requests[:1]

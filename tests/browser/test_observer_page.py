@@ -18,11 +18,15 @@ HOSTILE = "<img src=x onerror=alert(1)>"
 
 
 def observed(name: str, *settings: str) -> Report:
-    return COMMAND.report(Observe(problem=name, settings=[*settings], errors=Errors.UNIFORM, smooth=True))
+    return COMMAND.report(
+        Observe(problem=name, settings=[*settings], errors=Errors.UNIFORM, smooth=True)
+    )
 
 
 @pytest.mark.parametrize("name", ["vehicle", "observer-2005"])
-def test_keys_and_slider_step_through_the_sets(open_page: Open, screenshots: Path, name: str) -> None:
+def test_keys_and_slider_step_through_the_sets(
+    open_page: Open, screenshots: Path, name: str
+) -> None:
     report = observed(name)
     last = len(report.estimates) - 1
     for width, scheme in ((1300, "light"), (390, "dark")):

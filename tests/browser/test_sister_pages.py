@@ -78,7 +78,8 @@ def test_slider_and_keys_move_the_time_wide_and_narrow(
 
 @pytest.mark.parametrize("name", OPTIONS)
 def test_html_in_names_is_text(open_page: Open, reports: dict[str, Any], name: str) -> None:
-    report, owner = reports[name], "rendezvous" if name == "reach" else "problem"
+    report = reports[name]
+    owner = "rendezvous" if name == "reach" else "problem"
     problem = replace(getattr(report, owner), description=CLOSING)
     object.__setattr__(problem, "name", f"{HOSTILE}{CLOSING}")  # a file may not have this name
     worse = replace(report, **{owner: problem})
@@ -98,27 +99,36 @@ def test_html_in_names_is_text(open_page: Open, reports: dict[str, Any], name: s
     assert opened.page.evaluate("document.images.length") == 0
 
 
-def test_live_numbers_of_a_meeting(open_page: Open, pages: dict[str, str], reports: dict[str, Any]) -> None:
+def test_live_numbers_of_a_meeting(
+    open_page: Open, pages: dict[str, str], reports: dict[str, Any]
+) -> None:
     opened = open_page(pages["pareto"])
-    page, solution = opened.page, reports["pareto"].solution
+    page = opened.page
+    solution = reports["pareto"].solution
 
     def check() -> None:
         point = np.array(page.evaluate("point"))
         shown = rows(opened, 0)
         values = {name: numbers(text)[0] for name, text in shown.items()}
-        assert values["group loss"] == pytest.approx(float(solution.group_loss(point)), rel=SIX_DIGITS)
+        assert values["group loss"] == pytest.approx(
+            float(solution.group_loss(point)), rel=SIX_DIGITS
+        )
         for cost, whole, excess in zip(
             solution.costs, solution.cost_squared(point), solution.excess(point), strict=True
         ):
             assert values[f"J² of {cost.craft.name}"] == pytest.approx(whole, rel=SIX_DIGITS)
             assert values[f"excess of {cost.craft.name}"] == pytest.approx(excess, rel=SIX_DIGITS)
-        for index, each in enumerate(page.evaluate("panels[0].view.tracks.map(({ points }) => points)")):
+        for index, each in enumerate(
+            page.evaluate("panels[0].view.tracks.map(({ points }) => points)")
+        ):
             plan = solution.plan(index, point)
             flown = plan.state(plan.times(121))[:, :3]
             np.testing.assert_allclose(each, flown, rtol=1e-9, atol=1e-9 * np.abs(flown).max())
 
     check()
-    box = page.evaluate("(() => { const b = panel.canvas.getBoundingClientRect(); return [b.left, b.top]; })()")
+    box = page.evaluate(
+        "(() => { const b = panel.canvas.getBoundingClientRect(); return [b.left, b.top]; })()"
+    )
     x, y = page.evaluate("[panel.across(point[0]), panel.up(point[1])]")
     page.mouse.move(box[0] + x, box[1] + y)
     page.mouse.down()
@@ -137,14 +147,18 @@ def test_live_numbers_of_a_meeting(open_page: Open, pages: dict[str, str], repor
     check()
 
 
-def test_hover_in_a_pursuit_shows_its_numbers(open_page: Open, pages: dict[str, str], reports: dict[str, Any]) -> None:
+def test_hover_in_a_pursuit_shows_its_numbers(
+    open_page: Open, pages: dict[str, str], reports: dict[str, Any]
+) -> None:
     opened = open_page(pages["pursuit"])
     opened.page.evaluate("player.show(120)")
     sampled = history(reports["pursuit"].solution, 301)
     apart = np.linalg.norm(sampled.pursuer.position_m - sampled.evader.position_m, axis=1)
     opened.point_at("panels[4].panel", "[panels[4].panel.across(panels[4].times[120]), 60]")
     time, distance_km = numbers(opened.tip())
-    assert [time, distance_km * 1e3] == pytest.approx([sampled.time_s[120], apart[120]], rel=SIX_DIGITS)
+    assert [time, distance_km * 1e3] == pytest.approx(
+        [sampled.time_s[120], apart[120]], rel=SIX_DIGITS
+    )
     axes = orbital_axes(sampled.evader.position_m, sampled.evader.velocity_m_s)[120]
     outward, along, normal = axes @ (sampled.pursuer.position_m - sampled.evader.position_m)[120]
     opened.point_at("panels[1].panel", "panels[1].place(DATA.views[1].tracks[0].points[120])")
@@ -155,7 +169,9 @@ def test_hover_in_a_pursuit_shows_its_numbers(open_page: Open, pages: dict[str, 
     assert np.array(seen_km) * 1e3 == pytest.approx([outward, along, normal], rel=SIX_DIGITS)
 
 
-def test_visits_end_at_their_targets(open_page: Open, pages: dict[str, str], reports: dict[str, Any]) -> None:
+def test_visits_end_at_their_targets(
+    open_page: Open, pages: dict[str, str], reports: dict[str, Any]
+) -> None:
     opened = open_page(pages["multipoint"])
     path = reports["multipoint"].path
     for time_s, state in zip(path.nodes.arrive_s.tolist(), path.arrival_states, strict=True):
@@ -174,12 +190,15 @@ def test_the_tube_holds_the_flights_and_a_control_can_be_chosen(
     open_page: Open, pages: dict[str, str], reports: dict[str, Any]
 ) -> None:
     opened = open_page(pages["reach"])
-    page, report = opened.page, reports["reach"]
+    page = opened.page
+    report = reports["reach"]
     periods = report.rendezvous.problem.periods
     for t in range(1, periods):
         page.evaluate(f"player.show({24 * t})")
         assert page.evaluate("DATA.views[0].sets.of_frame[player.frame]") == t
-        corners = np.array([each for face in page.evaluate(f"DATA.views[0].sets.faces[{t}]") for each in face])
+        corners = np.array(
+            [each for face in page.evaluate(f"DATA.views[0].sets.faces[{t}]") for each in face]
+        )
         np.testing.assert_allclose(corners.min(axis=0), report.tube[t, :3, 0], rtol=1e-6, atol=1e-3)
         np.testing.assert_allclose(corners.max(axis=0), report.tube[t, :3, 1], rtol=1e-6, atol=1e-3)
     page.get_by_role("combobox", name="Control").select_option("l1")

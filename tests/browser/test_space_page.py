@@ -20,7 +20,8 @@ from tests.browser.conftest import Opened, numbers
 
 Open = Callable[..., Opened]
 STEP = 120
-MEASURED, IMPULSE = 4 * STEP + 1, 4 * STEP + 2
+MEASURED = 4 * STEP + 1
+IMPULSE = 4 * STEP + 2
 SIX_DIGITS = 5e-6
 AXES = ("y", "z")
 
@@ -36,7 +37,9 @@ def page(space: list[Record]) -> str:
     return interception_page(space[1:])
 
 
-def test_both_planes_show_the_sections_of_the_record(open_page: Open, page: str, space: list[Record]) -> None:
+def test_both_planes_show_the_sections_of_the_record(
+    open_page: Open, page: str, space: list[Record]
+) -> None:
     opened = open_page(page)
     opened.page.evaluate(f"player.show({MEASURED})")
     captions = opened.page.locator("figcaption").all_inner_texts()
@@ -48,10 +51,14 @@ def test_both_planes_show_the_sections_of_the_record(open_page: Open, page: str,
         assert len(found) == len(polygons)
         for outline, polygon in zip(found, polygons, strict=True):
             wanted = polygon.polygon()
-            np.testing.assert_allclose(outline, wanted, rtol=0.0, atol=1e-5 * np.ptp(wanted, axis=0).max())
+            np.testing.assert_allclose(
+                outline, wanted, rtol=0.0, atol=1e-5 * np.ptp(wanted, axis=0).max()
+            )
 
 
-def test_the_b_plane_shows_the_predicted_misses_of_the_record(open_page: Open, page: str, space: list[Record]) -> None:
+def test_the_b_plane_shows_the_predicted_misses_of_the_record(
+    open_page: Open, page: str, space: list[Record]
+) -> None:
     opened = open_page(page)
     opened.page.evaluate(f"player.show({MEASURED})")
     panel = "engagements[0].joint[0]"
@@ -68,7 +75,9 @@ def test_the_b_plane_shows_the_predicted_misses_of_the_record(open_page: Open, p
     for (low, high), (minimum, maximum) in zip(limits, ends, strict=True):
         assert low < minimum * factor
         assert high > maximum * factor
-    pixels = opened.page.evaluate(f"(({{ left, right, top, bottom }}) => [right - left, bottom - top])({panel}.chart)")
+    pixels = opened.page.evaluate(
+        f"(({{ left, right, top, bottom }}) => [right - left, bottom - top])({panel}.chart)"
+    )
     scale = [(high - low) / length for (low, high), length in zip(limits, pixels, strict=True)]
     assert scale[0] == pytest.approx(scale[1])
 
@@ -78,10 +87,16 @@ def long_flight() -> Record:
     """A flight of 1200 steps with four impulses, a cut-off and images in a window."""
     scenario = load_scenario("asteroid-1997-space", ["angle_sensor.period_s=1.0"])
     scenario = replace(
-        scenario, body=Body(40.0), **of_model(replace(scenario.set_model, step_s=1.0 / 12.0, sections=5))
+        scenario,
+        body=Body(40.0),
+        **of_model(replace(scenario.set_model, step_s=1.0 / 12.0, sections=5)),
     )
-    sensor = replace(scenario.set_model.angle_sensor, period_s=1.0 / 12.0, first_image_s=90.0, last_image_s=2.0)
-    model = replace(scenario.set_model, angle_sensor=sensor, model=Model.GUARANTEED, initial_set=InitialSet.BOX)
+    sensor = replace(
+        scenario.set_model.angle_sensor, period_s=1.0 / 12.0, first_image_s=90.0, last_image_s=2.0
+    )
+    model = replace(
+        scenario.set_model, angle_sensor=sensor, model=Model.GUARANTEED, initial_set=InitialSet.BOX
+    )
     thruster = replace(scenario.thruster, impulses_s=(60.0, 30.0, 15.0, 8.0), last_impulse_s=8.0)
     return fly_one(replace(scenario, **of_model(model), thruster=thruster, range_sensor=None))
 
@@ -105,11 +120,14 @@ def test_a_long_flight_is_thinned(open_page: Open, long_flight: Record, screensh
     for frame in (*range(0, 4 * len(kept), 97), 4 * len(kept) - 1):
         page.evaluate(f"player.show({frame})")
     number = kept.index(fired[1])
-    step, after = fired[1], fired[1] + 1
+    step = fired[1]
+    after = fired[1] + 1
     page.evaluate(f"player.show({4 * number + 2})")
     assert opened.shown_at().endswith("before arrival), after the impulse")
     said = rows_of(opened)
-    assert numbers(said["impulse modulus"]) == pytest.approx([np.hypot(*record.impulse_m_s[step])], rel=SIX_DIGITS)
+    assert numbers(said["impulse modulus"]) == pytest.approx(
+        [np.hypot(*record.impulse_m_s[step])], rel=SIX_DIGITS
+    )
     page.wait_for_timeout(50)
     page.screenshot(path=screenshots / "space-long.png", full_page=True)
     page.evaluate(f"player.show({4 * number + 3})")
@@ -131,9 +149,13 @@ def test_the_possible_miss_and_the_projections(open_page: Open, long_flight: Rec
     intervals = record.predicted_miss_m[kept]
     assert len(found["maximum"]) == len(steps)
     assert [number for number, value in enumerate(found["maximum"]) if value is not None] == known
-    found["maximum"], found["centred"] = ([found[name][number] for number in known] for name in ("maximum", "centred"))
+    found["maximum"], found["centred"] = (
+        [found[name][number] for number in known] for name in ("maximum", "centred")
+    )
     np.testing.assert_allclose(found["maximum"], np.hypot(*np.abs(intervals).max(axis=2).T))
-    np.testing.assert_allclose(found["centred"], np.hypot(*(0.5 * np.diff(intervals, axis=2)[:, :, 0].T)))
+    np.testing.assert_allclose(
+        found["centred"], np.hypot(*(0.5 * np.diff(intervals, axis=2)[:, :, 0].T))
+    )
     np.testing.assert_allclose(found["truth"][-1], float(record.result.miss_m[0]), atol=0.05)
     for number in range(len(AXES)):
         places, truth, extents = (
@@ -142,7 +164,10 @@ def test_the_possible_miss_and_the_projections(open_page: Open, long_flight: Rec
         )
         np.testing.assert_allclose(10.0 ** -np.array(places), record.true_range_m[steps])
         truth, extents = ([values[number] for number in known] for values in (truth, extents))
-        heights = [[section.polygons[number].polygon()[:, 1] for section in record.sections[step]] for step in kept]
+        heights = [
+            [section.polygons[number].polygon()[:, 1] for section in record.sections[step]]
+            for step in kept
+        ]
         ends = [(min(map(np.min, each)), max(map(np.max, each))) for each in heights]
         np.testing.assert_allclose(extents, ends, rtol=1e-6)
         inside = [low <= value <= high for value, (low, high) in zip(truth, ends, strict=True)]

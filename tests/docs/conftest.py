@@ -56,7 +56,8 @@ class Page:
         """Return the fenced blocks in some languages, or in all."""
         blocks = []
         for match in _BLOCK.finditer(self.text):
-            language, comment = match["language"].strip(), match["comment"] or ""
+            language = match["language"].strip()
+            comment = match["comment"] or ""
             if not languages or language in languages:
                 reason = comment.removeprefix(_NOT_RUN) if comment.startswith(_NOT_RUN) else ""
                 blocks.append(Block(self.name, language, match["text"], reason))
@@ -69,10 +70,17 @@ class Page:
 
 def all_pages() -> list[Page]:
     """Return every page of prose in the project, the pages of the site first."""
-    site = [path for path in sorted((ROOT / "docs").rglob("*.md")) if not {"_build", "gallery"} & set(path.parts)]
+    site = [
+        path
+        for path in sorted((ROOT / "docs").rglob("*.md"))
+        if not {"_build", "gallery"} & set(path.parts)
+    ]
     names = ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md", "benchmarks/README.md")
     others = [ROOT / name for name in names]
-    return [Page(path.relative_to(ROOT).as_posix(), path.read_text(encoding="utf-8")) for path in (*site, *others)]
+    return [
+        Page(path.relative_to(ROOT).as_posix(), path.read_text(encoding="utf-8"))
+        for path in (*site, *others)
+    ]
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:

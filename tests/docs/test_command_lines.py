@@ -40,7 +40,10 @@ REDUCED = (
     ),
     # The flights of the missions have thousands of steps.
     (r"^infoset experiment (dart-2022|haiv-2013)\b", rf"infoset experiment \1 {_STEPS.format(30)}"),
-    (r"^infoset experiment deep-impact-2005\b", f"infoset experiment deep-impact-2005 {_STEPS.format(150)}"),
+    (
+        r"^infoset experiment deep-impact-2005\b",
+        f"infoset experiment deep-impact-2005 {_STEPS.format(150)}",
+    ),
     # A narrow interval needs too many runs for a test.
     (r" --until \"[^\"]*\"", ""),
 )
@@ -68,10 +71,14 @@ SET_UP = (
     r"(python3 -m venv \.venv|\. \.venv/bin/activate|\.venv/bin/python -m pytest"
     r"|\.venv/bin/pip install -c constraints\.txt (\S+|-e \S+))"
 )
-"""Lines that create an environment and run these tests. `.ci/run` runs them; these tests check the names in them."""
+"""Lines that create an environment and run these tests. `.ci/run` runs them; these tests check the
+names in them.
+"""
 
 _PROMPT = "$ "
-_PLACEHOLDER = re.compile(r"\[|\||\.\.\.|=?\b[A-Z]+\b(?!\w)|^infoset [a-z-]+( [a-z-]+| --[a-z-]+)?$")
+_PLACEHOLDER = re.compile(
+    r"\[|\||\.\.\.|=?\b[A-Z]+\b(?!\w)|^infoset [a-z-]+( [a-z-]+| --[a-z-]+)?$"
+)
 """A placeholder, or the name of a command without arguments."""
 
 
@@ -90,7 +97,8 @@ def lines_of(text: str) -> Iterator[str]:
 def inline_lines(page: Page) -> list[str]:
     """Return the command lines in the running text."""
     return re.findall(
-        r"`((?:infoset|python (?:benchmarks|docs)/[^\s`]+)(?: [^`\n]+)?)`", re.sub(r"\s*\n\s*", " ", page.prose())
+        r"`((?:infoset|python (?:benchmarks|docs)/[^\s`]+)(?: [^`\n]+)?)`",
+        re.sub(r"\s*\n\s*", " ", page.prose()),
     )
 
 
@@ -118,19 +126,29 @@ def run(line: str, folder: Path) -> None:
     if words[0] == "python":
         assert (ROOT / words[1]).is_file(), line
         done = subprocess.run(
-            [sys.executable, ROOT / words[1], *words[2:]], cwd=folder, capture_output=True, text=True, check=False
+            [sys.executable, ROOT / words[1], *words[2:]],
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            check=False,
         )
         assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
         return
-    assert words[0] == "infoset", f"{line}: no rule to run it; put a comment <!-- not run: REASON --> above it"
+    assert words[0] == "infoset", (
+        f"{line}: no rule to run it; put a comment <!-- not run: REASON --> above it"
+    )
     into = None
     if ">" in words:
         words, into = words[: words.index(">")], folder / words[words.index(">") + 1]
     if "--out" in words and (folder / words[words.index("--out") + 1]).exists():
         words.append("--overwrite")  # another line of the page wrote there
-    printed, complained = io.StringIO(), io.StringIO()
+    printed = io.StringIO()
+    complained = io.StringIO()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("infoset.experiments.common.figure_style.figure_bytes", lambda _: [("pdf", b""), ("png", b"")])
+        patch.setattr(
+            "infoset.experiments.common.figure_style.figure_bytes",
+            lambda _: [("pdf", b""), ("png", b"")],
+        )
         with (
             contextlib.redirect_stdout(printed),
             contextlib.redirect_stderr(complained),
@@ -144,7 +162,12 @@ def run(line: str, folder: Path) -> None:
 
 def fenced_lines(page: Page) -> list[str]:
     """Return the command lines of the blocks of a page that are run, without set-up."""
-    lines = [line for block in page.blocks("sh", "console") if not block.not_run for line in lines_of(block.text)]
+    lines = [
+        line
+        for block in page.blocks("sh", "console")
+        if not block.not_run
+        for line in lines_of(block.text)
+    ]
     return [line for line in lines if not re.fullmatch(SET_UP, line.replace('"', ""))]
 
 
@@ -173,7 +196,9 @@ def test_the_quick_lines_run(page: Page, pages: list[Page], folder: Path) -> Non
     for other in pages[: [each.name for each in pages].index(page.name)]:
         there = quick_lines(other)
         shared = [line for line in lines if line in there]
-        same = itertools.takewhile(lambda pair: pair[0] == pair[1], zip(shared, there, strict=False))
+        same = itertools.takewhile(
+            lambda pair: pair[0] == pair[1], zip(shared, there, strict=False)
+        )
         tested = [line for line, _ in same]  # the other page begins with them
         lines = [line for line in lines if line not in tested]
     for line in lines:
@@ -201,10 +226,20 @@ def check_options(line: str) -> None:
     words = re.sub(r"[\[\]|,]", " ", line).split()[1:]
     command: Any = commands()
     while words and words[0] in getattr(command, "commands", {}):
-        command, words = command.commands[words[0]], words[1:]
-    named = not words or words[0].startswith("--") or words[0].isupper() or not hasattr(command, "commands")
+        command = command.commands[words[0]]
+        words = words[1:]
+    named = (
+        not words
+        or words[0].startswith("--")
+        or words[0].isupper()
+        or not hasattr(command, "commands")
+    )
     assert named, f"{line}: no such command"
-    known = {name for parameter in command.params for name in (*parameter.opts, *parameter.secondary_opts)}
+    known = {
+        name
+        for parameter in command.params
+        for name in (*parameter.opts, *parameter.secondary_opts)
+    }
     assert {word for word in words if word.startswith("-")} <= {*known, "--help", "-"}, line
 
 
@@ -218,7 +253,11 @@ def test_lines_with_placeholders_name_commands_and_options_that_exist(page: Page
 
 def test_examples_in_the_help_name_options_that_exist() -> None:
     root: Any = commands()
-    examples = [command.epilog.removeprefix("Example: ") for command in root.commands.values() if command.epilog]
+    examples = [
+        command.epilog.removeprefix("Example: ")
+        for command in root.commands.values()
+        if command.epilog
+    ]
     assert len(examples) >= 14
     for example in examples:
         check_options(example)

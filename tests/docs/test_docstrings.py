@@ -1,4 +1,6 @@
-"""The reference is complete: every parameter of a public name is described, every number has its unit."""
+"""The reference is complete: every parameter of a public name is described, every number has its
+unit.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,11 @@ PACKAGES = (
         "infoset.rendezvous.pareto",
         "infoset.rendezvous.multipoint",
     ),
-    *("infoset.rendezvous.reachability", "infoset.rendezvous.pursuit_evasion", "infoset.geometry.polytope"),
+    *(
+        "infoset.rendezvous.reachability",
+        "infoset.rendezvous.pursuit_evasion",
+        "infoset.geometry.polytope",
+    ),
     "experiments",
 )
 
@@ -30,7 +36,12 @@ RAISES_CHECKED = ("infoset", "infoset.guidance", "infoset.sim", "infoset.rendezv
 """Packages in which public functions document the exceptions that they raise."""
 
 WITHOUT_UNITS = (
-    *("infoset.ConvexPolygons", "infoset.geometry.polytope.", "infoset.Polytope.", "infoset.Zonotope"),
+    *(
+        "infoset.ConvexPolygons",
+        "infoset.geometry.polytope.",
+        "infoset.Polytope.",
+        "infoset.Zonotope",
+    ),
     "infoset.LinearObserver",  # geometry and systems in any unit
     *(
         "infoset.sim.Distribution",
@@ -48,11 +59,15 @@ CONTRACTS = {
     "start": "infoset.guidance.Strategy",
     "decide": "infoset.guidance.Strategy",
     "measure": "infoset.guidance.MeasurementNoise",
-    **dict.fromkeys(("true_value", "bound", "band", "share", "cut", "measured", "error"), "infoset.Sensor"),
+    **dict.fromkeys(
+        ("true_value", "bound", "band", "share", "cut", "measured", "error"), "infoset.Sensor"
+    ),
 }
 """Methods of a contract that many classes implement; the contract describes their parameters."""
 
-_IN_NAME = re.compile(r"_(m|s|rad|km|deg|kg|n|m_s|km_s|rad_s|m_s2|m2_s3|m3_s2|kg_s|per_m|per_s|mb)$")
+_IN_NAME = re.compile(
+    r"_(m|s|rad|km|deg|kg|n|m_s|km_s|rad_s|m_s2|m2_s3|m3_s2|kg_s|per_m|per_s|mb)$"
+)
 _UNIT = re.compile(
     r"(?<![\w^'’])(m|s|rad|km|deg|kg|N|MB|ms|m/s|km/s|rad/s|rad/m|m/s\^1\.5|m/s\^2|m/s\^3|m\^2/s\^3|m\^3/s\^2|kg/s|1/s)(?!\w)"
 )
@@ -63,22 +78,31 @@ _NONE_OR_GIVEN = re.compile(
     r"|standard deviations|units? of|own units|any units|permutation|matri|costate|states?\b|Gramian"
     r"|[Ff]ree (terminal )?values"
 )
-"""Words for numbers without a unit, or with a unit by convention of the reference: states are in m and m/s; the units
-of matrices and costates follow from that; free values have the units of their components."""
+"""Words for numbers without a unit, or with a unit by convention of the reference: states are in m
+and m/s; the units of matrices and costates follow from that; free values have the units of their
+components."""
 
 
 def public_things() -> Iterator[tuple[str, Any]]:
     """Yield the public classes, functions and methods of the packages, by name."""
     for package in PACKAGES:
         module = importlib.import_module(package)
-        defined = [name for name, thing in vars(module).items() if getattr(thing, "__module__", None) == package]
-        for name in getattr(module, "__all__", [each for each in defined if not each.startswith("_")]):
+        defined = [
+            name
+            for name, thing in vars(module).items()
+            if getattr(thing, "__module__", None) == package
+        ]
+        for name in getattr(
+            module, "__all__", [each for each in defined if not each.startswith("_")]
+        ):
             thing = getattr(module, name)
             thing = getattr(thing, "py_func", thing)
             if inspect.isclass(thing) and not issubclass(thing, Exception | enum.Enum):
                 yield f"{package}.{name}", thing
                 for method_name, method in vars(thing).items():
-                    function = inspect.unwrap(getattr(method, "__func__", getattr(method, "fget", method)))
+                    function = inspect.unwrap(
+                        getattr(method, "__func__", getattr(method, "fget", method))
+                    )
                     if not method_name.startswith("_") and inspect.isfunction(function):
                         yield f"{package}.{name}.{method_name}", function
             elif inspect.isfunction(thing):
@@ -90,7 +114,9 @@ THINGS = dict(public_things())
 
 def entries(text: str, title: str) -> list[tuple[str, str]]:
     """Return the heads and texts of a section of a NumPy-style docstring."""
-    found = re.search(rf"^{title}\n-+\n(.*?)(?=^\w[\w ]*\n-+$|\Z)", text, flags=re.DOTALL | re.MULTILINE)
+    found = re.search(
+        rf"^{title}\n-+\n(.*?)(?=^\w[\w ]*\n-+$|\Z)", text, flags=re.DOTALL | re.MULTILINE
+    )
     listed: list[tuple[str, str]] = []
     for line in found[1].splitlines() if found else ():
         if line and not line[0].isspace():
@@ -107,11 +133,14 @@ def described(text: str) -> set[str]:
 
 
 def undescribed(name: str, thing: Any) -> list[str]:
-    """Return the numbers among the parameters of a public name whose unit is neither in the name nor described."""
+    """Return the numbers among the parameters of a public name whose unit is neither in the name
+    nor described.
+    """
     if inspect.isclass(thing) and getattr(thing, "_is_protocol", False):
         return []
     text = inspect.getdoc(thing) or ""
-    known, method = described(text), name.rsplit(".", 1)[-1]
+    known = described(text)
+    method = name.rsplit(".", 1)[-1]
     if method in CONTRACTS and "Parameters\n" not in text:
         text += inspect.getdoc(THINGS[f"{CONTRACTS[method]}.{method}"]) or ""
         known |= described(text) | {"batch"}
@@ -134,14 +163,18 @@ def without_unit(name: str, thing: Any) -> list[str]:
         for head, said in entries(text, title):
             names, _, kind = head.partition(" : ")
             if title == "Returns" and not kind:
-                names, kind = name.rsplit(".", 1)[-1], head
+                names = name.rsplit(".", 1)[-1]
+                kind = head
             is_number = re.search(r"\bfloat|ndarray|array\b|array_like", kind) and not re.search(
                 r"\bbool|\bint\b", kind
             )
             if not is_number or all(_IN_NAME.search(each.strip()) for each in names.split(",")):
                 continue
             told = " ".join((names, kind, said, summary))
-            if _UNIT.search(f"{kind} {said} {summary}") is None and _NONE_OR_GIVEN.search(told) is None:
+            if (
+                _UNIT.search(f"{kind} {said} {summary}") is None
+                and _NONE_OR_GIVEN.search(told) is None
+            ):
                 bare.append(f"{title}: {head}")
     return bare
 
@@ -150,7 +183,9 @@ Definition = ast.FunctionDef | ast.AsyncFunctionDef
 
 
 def public_definitions(tree: ast.Module) -> Iterator[tuple[str, Definition, str]]:
-    """Yield the public functions and methods of a module, by name, with the docstring that documents them."""
+    """Yield the public functions and methods of a module, by name, with the docstring that
+    documents them.
+    """
     for node in tree.body:
         if isinstance(node, Definition) and not node.name.startswith("_"):
             yield node.name, node, ast.get_docstring(node) or ""
@@ -165,8 +200,12 @@ def public_definitions(tree: ast.Module) -> Iterator[tuple[str, Definition, str]
 
 
 def raised_by(body: Definition) -> set[str]:
-    """Return the names of the exceptions that a function raises; "Error" for one from a variable."""
-    raised = (node.exc for node in ast.walk(body) if isinstance(node, ast.Raise) and node.exc is not None)
+    """Return the names of the exceptions that a function raises; "Error" for one from a
+    variable.
+    """
+    raised = (
+        node.exc for node in ast.walk(body) if isinstance(node, ast.Raise) and node.exc is not None
+    )
     classes = (error.func if isinstance(error, ast.Call) else error for error in raised)
     names = (node.id if isinstance(node, ast.Name) else "" for node in classes)
     return {name if name[:1].isupper() else "Error" for name in names}
@@ -181,14 +220,19 @@ def silent_raises(source: str, public: Container[str] = ()) -> list[str]:
         name
         for name, body, text in public_definitions(ast.parse(source))
         if (raised := raised_by(body))
-        if not all(map(text.__contains__, raised)) or (name.split(".")[0] in public and not entries(text, "Raises"))
+        if not all(map(text.__contains__, raised))
+        or (name.split(".")[0] in public and not entries(text, "Raises"))
     ]
 
 
 def names_in_the_reference(package: str) -> set[str]:
-    """Return the public names of a package, and those of the classes from which its classes inherit."""
+    """Return the public names of a package, and those of the classes from which its classes
+    inherit.
+    """
     kinds = [thing for name, thing in THINGS.items() if name.startswith(package)]
-    bases = {base.__name__ for kind in kinds if inspect.isclass(kind) for base in inspect.getmro(kind)}
+    bases = {
+        base.__name__ for kind in kinds if inspect.isclass(kind) for base in inspect.getmro(kind)
+    }
     return bases | {thing.__name__ for thing in kinds}
 
 
@@ -210,7 +254,10 @@ def test_what_is_raised_is_said(package: str) -> None:
 @pytest.mark.parametrize("package", PACKAGES)
 def test_every_parameter_is_described(package: str) -> None:
     missing = {
-        name: found for name, thing in THINGS.items() if name.startswith(package) if (found := undescribed(name, thing))
+        name: found
+        for name, thing in THINGS.items()
+        if name.startswith(package)
+        if (found := undescribed(name, thing))
     }
     assert missing == {}
 

@@ -21,8 +21,12 @@ _TOCTREE_ENTRY = re.compile(r"^(?:.*<)?([\w/.-]+)>?$")
 
 @cache
 def anchors(path: Path) -> set[str]:
-    """Return the anchors of the headings of a page, as both the site and hosts of repositories make them."""
-    text = re.sub(r"^```.*?^```$", "", path.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    """Return the anchors of the headings of a page, as both the site and hosts of repositories make
+    them.
+    """
+    text = re.sub(
+        r"^```.*?^```$", "", path.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE
+    )
     titles = re.findall(r"^#+ (.+)$", text, flags=re.MULTILINE)
     return {re.sub(r"\s", "-", re.sub(r"[^\w\s-]", "", title.strip().lower())) for title in titles}
 
@@ -32,7 +36,11 @@ def source_of(target: Path) -> Path | None:
     if target.exists() and "gallery" not in target.parts:
         return target
     if target.parent == DOCS / "gallery":
-        made_from = DOCS / "examples" / ("GALLERY_HEADER.rst" if target.stem == "index" else f"{target.stem}.py")
+        made_from = (
+            DOCS
+            / "examples"
+            / ("GALLERY_HEADER.rst" if target.stem == "index" else f"{target.stem}.py")
+        )
         return made_from if made_from.exists() else None
     return None
 

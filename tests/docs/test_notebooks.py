@@ -14,7 +14,11 @@ NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 
 
 def code_cells(file: Path) -> list[dict[str, Any]]:
-    return [cell for cell in json.loads(file.read_text(encoding="utf-8"))["cells"] if cell["cell_type"] == "code"]
+    return [
+        cell
+        for cell in json.loads(file.read_text(encoding="utf-8"))["cells"]
+        if cell["cell_type"] == "code"
+    ]
 
 
 def test_the_readme_links_the_notebooks() -> None:
@@ -25,7 +29,9 @@ def test_the_readme_links_the_notebooks() -> None:
 
 @pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
 def test_notebooks_are_stored_without_results(file: Path) -> None:
-    assert all(cell["outputs"] == [] and cell["execution_count"] is None for cell in code_cells(file))
+    assert all(
+        cell["outputs"] == [] and cell["execution_count"] is None for cell in code_cells(file)
+    )
 
 
 @pytest.mark.docs

@@ -1,4 +1,6 @@
-"""Every Python block in the prose runs; the blocks of a page share one namespace, in their order."""
+"""Every Python block in the prose runs; the blocks of a page share one namespace, in their
+order.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""The built site: links, pictures, and that it loads nothing from the network. CONTRIBUTING.md has the build command.
+"""The built site: links, pictures, and that it loads nothing from the network. CONTRIBUTING.md has
+the build command.
 
 INFOSET_SITE is the folder of the site. If it is set and the site does not exist, the tests fail.
 """
@@ -27,7 +28,11 @@ PACKAGES = (
         "infoset.rendezvous.pareto",
         "infoset.rendezvous.multipoint",
     ),
-    *("infoset.rendezvous.reachability", "infoset.rendezvous.pursuit_evasion", "infoset.geometry.polytope"),
+    *(
+        "infoset.rendezvous.reachability",
+        "infoset.rendezvous.pursuit_evasion",
+        "infoset.geometry.polytope",
+    ),
 )
 LOADED = {"script": "src", "img": "src", "source": "src", "iframe": "src"}
 
@@ -40,7 +45,13 @@ class _Reader(HTMLParser):
     links: list[str] = field(default_factory=list)
     loads: list[str] = field(default_factory=list)
     pictures: list[str | None] = field(default_factory=list)
-    LOADING_LINKS: ClassVar[tuple[str, ...]] = ("stylesheet", "preload", "icon", "modulepreload", "shortcut icon")
+    LOADING_LINKS: ClassVar[tuple[str, ...]] = (
+        "stylesheet",
+        "preload",
+        "icon",
+        "modulepreload",
+        "shortcut icon",
+    )
 
     def __post_init__(self) -> None:
         super().__init__()
@@ -98,7 +109,9 @@ def test_links_and_anchors_inside_lead_somewhere(site: Path, read: dict[Path, _R
             assert target.is_file(), f"{page.relative_to(site)}: {link}"
             if parts.fragment and target in read:
                 ids = read[target].ids
-                assert unquote(parts.fragment) in ids, f"{page.relative_to(site)}: {link}: no such anchor"
+                assert unquote(parts.fragment) in ids, (
+                    f"{page.relative_to(site)}: {link}: no such anchor"
+                )
             seen += 1
     assert seen > 1000
 
@@ -111,16 +124,25 @@ def test_nothing_is_loaded_from_elsewhere(site: Path, read: dict[Path, _Reader])
             parts = urlsplit(source)
             assert not parts.scheme, f"{page.relative_to(site)} loads {source}"
             assert not parts.netloc, f"{page.relative_to(site)} loads {source}"
-            assert (page.parent / unquote(parts.path)).is_file(), f"{page.relative_to(site)}: no {source}"
+            assert (page.parent / unquote(parts.path)).is_file(), (
+                f"{page.relative_to(site)}: no {source}"
+            )
     for sheet in site.rglob("*.css"):
-        assert re.search(r"url\(\s*['\"]?(https?:)?//|@import\s+['\"]?https?:", sheet.read_text("utf-8")) is None, sheet
+        assert (
+            re.search(
+                r"url\(\s*['\"]?(https?:)?//|@import\s+['\"]?https?:", sheet.read_text("utf-8")
+            )
+            is None
+        ), sheet
 
 
 def test_pictures_say_what_they_show(site: Path, read: dict[Path, _Reader]) -> None:
     for page, reader in read.items():
         # Thumbnails of the gallery have no text; their titles have the same content.
         titled = page == site / "gallery" / "index.html"
-        assert all(text or (text is not None and titled) for text in reader.pictures), page.relative_to(site)
+        assert all(text or (text is not None and titled) for text in reader.pictures), (
+            page.relative_to(site)
+        )
 
 
 def test_every_public_name_is_described(read: dict[Path, _Reader]) -> None:

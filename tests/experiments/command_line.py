@@ -18,8 +18,12 @@ class Command:
         self._capsys = capsys
 
     @classmethod
-    def in_folder(cls, folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Command:
-        """Commands in a folder, with a clock that stands: stderr has no times, which depend on the machine."""
+    def in_folder(
+        cls, folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    ) -> Command:
+        """Commands in a folder, with a clock that stands: stderr has no times, which depend on the
+        machine.
+        """
         monkeypatch.setattr("infoset.experiments.common.screen.progress_clock", lambda: 0.0)
         monkeypatch.setenv("NO_COLOR", "1")
         monkeypatch.setenv("COLUMNS", "100")
@@ -35,7 +39,9 @@ class Command:
         return int(left.value.code or 0), captured.out, captured.err
 
     def refused(self, *arguments: object) -> str:
-        """The one message of a command that must be refused: ours, or Typer's after a line of usage."""
+        """The one message of a command that must be refused: ours, or Typer's after a line of
+        usage.
+        """
         code, out, err = self(*arguments)
         assert (code, out) == (2, "")
         assert err.startswith(("error: ", "Usage: "))

@@ -14,20 +14,25 @@ from tests.space import in_space
 
 
 @pytest.fixture
-def infoset(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Command:
+def infoset(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> Command:
     """Run a command in this process, in an empty folder: exit code, stdout and stderr."""
     return Command.in_folder(tmp_path, capsys, monkeypatch)
 
 
 @pytest.fixture
 def unrendered(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Draw figures, but write empty files, in tests that do not look at these files; with `rendered`, write them.
+    """Draw figures, but write empty files, in tests that do not look at these files; with
+    `rendered`, write them.
 
     Writing takes most of the time of a figure. Each kind of figure is written by some test.
     """
     if "rendered" not in request.fixturenames:
         empty = [("pdf", b""), ("png", b"")]
-        monkeypatch.setattr("infoset.experiments.common.figure_style.figure_bytes", lambda _figure: empty)
+        monkeypatch.setattr(
+            "infoset.experiments.common.figure_style.figure_bytes", lambda _figure: empty
+        )
 
 
 @pytest.fixture

@@ -1,4 +1,6 @@
-"""The command line: help, messages, exit codes and files, with the commands `experiment`, `engage` and `replay`."""
+"""The command line: help, messages, exit codes and files, with the commands `experiment`, `engage`
+and `replay`.
+"""
 
 from __future__ import annotations
 
@@ -27,8 +29,23 @@ from tests.experiments.command_line import Command
 pytestmark = pytest.mark.usefixtures("unrendered")
 
 CURVE_KEYS = [
-    *("published_curve", "noise", "range_sensor", "miss_m", "impulse_m_s", "guaranteed_miss_m", "outcome"),
-    *("set_emptied", "cause", "unguided_miss_m", "engine_corrects_m", "budget_corrects_m", "last_possible_m"),
+    *(
+        "published_curve",
+        "noise",
+        "range_sensor",
+        "miss_m",
+        "impulse_m_s",
+        "guaranteed_miss_m",
+        "outcome",
+    ),
+    *(
+        "set_emptied",
+        "cause",
+        "unguided_miss_m",
+        "engine_corrects_m",
+        "budget_corrects_m",
+        "last_possible_m",
+    ),
     *("truth_kept", "truth_margin_m", "phi_held", "miss_z_m"),
 ]
 OUTCOMES = {"arrived", "set-empty", "budget-spent", "diverged"}
@@ -43,7 +60,17 @@ def test_version(infoset: Command) -> None:
 
 
 def test_help_imports_nothing_heavy_and_no_command_imports_what_draws_before_it_draws() -> None:
-    heavy = ["numpy", "numba", "pydantic", "matplotlib", "scipy", "shapely", "rich", "infoset.model", "infoset.sim"]
+    heavy = [
+        "numpy",
+        "numba",
+        "pydantic",
+        "matplotlib",
+        "scipy",
+        "shapely",
+        "rich",
+        "infoset.model",
+        "infoset.sim",
+    ]
     drawing = ["matplotlib", "PIL", "scipy.stats"]
     code = (
         "import importlib, sys; from infoset.experiments.cli import RUNS; "
@@ -68,25 +95,42 @@ def test_help_imports_nothing_heavy_and_no_command_imports_what_draws_before_it_
         ("engage --json - --csv -", "is given twice"),
         ("engage --csv /dev/null --overwrite", "/dev/null: exists already"),
         (f"engage --json {'n' * 300}", "File name too long"),
-        ("engage --record out.txt", "--record: out.txt: the file must end in .npz; for example out.npz"),
+        (
+            "engage --record out.txt",
+            "--record: out.txt: the file must end in .npz; for example out.npz",
+        ),
         ("engage --noise both --record out", "--record: out-random: the file must end in .npz"),
         ("adversary --record worst", "--record: worst: the file must end in .npz"),
-        ("replay no.npz --html a.txt", "--html: a.txt: the file must end in .html; for example a.html"),
+        (
+            "replay no.npz --html a.txt",
+            "--html: a.txt: the file must end in .html; for example a.html",
+        ),
         ("replay no.npz --gif a.png", "--gif: a.png: the file must end in .gif; for example a.gif"),
         ("pareto --html a.txt", "--html: a.txt: the file must end in .html"),
         ("engage --out /dev/null/figures", "/dev/null/figures: cannot be written: Not a directory"),
-        ("experiment --out /dev/null/figures", "/dev/null/figures: cannot be written: Not a directory"),
+        (
+            "experiment --out /dev/null/figures",
+            "/dev/null/figures: cannot be written: Not a directory",
+        ),
         ("compare --csv /dev/null/a/b.csv", "/dev/null/a: cannot be written: Not a directory"),
         ("pareto --json /dev/null/a.json", "/dev/null: cannot be written: "),
         ("campaign --model guaranteed --runs 2 --out /dev/null/runs", "/dev/null/runs"),
-        ("sweep --model guaranteed --vary thruster.budget_m_s=1:2:2 --out /dev/null/runs", "/dev/null/runs"),
+        (
+            "sweep --model guaranteed --vary thruster.budget_m_s=1:2:2 --out /dev/null/runs",
+            "/dev/null/runs",
+        ),
     ],
 )
 def test_what_is_wrong_is_one_message_before_the_work(
     line: str, part: str, infoset: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("infoset.sim.parallel.simulate_runs", lambda *_: pytest.fail("began to work"))
-    monkeypatch.setattr("infoset.experiments.interception.runs.engage.fly_one", lambda *_: pytest.fail("began to work"))
+    monkeypatch.setattr(
+        "infoset.sim.parallel.simulate_runs", lambda *_: pytest.fail("began to work")
+    )
+    monkeypatch.setattr(
+        "infoset.experiments.interception.runs.engage.fly_one",
+        lambda *_: pytest.fail("began to work"),
+    )
     assert part in " ".join(infoset.refused(*line.split()).split())
     assert names_in(tmp_path) == []
 
@@ -102,7 +146,9 @@ def test_experiment_as_json(infoset: Command, tmp_path: Path) -> None:
     assert found["elapsed_s"] > 0.0
     curves = found["curves"]
     assert [list(curve) for curve in curves] == [CURVE_KEYS] * 4
-    assert [(curve["published_curve"], curve["noise"], curve["range_sensor"]) for curve in curves] == [
+    assert [
+        (curve["published_curve"], curve["noise"], curve["range_sensor"]) for curve in curves
+    ] == [
         (1, "random", False),
         (2, "random", True),
         (3, "game", False),
@@ -110,7 +156,10 @@ def test_experiment_as_json(infoset: Command, tmp_path: Path) -> None:
     ]
     for curve in curves:
         assert all(len(curve[key]) == 3 for key in CURVE_KEYS[3:])
-        assert all(isinstance(each, float) and math.isfinite(each) for each in curve["miss_m"] + curve["impulse_m_s"])
+        assert all(
+            isinstance(each, float) and math.isfinite(each)
+            for each in curve["miss_m"] + curve["impulse_m_s"]
+        )
         assert all(each is None or each >= 0.0 for each in curve["guaranteed_miss_m"])
         assert set(curve["outcome"]) <= OUTCOMES
     assert curves[1]["miss_m"] == simulate(scenario, 3, seed=5).miss_m.tolist()
@@ -138,7 +187,9 @@ def test_a_run_of_the_experiment_is_the_same_engagement(infoset: Command) -> Non
     curves = infoset.json("experiment", "--runs", 3, "--seed", 7, "--set", "tie=random")["curves"]
     cases = product(("random", "game"), ("--no-range-sensor", "--range-sensor"))
     for curve, (noise, switch) in zip(curves, cases, strict=True):
-        one = infoset.json("engage", "--noise", noise, switch, "--seed", 7, "--run", 2, "--set", "tie=random")
+        one = infoset.json(
+            "engage", "--noise", noise, switch, "--seed", 7, "--run", 2, "--set", "tie=random"
+        )
         assert {key: one[key] for key in CURVE_KEYS} == {
             key: value[2] if isinstance(value, list) else value for key, value in curve.items()
         }
@@ -147,10 +198,15 @@ def test_a_run_of_the_experiment_is_the_same_engagement(infoset: Command) -> Non
 def test_the_guaranteed_model_shows_its_certificate(infoset: Command) -> None:
     code, out, _ = infoset("experiment", "--runs", 4, "--model", "guaranteed")
     assert code == 0
-    sets = "true state inside the set at every step: 4 of 4 runs (100 %); set became empty: 0 of 4 runs (0 %)"
+    sets = (
+        "true state inside the set at every step: 4 of 4 runs (100 %); set became empty: 0 of 4 "
+        "runs (0 %)"
+    )
     assert out.count(f"{sets}; miss within the bound Phi: 4 of 4 runs") == 4
     reason = "(manoeuvres 0.005 and gravity 3.8e-07, divided by 1 - 0.0172)"
-    assert f"acceleration along z at most 0.0050881 m/s^2 {reason}" in out  # (0.005 + 3.8e-7) / (1 - 1 / 58)
+    assert (
+        f"acceleration along z at most 0.0050881 m/s^2 {reason}" in out
+    )  # (0.005 + 3.8e-7) / (1 - 1 / 58)
     one = infoset.json("engage", "--model", "guaranteed", "--run", 3)
     assert one["phi_held"] is True
     assert one["truth_margin_m"] == min(step["truth_margin_m"] for step in one["steps"]) >= 0.0
@@ -161,20 +217,35 @@ def test_engage_as_json(infoset: Command, tmp_path: Path) -> None:
     found = infoset.json("engage")
     assert {*CURVE_KEYS, "run", "seed", "strategy", "hit", "inconsistency", "steps"} <= {*found}
     assert found["scenario_hash"] == fingerprint(load_scenario("asteroid-1997"))
-    assert (found["run"], found["seed"], found["noise"], found["range_sensor"]) == (0, 0, "random", True)
+    assert (found["run"], found["seed"], found["noise"], found["range_sensor"]) == (
+        0,
+        0,
+        "random",
+        True,
+    )
     assert found["outcome"] in OUTCOMES
     steps = found["steps"]
     columns = [
-        *("step", "time_s", "true_range_m", "measured_range_m", "impulse_m_s", "measured_angle_z_rad"),
+        *(
+            "step",
+            "time_s",
+            "true_range_m",
+            "measured_range_m",
+            "impulse_m_s",
+            "measured_angle_z_rad",
+        ),
         *("measured_rate_z_rad_s", "true_angle_z_rad", "true_rate_z_rad_s", "impulse_z_m_s"),
         *("predicted_miss_z_lower_m", "predicted_miss_z_upper_m", "truth_margin_m", "sections"),
     ]
     assert all(list(step) == columns for step in steps)
     assert [step["time_s"] for step in steps[:3]] == [0.0, 0.5, 1.0]
-    first, last = steps[0], steps[-1]
+    first = steps[0]
+    last = steps[-1]
     assert first["predicted_miss_z_lower_m"] < first["predicted_miss_z_upper_m"]
     assert last["time_s"] == 0.5 * (len(steps) - 1)
-    assert all((step["predicted_miss_z_lower_m"] is None) == (step["sections"] == 0) for step in steps)
+    assert all(
+        (step["predicted_miss_z_lower_m"] is None) == (step["sections"] == 0) for step in steps
+    )
     assert math.isclose(sum(step["impulse_m_s"] for step in steps), found["impulse_m_s"])
     assert names_in(tmp_path) == []
 
@@ -186,9 +257,20 @@ def test_engage_under_both_noises(infoset: Command, tmp_path: Path) -> None:
     arguments = ["engage", "asteroid-1997-single", "--noise", "both"]
     code, out, _ = infoset(*arguments, "--out", folder, "--record", record, "--csv", steps)
     assert code == 0
-    drawn = [f"figure-{name}.{kind}" for name in ("2-process", "3-sets", "approach") for kind in ("pdf", "png")]
+    drawn = [
+        f"figure-{name}.{kind}"
+        for name in ("2-process", "3-sets", "approach")
+        for kind in ("pdf", "png")
+    ]
     assert names_in(folder) == [
-        *(*drawn, "record-game.npz", "record-random.npz", "results.json", "scenario.toml", "steps.csv")
+        *(
+            *drawn,
+            "record-game.npz",
+            "record-random.npz",
+            "results.json",
+            "scenario.toml",
+            "steps.csv",
+        )
     ]
     for part in ("arrived", "the paper's Phi (not a bound here), m"):
         assert part in out
@@ -203,11 +285,14 @@ def test_engage_under_both_noises(infoset: Command, tmp_path: Path) -> None:
     assert {row["noise"] for row in rows} == {"random", "game"}
     assert len(rows) == len(found["random"]["steps"]) + len(found["game"]["steps"])
     assert rows[0]["measured_range_m"] == ""
-    assert (tmp_path / "flight-random.npz").read_bytes() == (folder / "record-random.npz").read_bytes()
+    assert (tmp_path / "flight-random.npz").read_bytes() == (
+        folder / "record-random.npz"
+    ).read_bytes()
 
 
 @pytest.mark.parametrize(
-    ("option", "name"), [("--json", "x.json"), ("--csv", "x.csv"), ("--record", "x.npz"), ("--out", "x")]
+    ("option", "name"),
+    [("--json", "x.json"), ("--csv", "x.csv"), ("--record", "x.npz"), ("--out", "x")],
 )
 def test_nothing_is_replaced_unless_told(
     option: str, name: str, infoset: Command, brief_file: Path, tmp_path: Path
@@ -226,7 +311,9 @@ def test_nothing_is_replaced_unless_told(
     assert names_in(tmp_path) == [name]
 
 
-def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failed_write_leaves_the_old_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def fail(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
@@ -247,7 +334,9 @@ def test_json_and_csv_of_odd_values() -> None:
         to_json({"a": math.nan})
 
 
-def test_results_that_are_not_finite_are_refused(infoset: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_results_that_are_not_finite_are_refused(
+    infoset: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def overflowing(scenario: Scenario, runs: int, **_: object) -> object:
         results = simulate(scenario, runs)
         results.miss_m[:] = math.inf
@@ -299,10 +388,13 @@ def test_a_log_has_lines_of_progress(capsys: pytest.CaptureFixture[str]) -> None
     assert capsys.readouterr().err == "patient: estimated time 90 s\npatient: 50 %, 1 min left\n"
 
 
-def test_a_long_command_says_its_time_once_and_the_time_left(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_long_command_says_its_time_once_and_the_time_left(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     now_s = 0.0
     with screen.progress_bar(quiet=False, clock=lambda: now_s) as begin:
-        one, two = begin("one"), begin("two")
+        one = begin("one")
+        two = begin("two")
         now_s = 50.0  # kernels are compiled before the first report
         one(0.01)
         now_s = 51.0
@@ -326,8 +418,12 @@ def test_a_short_command_says_no_time(capsys: pytest.CaptureFixture[str]) -> Non
     assert capsys.readouterr().err == ""
 
 
-@pytest.mark.parametrize("error", [OSError(28, "No space left on device", "k.nbi"), MemoryError("Unable to allocate")])
-def test_errors_of_the_system_are_messages(error: Exception, infoset: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    "error", [OSError(28, "No space left on device", "k.nbi"), MemoryError("Unable to allocate")]
+)
+def test_errors_of_the_system_are_messages(
+    error: Exception, infoset: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def fail(*_: object) -> None:
         raise error
 

@@ -23,7 +23,10 @@ FACTS = [
     "images",
     "possible impulses",
     "miss without impulses",
-    "miss that the images and the speeds of [uncertainty] leave possible, with errors at their bounds",
+    (
+        "miss that the images and the speeds of [uncertainty] leave possible, with errors at "
+        "their bounds"
+    ),
 ]
 CAMERA_FACT = "miss that the images alone leave possible, with errors at their bounds (closed form)"
 TIMES = ["camera.first_image_s", "thruster.impulses_s"]
@@ -41,13 +44,17 @@ def test_the_list_has_every_built_in_file(noun: str, infoset: Command) -> None:
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_a_built_in_file_is_shown_copied_checked_and_written_again(name: str, infoset: Command) -> None:
+def test_a_built_in_file_is_shown_copied_checked_and_written_again(
+    name: str, infoset: Command
+) -> None:
     file = FILES[name]
     noun = "scenarios" if file.kind == SCENARIO else "problems"
     assert infoset(noun, "show", name) == (0, file.text, "")
     assert infoset(noun, "new", "-", "--like", name)[:2] == (0, file.text)
     assert infoset(noun, "new", "mine.toml", "--like", name)[0] == 0
-    copy, original = (text.splitlines() for text in (Path("mine.toml").read_text(encoding="utf-8"), file.text))
+    copy, original = (
+        text.splitlines() for text in (Path("mine.toml").read_text(encoding="utf-8"), file.text)
+    )
     other = [line for line, shown in zip(copy, original, strict=True) if line != shown]
     assert [line.partition("#")[0].strip() for line in other] == [
         'name = "mine"',
@@ -79,8 +86,8 @@ def test_check_prints_the_schedule_that_will_happen(infoset: Command) -> None:
         "431 before the last decision of an impulse",
         "possible impulses: 3, from 5403.495 s to 753.4951 s before the nominal arrival",
         "camera.first_image_s: 7203.495 s instead of 7200 s (nearest possible times)",
-        "thruster.impulses_s: 5403.495 s instead of 5400 s; 2103.495 s instead of 2100 s; 753.4951 s instead of 750 s "
-        "(nearest possible times)",
+        "thruster.impulses_s: 5403.495 s instead of 5400 s; 2103.495 s instead of 2100 s; "
+        "753.4951 s instead of 750 s (nearest possible times)",
     ]
     found = json.loads(infoset("scenarios", "check", "deep-impact-2005", "--json")[1])
     schedule = found["schedule"]
@@ -92,13 +99,17 @@ def test_check_prints_the_schedule_that_will_happen(infoset: Command) -> None:
 
 
 def test_check_lists_few_of_many_differences(infoset: Command) -> None:
-    settings = ("thruster.last_impulse_s=120", "thruster.impulse_period_s=64", "thruster.first_impulse_s=440")
+    settings = (
+        "thruster.last_impulse_s=120",
+        "thruster.impulse_period_s=64",
+        "thruster.first_impulse_s=440",
+    )
     options = [option for setting in settings for option in ("--set", setting)]
     _, out, _ = infoset("scenarios", "check", "dart-2022", *options)
     (line,) = [line for line in out.splitlines() if line.startswith("thruster.impulse_period_s")]
     assert line == (
-        "thruster.impulse_period_s: 180 s instead of 184 s; 250 s instead of 248 s; 310 s instead of 312 s, and 1 more "
-        "(nearest possible times)"
+        "thruster.impulse_period_s: 180 s instead of 184 s; 250 s instead of 248 s; 310 s instead "
+        "of 312 s, and 1 more (nearest possible times)"
     )
     assert "possible impulses: 6, from 440 s to 120 s before the nominal arrival" in out
 
@@ -119,8 +130,13 @@ def test_check_of_a_nominal_arrival_that_is_far_too_late(infoset: Command) -> No
         ("problems", "service-2", "target.2.time_min=45", "target.2.tim_min=45"),
     ],
 )
-def test_check_takes_settings(noun: str, name: str, setting: str, wrong: str, infoset: Command) -> None:
-    plain, changed = (json.loads(infoset(noun, "check", name, *more, "--json")[1]) for more in ([], ["--set", setting]))
+def test_check_takes_settings(
+    noun: str, name: str, setting: str, wrong: str, infoset: Command
+) -> None:
+    plain, changed = (
+        json.loads(infoset(noun, "check", name, *more, "--json")[1])
+        for more in ([], ["--set", setting])
+    )
     hashes = [found.get("scenario_hash") or found["problem_hash"] for found in (plain, changed)]
     assert hashes[0] != hashes[1]
     assert "has no key" in infoset.refused(noun, "check", name, "--set", wrong)
@@ -139,9 +155,18 @@ def test_a_file_is_replaced_only_if_asked(noun: str, infoset: Command) -> None:
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("scenarios show asteroid-1996", 'scenario: there is no "asteroid-1996"; did you mean asteroid-1997'),
-        ("problems new mine.toml --like pareto-2009", 'there is no "pareto-2009"; did you mean pareto-2008?'),
-        ("problems check asteroid-1997", "asteroid-1997: this is a scenario; use infoset engage asteroid-1997"),
+        (
+            "scenarios show asteroid-1996",
+            'scenario: there is no "asteroid-1996"; did you mean asteroid-1997',
+        ),
+        (
+            "problems new mine.toml --like pareto-2009",
+            'there is no "pareto-2009"; did you mean pareto-2008?',
+        ),
+        (
+            "problems check asteroid-1997",
+            "asteroid-1997: this is a scenario; use infoset engage asteroid-1997",
+        ),
         ("scenarios new file/mine.toml", "File exists"),
         ("scenarios check binary", "is not text in UTF-8"),
         ("problems check empty", "kind: must be one of pareto-encounter, multipoint"),
@@ -151,7 +176,13 @@ def test_a_file_is_replaced_only_if_asked(noun: str, infoset: Command) -> None:
     ],
 )
 def test_what_is_wrong_is_one_message(line: str, message: str, infoset: Command) -> None:
-    contents = {"file": b"", "empty": b"", "binary": b"\x93NUMPY\xff\x00", "odd": b"kind = [1]", "broken": b"kind = "}
+    contents = {
+        "file": b"",
+        "empty": b"",
+        "binary": b"\x93NUMPY\xff\x00",
+        "odd": b"kind = [1]",
+        "broken": b"kind = ",
+    }
     for name, content in contents.items():
         Path(name).write_bytes(content)
     arguments = [f"./{word}" if word in contents else word for word in line.split()]

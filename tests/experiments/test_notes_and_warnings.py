@@ -24,13 +24,21 @@ from tests.experiments.command_line import Command
 @pytest.mark.parametrize(
     ("thruster", "message"),
     [
-        ({"last_impulse_s": 50.0, "delay_steps": 6}, "excludes all impulses: .* 40 s before the nominal arrival"),
+        (
+            {"last_impulse_s": 50.0, "delay_steps": 6},
+            "excludes all impulses: .* 40 s before the nominal arrival",
+        ),
         ({"last_impulse_s": 50.0, "impulses_s": (30.0, 20.0)}, "excludes all impulses"),
         ({"last_impulse_s": 500.0}, "excludes all impulses"),
-        ({"impulses_s": (90.0,), "delay_steps": 2}, "give later times or fewer delay_steps: got 90.0"),
+        (
+            {"impulses_s": (90.0,), "delay_steps": 2},
+            "give later times or fewer delay_steps: got 90.0",
+        ),
     ],
 )
-def test_a_schedule_without_impulses_names_the_key_to_change(thruster: dict[str, object], message: str) -> None:
+def test_a_schedule_without_impulses_names_the_key_to_change(
+    thruster: dict[str, object], message: str
+) -> None:
     engine = Thruster(10.0, 0.0, 1.0, **thruster)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match=message):
         engine.impulse_steps(100.0, 10.0)
@@ -43,23 +51,33 @@ def test_an_image_window_between_two_images_has_the_nearest_two() -> None:
 
 
 def test_images_before_the_start_have_a_warning() -> None:
-    scenario = load_scenario("dart-2022", ["camera.first_image_s=20000", "camera.last_image_s=14406"])
+    scenario = load_scenario(
+        "dart-2022", ["camera.first_image_s=20000", "camera.last_image_s=14406"]
+    )
     assert image_times_s(scenario) == []
     (line,) = scenario_warnings(scenario)
-    assert "no impulse follows a measurement: images are taken from 20000 s to 14406 s before" in line
+    assert (
+        "no impulse follows a measurement: images are taken from 20000 s to 14406 s before" in line
+    )
 
 
 def test_a_nominal_arrival_that_is_far_too_late_is_checked_at_once() -> None:
-    """Its steps are not searched: in floating point the time before the arrival does not change with the step."""
+    """Its steps are not searched: in floating point the time before the arrival does not change
+    with the step.
+    """
     scenario = load_scenario("dart-2022", ["nominal_range_m=1e50"])
-    assert "nominal_range_m is 1e+50 m, far outside uncertainty.x_m" in scenario_warnings(scenario)[-1]
+    assert (
+        "nominal_range_m is 1e+50 m, far outside uncertainty.x_m" in scenario_warnings(scenario)[-1]
+    )
 
 
 def test_the_closed_form_is_not_that_of_a_camera_that_loses_images() -> None:
     scenario = load_scenario("dart-2022")
     lossy = replace(scenario.set_model.angle_sensor, miss_probability=0.5)
     with pytest.raises(ValueError, match="loses no image"):
-        possible_miss_of(replace(scenario, **of_model(replace(scenario.set_model, angle_sensor=lossy))))
+        possible_miss_of(
+            replace(scenario, **of_model(replace(scenario.set_model, angle_sensor=lossy)))
+        )
 
 
 LONG_STEPS = ("--set", "step_s=30", "--set", "camera.period_s=30")
@@ -69,10 +87,29 @@ LONG_STEPS = ("--set", "step_s=30", "--set", "camera.period_s=30")
 @pytest.mark.usefixtures("unrendered")
 def test_a_sweep_names_keys_without_an_effect_and_its_adversary(infoset: Command) -> None:
     pytest.importorskip("pyarrow")
-    arguments = ["sweep", "haiv-2013", "--set", "thruster.impulses_s=[5400, 180]", "--noise", "game", "--runs", "6"]
-    arguments += ["--vary", "thruster.last_impulse_s=10:100:2", "--require", "miss_m p50<500", "--out", "out"]
+    arguments = [
+        "sweep",
+        "haiv-2013",
+        "--set",
+        "thruster.impulses_s=[5400, 180]",
+        "--noise",
+        "game",
+        "--runs",
+        "6",
+    ]
+    arguments += [
+        "--vary",
+        "thruster.last_impulse_s=10:100:2",
+        "--require",
+        "miss_m p50<500",
+        "--out",
+        "out",
+    ]
     _, out, _ = infoset(*arguments, *LONG_STEPS)
-    assert "thruster.last_impulse_s has no effect: cells that differ only in it have the same results" in out
+    assert (
+        "thruster.last_impulse_s has no effect: cells that differ only in it have the same results"
+        in out
+    )
     assert "miss_m p50<500 is met against this adversary in " in out
     assert "game noise (tie rule upper) is one adversary, not the worst case: infoset bound" in out
     assert "one model of many" not in out
@@ -97,7 +134,10 @@ def test_what_shows_a_greater_probability_is_said(hits: int, runs: int, text: st
     outlook = outlook_text(estimate_hits(hits, runs))
     assert outlook.startswith(text)
     share = "0.999" if "99.9" in text else "0.99"
-    assert f'infoset sweep --vary KEY=FROM:TO:COUNT --require "hit>={share}" --until decided decides it' in outlook
+    assert (
+        f'infoset sweep --vary KEY=FROM:TO:COUNT --require "hit>={share}" --until decided decides it'
+        in outlook
+    )
 
 
 @pytest.mark.parametrize(("hits", "runs"), [(50, 100), (0, 10), (1900, 2000)])
@@ -110,7 +150,10 @@ def test_the_sweep_needs_the_runs_that_the_outlook_names() -> None:
     outlook = outlook_text(estimate_hits(100, 100))
     needed = int(outlook.rpartition("after about ")[2].split()[0])
     assert judge(np.ones(needed), HitRequirement(0.99), watched=True).decision is Decision.MET
-    assert judge(np.ones(needed - 1), HitRequirement(0.99), watched=True).decision is Decision.UNDECIDED
+    assert (
+        judge(np.ones(needed - 1), HitRequirement(0.99), watched=True).decision
+        is Decision.UNDECIDED
+    )
 
 
 def test_an_experiment_with_a_body_says_what_would_show_more(infoset: Command, file: Path) -> None:
@@ -119,7 +162,9 @@ def test_an_experiment_with_a_body_says_what_would_show_more(infoset: Command, f
     lines = out.splitlines()
     for case in ("random", "random + range sensor", "game", "game + range sensor"):
         (number,) = (at for at, line in enumerate(lines) if line.startswith(f"{case}: hit"))
-        assert lines[number + 1].startswith(f"{case}: for 99 % with 95 % confidence: at least 299 runs without a miss")
+        assert lines[number + 1].startswith(
+            f"{case}: for 99 % with 95 % confidence: at least 299 runs without a miss"
+        )
     assert "99 %" not in infoset("experiment", file, "--runs", 4)[1]
 
 
@@ -127,7 +172,9 @@ PAPERS_WORDS = re.compile(r"curve|figure-[234]|figure [234]|published|printed")
 
 
 @pytest.mark.usefixtures("unrendered")
-def test_words_of_the_paper_are_for_its_scenarios(infoset: Command, file: Path, tmp_path: Path) -> None:
+def test_words_of_the_paper_are_for_its_scenarios(
+    infoset: Command, file: Path, tmp_path: Path
+) -> None:
     own = "\n".join(
         [
             *infoset("experiment", file, "--runs", 2, "--out", "own")[1:],
@@ -136,7 +183,11 @@ def test_words_of_the_paper_are_for_its_scenarios(infoset: Command, file: Path, 
             *infoset("replay", "a.npz", "--out", "again")[1:],
         ]
     )
-    names = [each.name for folder in ("own", "flight", "worst", "again") for each in (tmp_path / folder).iterdir()]
+    names = [
+        each.name
+        for folder in ("own", "flight", "worst", "again")
+        for each in (tmp_path / folder).iterdir()
+    ]
     assert {"figure-distributions.png", "figure-process.png", "figure-sets.png"} <= set(names)
     assert not PAPERS_WORDS.search(own)
     assert not [name for name in names if PAPERS_WORDS.search(name)]
@@ -163,5 +214,7 @@ def test_both_noises_have_their_printed_impulses_and_others_none(infoset: Comman
     assert re.search(r"impulse that the paper prints, m/s +-\n", out)
 
 
-def test_an_engagement_of_another_scenario_has_no_printed_impulse(infoset: Command, file: Path) -> None:
+def test_an_engagement_of_another_scenario_has_no_printed_impulse(
+    infoset: Command, file: Path
+) -> None:
     assert "the paper prints" not in infoset("engage", file)[1]

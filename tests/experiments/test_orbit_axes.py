@@ -13,7 +13,10 @@ from tests.experiments.command_line import Command
 def test_the_papers_axes() -> None:
     # 7 m outward, 3 m ahead, 2 m along the normal; the papers have x against the motion, y outward.
     assert to_paper([7.0, 3.0, 2.0, 0.7, 0.3, 0.2]).tolist() == [-3.0, 7.0, 2.0, -0.3, 0.7, 0.2]
-    assert from_paper([[-3.0, 7.0, 2.0], [3.0, 0.0, 0.0]]).tolist() == [[7.0, 3.0, 2.0], [0.0, -3.0, 0.0]]
+    assert from_paper([[-3.0, 7.0, 2.0], [3.0, 0.0, 0.0]]).tolist() == [
+        [7.0, 3.0, 2.0],
+        [0.0, -3.0, 0.0],
+    ]
     # The published initial state.
     printed = [2650.0, -2540.0, 2120.0, -3.0, 2.0, 3.0]
     assert to_paper(load_problem("rendezvous-2021").problem.initial).tolist() == printed

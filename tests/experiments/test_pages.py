@@ -1,4 +1,6 @@
-"""Pages as text: what is in them, what is not, and that their colours can be told apart. tests/browser opens them."""
+"""Pages as text: what is in them, what is not, and that their colours can be told apart.
+tests/browser opens them.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +41,10 @@ def record() -> Record:
 
 
 @given(
-    st.recursive(st.text() | st.floats(allow_nan=False, allow_infinity=False), lambda each: st.lists(each, max_size=3))
+    st.recursive(
+        st.text() | st.floats(allow_nan=False, allow_infinity=False),
+        lambda each: st.lists(each, max_size=3),
+    )
 )
 def test_embedded_json_reads_back_and_cannot_end_its_block(value: object) -> None:
     text = embedded_json({"value": value, "more": "</script>\u2028&"})
@@ -65,11 +70,15 @@ def test_a_page_is_small_and_fetches_nothing(record: Record) -> None:
     text = interception_page([record, replace(record, run=1)])
     assert len(text.encode()) < MAX_BYTES
     code = re.sub(r'<script type="application/json".*?</script>', "", text, flags=re.DOTALL)
-    assert not re.search(r"https?:|src=|href=|@import|url\(|innerHTML|outerHTML|document\.write|eval\(", code)
+    assert not re.search(
+        r"https?:|src=|href=|@import|url\(|innerHTML|outerHTML|document\.write|eval\(", code
+    )
 
 
 def flown(name: str) -> Record:
-    """Engagements of every kind: two noises, a set that is lost and recovered, the guaranteed model, a rate sensor."""
+    """Engagements of every kind: two noises, a set that is lost and recovered, the guaranteed
+    model, a rate sensor.
+    """
     scenario = load_scenario("asteroid-1997")
     model = scenario.set_model
     if name == "guaranteed":
@@ -82,14 +91,18 @@ def flown(name: str) -> Record:
     if name == "game":
         return fly_one(replace(scenario, noise=NoiseKind.GAME))
     recovery = Recovery.NONE if name == "lost" else Recovery.WIDENED
-    return fly_one(replace(scenario, noise=NoiseKind.GAME, **of_model(replace(model, recovery=recovery))), 2)
+    return fly_one(
+        replace(scenario, noise=NoiseKind.GAME, **of_model(replace(model, recovery=recovery))), 2
+    )
 
 
 @pytest.mark.parametrize("name", ["game", "guaranteed", "lost", "recovered", "space"])
 def test_replaying_gives_the_recorded_sets_bit_for_bit(name: str) -> None:
     record = flown(name)
     assert (record.result.outcomes[0] is Outcome.SET_EMPTY) == (name in ("lost", "recovered"))
-    after = itertools.islice(replayed(record.scenario, record.measured, record.impulse_m_s), 1, None, 2)
+    after = itertools.islice(
+        replayed(record.scenario, record.measured, record.impulse_m_s), 1, None, 2
+    )
     for information, sections in zip(after, record.sections, strict=True):
         for found, recorded in zip(information.sections(), sections, strict=True):
             assert (found.label_m, found.range_m) == (recorded.label_m, recorded.range_m)
@@ -98,7 +111,9 @@ def test_replaying_gives_the_recorded_sets_bit_for_bit(name: str) -> None:
     for step, interval in enumerate(record.predicted_miss_m):
         assert np.isnan(interval).all() == (not misses_m[step].size)
         if misses_m[step].size:
-            ends = np.stack([misses_m[step][..., 0].min(axis=1), misses_m[step][..., 1].max(axis=1)], axis=1)
+            ends = np.stack(
+                [misses_m[step][..., 0].min(axis=1), misses_m[step][..., 1].max(axis=1)], axis=1
+            )
             np.testing.assert_array_equal(interval, ends)
 
 
@@ -115,7 +130,9 @@ def test_what_was_before_holds_what_is_after(kind: Model) -> None:
             if section.label_m in before:
                 points = section.polygons[0].polygon()
                 scale = np.abs(points).max()
-                assert all(before[section.label_m].margin(point) >= -1e-9 * scale for point in points)
+                assert all(
+                    before[section.label_m].margin(point) >= -1e-9 * scale for point in points
+                )
 
 
 def test_outlines_keep_their_boxes_exactly() -> None:
@@ -129,12 +146,15 @@ def test_outlines_keep_their_boxes_exactly() -> None:
 
 def test_outlines_of_long_flights_have_few_vertices() -> None:
     turns = np.linspace(0.0, 2.0 * np.pi, 400, endpoint=False)
-    circle, triangle = np.column_stack([np.cos(turns), np.sin(turns)]), np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]])
+    circle = np.column_stack([np.cos(turns), np.sin(turns)])
+    triangle = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]])
     packed = packed_outlines([circle, triangle, triangle[:1], triangle[:2], circle], TOLERANCE)
     counts = np.frombuffer(base64.b64decode(packed["counts"]), dtype="<u4")
     assert counts[1:4].tolist() == [3, 1, 2]
     assert 20 < counts[0] == counts[4] < 150
-    grid = np.frombuffer(base64.b64decode(packed["vertices"]), dtype="<u2").reshape(-1, 2)[: counts[0]]
+    grid = np.frombuffer(base64.b64decode(packed["vertices"]), dtype="<u2").reshape(-1, 2)[
+        : counts[0]
+    ]
     drawn = 2.0 * grid / STEPS_OF_A_BOX - 1.0
     chords = 0.5 * (drawn + np.roll(drawn, 1, axis=0))
     assert np.hypot(*chords.T).min() > 1.0 - 2.0 * TOLERANCE - 1e-4

@@ -1,4 +1,6 @@
-"""What the commands of the problems have in common: files, trajectories, and one message for bad input."""
+"""What the commands of the problems have in common: files, trajectories, and one message for bad
+input.
+"""
 
 from __future__ import annotations
 
@@ -29,8 +31,11 @@ COMMANDS = {
 
 @pytest.mark.parametrize("module", COMMANDS)
 @pytest.mark.usefixtures("unrendered")
-def test_the_folder_has_the_problem_the_results_and_the_figures(module: str, infoset: Command, tmp_path: Path) -> None:
-    command, arguments = import_module(f"infoset.experiments.{module}").COMMAND, COMMANDS[module]
+def test_the_folder_has_the_problem_the_results_and_the_figures(
+    module: str, infoset: Command, tmp_path: Path
+) -> None:
+    command = import_module(f"infoset.experiments.{module}").COMMAND
+    arguments = COMMANDS[module]
     pages = () if command.to_html is None else ("--html", "page.html")
     assert infoset(*arguments, "--out", "found", "--json", "x.json", *pages, "-q") == (0, "", "")
     figures = [f"{name}.{kind}" for name in command.figure_names for kind in ("pdf", "png")]
@@ -43,12 +48,16 @@ def test_the_folder_has_the_problem_the_results_and_the_figures(module: str, inf
     assert pages == () or arguments[1] in (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "--overwrite" in infoset.refused(*arguments, "--json", "x.json")
     # The written problem is the same problem.
-    again = strict(infoset(arguments[0], "found/problem.toml", *arguments[2:], "--json", "-", "-q")[1])
+    again = strict(
+        infoset(arguments[0], "found/problem.toml", *arguments[2:], "--json", "-", "-q")[1]
+    )
     assert again == found
 
 
 @pytest.mark.parametrize("command", [arguments[0] for arguments in COMMANDS.values()])
-def test_an_unknown_problem_is_refused_with_one_message(command: str, infoset: Command, tmp_path: Path) -> None:
+def test_an_unknown_problem_is_refused_with_one_message(
+    command: str, infoset: Command, tmp_path: Path
+) -> None:
     err = infoset.refused(command, "bad\x1b[31mname", "--json", "x.json")
     assert "built-in problem: there is no" in err
     assert "\x1b" not in err
@@ -69,9 +78,14 @@ def test_craft_meet_at_the_end(infoset: Command) -> None:
     assert ends[0] == pytest.approx(ends[2], abs=1e-9)
 
 
-def test_the_chaser_is_where_the_targets_are_at_their_times(infoset: Command, tmp_path: Path) -> None:
+def test_the_chaser_is_where_the_targets_are_at_their_times(
+    infoset: Command, tmp_path: Path
+) -> None:
     rows = table(infoset, "multipoint", "service-3", "--json", "flown.json")
-    at = {(row["craft"], float(row["time_s"])): [float(row[name]) for name in STATE[:3]] for row in rows}
+    at = {
+        (row["craft"], float(row["time_s"])): [float(row[name]) for name in STATE[:3]]
+        for row in rows
+    }
     result = strict((tmp_path / "flown.json").read_text())
     for name, time_s in zip(result["order"], result["times_s"], strict=True):
         assert at["chaser", time_s] == pytest.approx(at[name, time_s], abs=1e-6)
@@ -83,14 +97,22 @@ def test_selected_controls_are_written_on_both_models(infoset: Command) -> None:
     assert list(rows[0]) == ["control", "model", "time_s", *STATE, *CONTROL]
     energy = [row for row in rows if (row["control"], row["model"]) == ("energy", "nonlinear")]
     assert [row["time_s"] for row in energy] == ["0.0", "180.0", "360.0", "540.0", "720.0"]
-    assert math.hypot(*(float(energy[-1][name]) for name in STATE)) == pytest.approx(1.668, abs=1e-3)
+    assert math.hypot(*(float(energy[-1][name]) for name in STATE)) == pytest.approx(
+        1.668, abs=1e-3
+    )
     assert energy[-1]["ux_m_s2"] == ""
     assert max(abs(float(row["ux_m_s2"])) for row in energy[:-1]) <= 0.15
 
 
 def test_both_players_are_at_the_capture(infoset: Command) -> None:
     rows = table(infoset, "pursuit")
-    assert list(rows[0]) == ["player", "time_s", *STATE, "mass_kg", *(f"thrust_direction_{axis}" for axis in "xyz")]
+    assert list(rows[0]) == [
+        "player",
+        "time_s",
+        *STATE,
+        "mass_kg",
+        *(f"thrust_direction_{axis}" for axis in "xyz"),
+    ]
     ends = {row["player"]: [float(row[name]) for name in STATE[:3]] for row in rows}
     assert math.dist(ends["pursuer"], ends["evader"]) < 1.0
     assert float(rows[-1]["time_s"]) == pytest.approx(45343.620266)

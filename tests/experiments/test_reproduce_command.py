@@ -40,7 +40,8 @@ def only(*numbers: Comparison) -> Callable[[Paper, Progress], tuple[Comparison, 
 
 
 @pytest.mark.parametrize(
-    ("text", "unit"), [("0.0690", 1e-4), ("-2018.0", 0.1), ("80", 1.0), ("5.58794e-8", 1e-13), ("1.20e3", 10.0)]
+    ("text", "unit"),
+    [("0.0690", 1e-4), ("-2018.0", 0.1), ("80", 1.0), ("5.58794e-8", 1e-13), ("1.20e3", 10.0)],
 )
 def test_the_last_digit_of_what_is_printed(text: str, unit: float) -> None:
     assert last_digit(text) == pytest.approx(unit, rel=1e-12)
@@ -104,12 +105,19 @@ def test_every_number_of_a_file_needs_one_of_ours() -> None:
 
 
 def differences(velocities: np.ndarray, paper: Paper) -> np.ndarray:
-    """Ours less the printed numbers that identify the start velocities, in units of their last digits."""
+    """Ours less the printed numbers that identify the start velocities, in units of their last
+    digits.
+    """
     settings = [
         "orbit_rate_rad_s=0.00117689",
-        *(f"craft.{index}.velocity_m_s={each.tolist()}" for index, each in enumerate(velocities, start=1)),
+        *(
+            f"craft.{index}.velocity_m_s={each.tolist()}"
+            for index, each in enumerate(velocities, start=1)
+        ),
     ]
-    ours: dict[str, Sequence[float]] = results(solve_encounter(load_problem(PROBLEM, settings).encounter), paper)
+    ours: dict[str, Sequence[float]] = results(
+        solve_encounter(load_problem(PROBLEM, settings).encounter), paper
+    )
     return np.array(
         [
             (value - number.value) / last_digit(number.printed)
@@ -126,12 +134,16 @@ def test_the_start_velocities_of_the_encounter_are_the_least_squares_fit() -> No
     fitted = np.array([craft.state[3:] for craft in encounter.craft])
     printed = np.array([craft.state[3:] for craft in load_problem(PROBLEM).encounter.craft])
     assert np.abs(fitted - printed).max() < 0.5e-4
-    at, unit = differences(fitted, paper), 1e-4
+    at = differences(fitted, paper)
+    unit = 1e-4
     slopes = [differences(fitted + unit * step.reshape(3, 3), paper) - at for step in np.eye(9)]
     # A step of the Gauss-Newton method changes nothing, in units of the last printed digit.
     assert np.abs(np.linalg.lstsq(np.stack(slopes, axis=1), at, rcond=None)[0]).max() < 1e-5
-    # The printed velocities alone do not give the last digits, but give the positions of the table to 4e-4 m.
-    rounded = results(solve_encounter(load_problem(PROBLEM, ["orbit_rate_rad_s=0.00117689"]).encounter), paper)
+    # The printed velocities alone do not give the last digits, but give the positions of the table
+    # to 4e-4 m.
+    rounded = results(
+        solve_encounter(load_problem(PROBLEM, ["orbit_rate_rad_s=0.00117689"]).encounter), paper
+    )
     for number, value in zip(paper.tables["table"], rounded["table"], strict=True):
         low, high = interval(number.printed, 0.5, 4e-4)
         assert number.corrected is not None or low <= value <= high, number.name
@@ -157,7 +169,14 @@ def test_json_and_text_of_one_paper(infoset: Command, tmp_path: Path) -> None:
     mended = by_name["first, x_3, 1"]
     assert (mended["corrected"], mended["verdict"]) == ("8.73291025e7", "misprint")
     assert all(each["note"] for each in paper["numbers"] if each["verdict"] != "agreed")
-    for piece in ("-28.795", "not explained", "misprint (2)", "right: 8.73291025e7", "0.00117689", "147 numbers"):
+    for piece in (
+        "-28.795",
+        "not explained",
+        "misprint (2)",
+        "right: 8.73291025e7",
+        "0.00117689",
+        "147 numbers",
+    ):
         assert piece in out
 
 
@@ -177,7 +196,11 @@ def test_a_number_that_should_agree_and_does_not(
     assert f"table 1, y (m): 1.25, ours {ours}" in err
     assert "x (m)" not in err
     found = strict(out)["papers"][0]["numbers"]
-    assert [each["verdict"] for each in found] == ["agreed", "disagreed", "explained by another model"]
+    assert [each["verdict"] for each in found] == [
+        "agreed",
+        "disagreed",
+        "explained by another model",
+    ]
     assert [each["ours"] for each in found] == [1.25, 1.3 if ours == 1.3 else None, 1.9]
     assert [each["other_model"] for each in found] == [None, None, 1.2512]
     assert "1.25  1.9000       1.2512  explained by another model (1)" in run()[1]
@@ -201,7 +224,9 @@ def test_reachability_tables_stand_as_the_theory_says() -> None:
         ("table 3", "linear x3(2) (m)"),
     ):
         assert by_name[source, name].verdict is Verdict.MISPRINT, name
-    controls = [each for each in found if each.number.source == "table 1" and each.number.name[0] == "u"]
+    controls = [
+        each for each in found if each.number.source == "table 1" and each.number.name[0] == "u"
+    ]
     assert [each.verdict for each in controls] == [Verdict.AGREED] * 12
     for table in (1, 2, 3):
         miss = by_name[f"table {table}", "nonlinear, norm of x(4)"]
@@ -212,7 +237,8 @@ def test_reachability_tables_stand_as_the_theory_says() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "tables"), [("multipoint", 9), ("pursuit", 1), pytest.param("pursuit", 9, marks=pytest.mark.thorough)]
+    ("name", "tables"),
+    [("multipoint", 9), ("pursuit", 1), pytest.param("pursuit", 9, marks=pytest.mark.thorough)],
 )
 def test_results_of_commands_agree(name: str, tables: int) -> None:
     paper = read_paper(name)

@@ -27,7 +27,9 @@ LINE = "model: guaranteed, the default of studies; to use that of the file, add 
     ids=lambda line: line.split()[0],
 )
 @pytest.mark.usefixtures("unrendered")
-def test_the_default_model_is_the_guaranteed_one(infoset: Command, brief: Scenario, tmp_path: Path, line: str) -> None:
+def test_the_default_model_is_the_guaranteed_one(
+    infoset: Command, brief: Scenario, tmp_path: Path, line: str
+) -> None:
     (tmp_path / "brief.toml").write_text(to_toml(brief))
     for name, chosen in {"guaranteed": [], "paper": ["--model", "paper"]}.items():
         code, out, err = infoset(*line.format(name).split(), *chosen, "--json", "-")
@@ -38,7 +40,9 @@ def test_the_default_model_is_the_guaranteed_one(infoset: Command, brief: Scenar
             assert json.loads(out)["model"] == name
 
 
-def test_a_resumed_folder_keeps_its_model(infoset: Command, brief_file: Path, tmp_path: Path) -> None:
+def test_a_resumed_folder_keeps_its_model(
+    infoset: Command, brief_file: Path, tmp_path: Path
+) -> None:
     asked = ("campaign", brief_file, "--chunk", 4, "--out", "runs")
     assert infoset(*asked, "--runs", 4, "--model", "paper")[0] == 0
     code, _, err = infoset(*asked, "--runs", 8, "--resume")

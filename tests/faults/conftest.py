@@ -46,7 +46,9 @@ def file(brief: Scenario, tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def infoset(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Command:
+def infoset(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> Command:
     """Run a command in this process, in an empty folder: exit code, stdout and stderr."""
     return Command.in_folder(tmp_path, capsys, monkeypatch)
 
@@ -57,14 +59,20 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
     folder = tmp_path / "disk"
     folder.mkdir()
     command = ["mount", "-t", "tmpfs", "-o", "size=32k", "tmpfs", str(folder)]
-    if shutil.which("mount") is None or subprocess.run(command, capture_output=True, check=False).returncode != 0:
+    if (
+        shutil.which("mount") is None
+        or subprocess.run(command, capture_output=True, check=False).returncode != 0
+    ):
         pytest.skip("a small tmpfs cannot be mounted here")
     yield folder
     subprocess.run(["umount", folder], check=True)
 
 
 def begin(
-    *arguments: object, folder: Path, environment: Mapping[str, str] | None = None, prefix: tuple[str, ...] = ()
+    *arguments: object,
+    folder: Path,
+    environment: Mapping[str, str] | None = None,
+    prefix: tuple[str, ...] = (),
 ) -> subprocess.Popen[str]:
     """Begin the command in another process."""
     return subprocess.Popen(
@@ -107,6 +115,9 @@ def ordinary() -> tuple[str, ...]:
     if os.getuid() != 0:
         return ()
     prefix = ("setpriv", "--bounding-set=-dac_override,-dac_read_search,-fowner")
-    if shutil.which("setpriv") is None or subprocess.run([*prefix, "true"], check=False).returncode != 0:
+    if (
+        shutil.which("setpriv") is None
+        or subprocess.run([*prefix, "true"], check=False).returncode != 0
+    ):
         pytest.skip("root cannot give up its rights here")
     return prefix

@@ -1,4 +1,6 @@
-"""Compiled kernels: stale sources, no home, an installation that may not be written, two processes at once."""
+"""Compiled kernels: stale sources, no home, an installation that may not be written, two processes
+at once.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,13 @@ from infoset.rendezvous import _compile as _compile_of_rendezvous
 
 pytestmark = pytest.mark.thorough
 
-PACKAGES = ("infoset", "infoset.guidance", "infoset.sim", "infoset.rendezvous", "infoset.experiments")
+PACKAGES = (
+    "infoset",
+    "infoset.guidance",
+    "infoset.sim",
+    "infoset.rendezvous",
+    "infoset.experiments",
+)
 
 
 def twice(value: float) -> float:
@@ -39,7 +47,9 @@ def nowhere(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("nowhere")
-def test_the_folder_of_the_environment_comes_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_folder_of_the_environment_comes_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert cache_folder(shown) is None
     monkeypatch.setenv(VARIABLE, str(tmp_path / "mine"))
     folder = cache_folder(shown)
@@ -76,14 +86,26 @@ for texts in json.load(sys.stdin):
 
 @pytest.mark.parametrize("sim", ["infoset/sim", "sim"], ids=["installation", "checkout"])
 def test_kernel_is_compiled_again_if_what_it_uses_has_changed(tmp_path: Path, sim: str) -> None:
-    """Functions that a kernel calls and constants of other modules, of `infoset` and of a package inside it."""
+    """Functions that a kernel calls and constants of other modules, of `infoset` and of a package
+    inside it.
+    """
     source = Path(infoset.__file__).parent
-    texts = {f"infoset/{name}": (source / name).read_text() for name in ("__init__.py", "_compile.py", "kernels.py")}
+    texts = {
+        f"infoset/{name}": (source / name).read_text()
+        for name in ("__init__.py", "_compile.py", "kernels.py")
+    }
     texts |= {
         f"{sim}/__init__.py": "",
         f"{sim}/constant.py": "FACTOR = 2.0\n",
-        "infoset/callee.py": "from infoset._compile import inlined\nfrom infoset.sim.constant import FACTOR\n\n\n"
-        "@inlined\ndef times(x):\n    return FACTOR * x\n",
+        "infoset/callee.py": (
+            "from infoset._compile import inlined\n"
+            "from infoset.sim.constant import FACTOR\n"
+            "\n"
+            "\n"
+            "@inlined\n"
+            "def times(x):\n"
+            "    return FACTOR * x\n"
+        ),
         "infoset/caller.py": "from infoset import callee\nfrom infoset._compile import entry\n\n\n"
         "@entry\ndef call(x):\n    return callee.times(x)\n",
     }
@@ -98,13 +120,22 @@ def test_kernel_is_compiled_again_if_what_it_uses_has_changed(tmp_path: Path, si
         [sys.executable, "-B", "-c", PROGRAM, str(tmp_path / "packages")],
         input=json.dumps([texts | changed for changed in changes]),
         cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(tmp_path / "packages"), VARIABLE: str(tmp_path / "cache")},
+        env={
+            **os.environ,
+            "PYTHONPATH": str(tmp_path / "packages"),
+            VARIABLE: str(tmp_path / "cache"),
+        },
         capture_output=True,
         text=True,
         check=True,
     )
 
-    assert done.stdout.splitlines() == ["2.0 0", "4.0 0", "-1.0 0", "2.0 1"]  # at last the first one, stored
+    assert done.stdout.splitlines() == [
+        "2.0 0",
+        "4.0 0",
+        "-1.0 0",
+        "2.0 1",
+    ]  # at last the first one, stored
 
 
 @pytest.fixture(scope="module")
@@ -113,7 +144,8 @@ def installation(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("installed")
     for name in PACKAGES:
         package = Path(str(importlib.import_module(name).__file__)).parent
-        inside, without = folder.joinpath(*name.split(".")), shutil.ignore_patterns("__pycache__")
+        inside = folder.joinpath(*name.split("."))
+        without = shutil.ignore_patterns("__pycache__")
         shutil.copytree(package, inside, ignore=without, dirs_exist_ok=True)
     for path in (folder, *folder.rglob("*")):
         path.chmod(0o500 if path.is_dir() else 0o400)
@@ -132,10 +164,13 @@ def environment_of(installation: Path, temporary: Path, home: Path) -> dict[str,
     }
 
 
-def test_no_folder_can_be_written(installation: Path, tmp_path: Path, ordinary: tuple[str, ...]) -> None:
+def test_no_folder_can_be_written(
+    installation: Path, tmp_path: Path, ordinary: tuple[str, ...]
+) -> None:
     """The library alone, as in a notebook: it works, and one line says what to do."""
     code = (
-        "from infoset.rendezvous.relative_motion.clohessy_wiltshire import angle_less_sine; print(angle_less_sine(1.0))"
+        "from infoset.rendezvous.relative_motion.clohessy_wiltshire import angle_less_sine; "
+        "print(angle_less_sine(1.0))"
     )
     sealed = tmp_path / "home"
     sealed.mkdir(mode=0o500)

@@ -33,11 +33,28 @@ def test_a_full_disk(name: str, infoset: Command, file: Path, small_disk: Path) 
     need_whole(small_disk)
 
 
-def test_a_campaign_on_a_full_disk_goes_on(infoset: Command, brief: Scenario, file: Path, small_disk: Path) -> None:
+def test_a_campaign_on_a_full_disk_goes_on(
+    infoset: Command, brief: Scenario, file: Path, small_disk: Path
+) -> None:
     subprocess.run(["mount", "-o", "remount,size=200k", small_disk], check=True)
-    asked = ("campaign", file, "--model", "paper", "--runs", 1600, "--chunk", 32, "--out", small_disk / "runs", "-q")
+    asked = (
+        "campaign",
+        file,
+        "--model",
+        "paper",
+        "--runs",
+        1600,
+        "--chunk",
+        32,
+        "--out",
+        small_disk / "runs",
+        "-q",
+    )
     err = infoset.refused(*asked)
-    assert "No space left on device; the files in the folder are complete: free some space and run again" in err
+    assert (
+        "No space left on device; the files in the folder are complete: free some space and "
+        "run again"
+    ) in err
     assert 0 < CampaignFolder.read(small_disk / "runs").finished_runs < 1500
     need_whole(small_disk)
     assert infoset(*asked, "--resume")[0] == 2  # still full
@@ -48,7 +65,9 @@ def test_a_campaign_on_a_full_disk_goes_on(infoset: Command, brief: Scenario, fi
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_a_folder_that_may_not_be_written(name: str, file: Path, tmp_path: Path, ordinary: tuple[str, ...]) -> None:
+def test_a_folder_that_may_not_be_written(
+    name: str, file: Path, tmp_path: Path, ordinary: tuple[str, ...]
+) -> None:
     sealed = tmp_path / "sealed"
     sealed.mkdir(mode=0o500)
     left = ended(begin(*COMMANDS[name], "--out", sealed / "o", folder=tmp_path, prefix=ordinary))

@@ -58,7 +58,8 @@ COMMANDS: dict[str, list[object]] = {
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_interrupted_at_random_moments(name: str, file: Path, tmp_path: Path) -> None:
-    command, chance = [*COMMANDS[name], "--overwrite"], random.Random(name)
+    command = [*COMMANDS[name], "--overwrite"]
+    chance = random.Random(name)
     began_s = time.monotonic()
     assert ended(begin(*command, folder=tmp_path)).code == 0
     lasts_s = time.monotonic() - began_s
@@ -70,19 +71,27 @@ def test_interrupted_at_random_moments(name: str, file: Path, tmp_path: Path) ->
         need_whole(tmp_path)
 
 
-@pytest.mark.parametrize(("kind", "times"), [(signal.SIGINT, 10), (signal.SIGKILL, 6)], ids=["interrupted", "killed"])
+@pytest.mark.parametrize(
+    ("kind", "times"), [(signal.SIGINT, 10), (signal.SIGKILL, 6)], ids=["interrupted", "killed"]
+)
 def test_a_campaign_stopped_many_times_gives_the_same_bits(
     kind: signal.Signals, times: int, brief: Scenario, file: Path, tmp_path: Path
 ) -> None:
     """At random moments: before the first file, between two files, and while one is written."""
     many = ("--runs", 2000, "--chunk", 8, "--noise", "mixed", "--model", "paper")
     asked = ("campaign", file, *many, "--out", "runs", "--resume", "-q")
-    chance, stored = random.Random(9), []
+    chance = random.Random(9)
+    stored = []
     shards = tmp_path / "runs" / "shards"
     for _ in range(times):
         process = begin(*asked, folder=tmp_path)
-        before, deadline = len(list(shards.glob("*.parquet"))), time.monotonic() + 60.0
-        while process.poll() is None and len(list(shards.glob("*.parquet"))) == before and time.monotonic() < deadline:
+        before = len(list(shards.glob("*.parquet")))
+        deadline = time.monotonic() + 60.0
+        while (
+            process.poll() is None
+            and len(list(shards.glob("*.parquet"))) == before
+            and time.monotonic() < deadline
+        ):
             time.sleep(0.005)
         time.sleep(chance.uniform(0.0, 0.5))
         process.send_signal(kind)
@@ -118,6 +127,8 @@ from infoset.experiments.__main__ import main
 main()
 """
     command = [sys.executable, "-c", program, "engage", file.name, "-q"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(
+        command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False
+    )
     assert (done.returncode, done.stdout) == (130, "")
     assert "Traceback" not in done.stderr

@@ -22,7 +22,8 @@ LIMITED = (
     "import resource, sys\n"
     "from infoset.experiments.cli import main\n"
     "import numpy, pyarrow, scipy.linalg, infoset.sim.storage.tables, infoset.sim.simulate\n"
-    "import infoset.experiments.campaigns.run_campaign, infoset.experiments.interception.scenario_file\n"
+    "import infoset.experiments.campaigns.run_campaign, "
+    "infoset.experiments.interception.scenario_file\n"
     "from infoset.engine import location, section_passes\n"
     "used = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize()\n"
     "resource.setrlimit(resource.RLIMIT_AS, (used + int(sys.argv[1]),) * 2)\n"
@@ -30,12 +31,15 @@ LIMITED = (
 )
 """A process that may allocate so many bytes more than it has after loading, as under `ulimit -v`.
 
-OpenBLAS, which Numba loads with scipy.linalg, does not end where it finds no memory, and is loaded before.
+OpenBLAS, which Numba loads with scipy.linalg, does not end where it finds no memory, and is loaded
+before.
 """
 
 
 def with_room(room_bytes: int, *arguments: object, folder: Path) -> Left:
-    """Run the command with so much memory beyond what Python and its libraries take; kill it after two minutes."""
+    """Run the command with so much memory beyond what Python and its libraries take; kill it after
+    two minutes.
+    """
     try:
         done = subprocess.run(
             [sys.executable, "-c", LIMITED, str(room_bytes), *map(str, arguments)],
@@ -74,17 +78,28 @@ def test_no_memory_is_a_message_that_says_how_to_go_on(
     assert infoset(*asked, "--resume", "-q")[0] == 0
 
 
-@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="how much memory is taken is told here otherwise")
-def test_a_campaign_under_a_limit_ends_and_is_resumed(brief: Scenario, file: Path, tmp_path: Path) -> None:
-    """With however little memory: the shards that are there are complete, and the campaign can be resumed.
+@pytest.mark.skipif(
+    not Path("/proc/self/statm").exists(), reason="how much memory is taken is told here otherwise"
+)
+def test_a_campaign_under_a_limit_ends_and_is_resumed(
+    brief: Scenario, file: Path, tmp_path: Path
+) -> None:
+    """With however little memory: the shards that are there are complete, and the campaign can be
+    resumed.
 
-    Where a library or Python itself fails for want of memory, it may end the process in its own way, or wait forever.
-    So few runs are simulated in threads: Python's pool of processes waits for a thread that had no memory.
+    Where a library or Python itself fails for want of memory, it may end the process in its own
+    way, or wait forever. So few runs are simulated in threads: Python's pool of processes waits for
+    a thread that had no memory.
     """
     study = ("campaign", file, "--model", "paper")
     asked = (*study, "--runs", 2048, "--chunk", 512, "--out", "runs", "--resume", "--workers", 2)
     # What compiles is not ours: the kernels are made before.
-    assert with_room(4 << 30, *study, "--runs", 32, "--out", "first", "--workers", 1, folder=tmp_path).code == 0
+    assert (
+        with_room(
+            4 << 30, *study, "--runs", 32, "--out", "first", "--workers", 1, folder=tmp_path
+        ).code
+        == 0
+    )
     codes = []
     for room_bytes in (1 << 20, 8 << 20, 32 << 20, 128 << 20):
         left = with_room(room_bytes, *asked, folder=tmp_path)

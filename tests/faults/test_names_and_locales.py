@@ -23,7 +23,9 @@ LONGEST = f"{'n' * 240} Ünï-цель"
 """A name of 255 bytes, the maximum."""
 
 
-def test_files_are_the_same_with_a_decimal_comma(brief: Scenario, file: Path, tmp_path: Path) -> None:
+def test_files_are_the_same_with_a_decimal_comma(
+    brief: Scenario, file: Path, tmp_path: Path
+) -> None:
     if shutil.which("localedef") is None:
         pytest.skip("there is no localedef")
     make = ["localedef", "--no-archive", "-i", "de_DE", "-f", "UTF-8", str(tmp_path / GERMAN)]
@@ -43,17 +45,28 @@ def test_files_are_the_same_with_a_decimal_comma(brief: Scenario, file: Path, tm
 
 
 @pytest.mark.parametrize(
-    "name", [LONGEST, "with some spaces", "標的-🛰", 'quote\'s "and" $HOME', "-rf", "line\nbreak"], ids=ascii
+    "name",
+    [LONGEST, "with some spaces", "標的-🛰", 'quote\'s "and" $HOME', "-rf", "line\nbreak"],
+    ids=ascii,
 )
-def test_a_folder_of_any_name(name: str, infoset: Command, file: Path, brief: Scenario, tmp_path: Path) -> None:
+def test_a_folder_of_any_name(
+    name: str, infoset: Command, file: Path, brief: Scenario, tmp_path: Path
+) -> None:
     home = tmp_path / name
     home.mkdir()
     scenario = home / "an approach, brief.toml"
     shutil.copy(file, scenario)
-    code, _, err = infoset("engage", scenario, "--record", home / "flight.npz", "--json", home / "r.json")
+    code, _, err = infoset(
+        "engage", scenario, "--record", home / "flight.npz", "--json", home / "r.json"
+    )
     assert (code, err) == (0, f"wrote r.json, flight.npz in {home}\n")
     assert infoset("replay", home / "flight.npz", "--html", home / "page.html")[0] == 0
-    assert infoset("campaign", scenario, "--runs", 8, "--model", "paper", "--out", home / "runs", "-q")[0] == 0
+    assert (
+        infoset(
+            "campaign", scenario, "--runs", 8, "--model", "paper", "--out", home / "runs", "-q"
+        )[0]
+        == 0
+    )
     assert CampaignFolder.read(home / "runs").complete
     assert load_scenario(home / "runs" / "scenario.toml") == brief
     need_whole(home)

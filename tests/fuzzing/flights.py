@@ -1,4 +1,6 @@
-"""Engagements in proportion to a few numbers, flown and looked at: what the tests of numbers under stress share."""
+"""Engagements in proportion to a few numbers, flown and looked at: what the tests of numbers under
+stress share.
+"""
 
 from __future__ import annotations
 
@@ -55,17 +57,21 @@ def engagement(
     The centroid error of a camera is the largest one.
     """
     slope = math.tan(angle_rad)
-    z, v = range_m * slope, 0.2 * speed_m_s * slope
+    z = range_m * slope
+    v = 0.2 * speed_m_s * slope
     bounds = StateBox(
         (-z, z),
         (0.9 * range_m, 1.1 * range_m),
         (-v, 0.7 * v),
         (-speed_m_s * (1.0 + speed_error), -speed_m_s * (1.0 - speed_error)),
     )
-    sensor: AngleSensor | Camera = AngleSensor(step_s, error * angle_rad, 1.5 * error * angle_rad, range_m)
+    sensor: AngleSensor | Camera = AngleSensor(
+        step_s, error * angle_rad, 1.5 * error * angle_rad, range_m
+    )
     if camera:
         sensor = Camera(step_s, error * angle_rad, 0.001999 * range_m)
-    thruster, disturbance = Thruster(10.0 * v, 1e-3 * v, 0.2 * v), 0.01 * slope * speed_m_s**2 / range_m
+    thruster = Thruster(10.0 * v, 1e-3 * v, 0.2 * v)
+    disturbance = 0.01 * slope * speed_m_s**2 / range_m
     along_y = None
     if in_space:
         bounds = replace(bounds, y_m=(-0.6 * z, 0.9 * z), vy_m_s=(-0.8 * v, v))
@@ -107,7 +113,8 @@ def numbers(scenario: Scenario, seed: int, batch: int = 3) -> Draws:
         return np.clip(generator.uniform(-2.0, 2.0, shape), -1.0, 1.0)
 
     states = minimum + (maximum - minimum) * generator.uniform(size=(batch, len(minimum)))
-    errors, tie = {"angle": uniform(), "range": uniform((batch, steps))}, uniform()
+    errors = {"angle": uniform(), "range": uniform((batch, steps))}
+    tie = uniform()
     if scenario.rate_sensor is not None:
         errors["rate"] = uniform()
     return Draws(
@@ -120,7 +127,9 @@ def numbers(scenario: Scenario, seed: int, batch: int = 3) -> Draws:
     )
 
 
-def fly(scenario: Scenario, draws: Draws, strategy: Strategy | None = None, steps: int | None = None) -> Flight:
+def fly(
+    scenario: Scenario, draws: Draws, strategy: Strategy | None = None, steps: int | None = None
+) -> Flight:
     flight = Engagements(scenario, draws, strategy)
     seen: list[Step] = []
     labels: list[Floats] = []
@@ -131,7 +140,9 @@ def fly(scenario: Scenario, draws: Draws, strategy: Strategy | None = None, step
 
     while flight.flying and (steps is None or flight.step < steps):
         flight.advance(look)
-    first_new = next((i for i, here in enumerate(labels) if not np.array_equal(here, labels[0])), len(labels))
+    first_new = next(
+        (i for i, here in enumerate(labels) if not np.array_equal(here, labels[0])), len(labels)
+    )
     return Flight(
         np.array([step.predicted_miss.lower_m for step in seen]),
         np.array([step.predicted_miss.upper_m for step in seen]),
@@ -155,10 +166,13 @@ def mirrored(scenario: Scenario, draws: Draws) -> tuple[Scenario, Draws]:
         return replace(mirror, y_m=turned(box.y_m), vy_m_s=turned(box.vy_m_s))
 
     swapped = {TieRule.UPPER: TieRule.LOWER, TieRule.LOWER: TieRule.UPPER}
-    sun, flip = scenario.sun, np.array([-1.0] * len(scenario.set_model.axes) + [1.0])
+    sun = scenario.sun
+    flip = np.array([-1.0] * len(scenario.set_model.axes) + [1.0])
     image = replace(
         scenario,
-        sun=None if sun is None else replace(sun, direction_rad=-sun.direction_rad, elevation_rad=-sun.elevation_rad),
+        sun=None
+        if sun is None
+        else replace(sun, direction_rad=-sun.direction_rad, elevation_rad=-sun.elevation_rad),
         dispersion=across(scenario.dispersion),
         **of_model(replace(scenario.set_model, bounds=across(scenario.set_model.bounds))),
         tie=swapped.get(scenario.tie, scenario.tie),
@@ -167,7 +181,9 @@ def mirrored(scenario: Scenario, draws: Draws) -> tuple[Scenario, Draws]:
         draws,
         position_m=draws.position_m * flip,
         velocity_m_s=draws.velocity_m_s * flip,
-        errors={name: errors if name == "range" else -errors for name, errors in draws.errors.items()},
+        errors={
+            name: errors if name == "range" else -errors for name, errors in draws.errors.items()
+        },
         tie=-draws.tie,
         target=None if draws.target is None else -draws.target,
     )
@@ -175,18 +191,27 @@ def mirrored(scenario: Scenario, draws: Draws) -> tuple[Scenario, Draws]:
 
 def scaled(scenario: Scenario, draws: Draws, length: float, time: float) -> tuple[Scenario, Draws]:
     """The same engagement in other units, its numbers left without them."""
-    speed, acceleration = length / time, length / time**2
+    speed = length / time
+    acceleration = length / time**2
 
     def box(given_box: StateBox) -> StateBox:
         units = {name: speed if name.endswith("_m_s") else length for name in vars(given_box)}
-        ends = {name: tuple(units[name] * end for end in ends) for name, ends in vars(given_box).items() if ends}
+        ends = {
+            name: tuple(units[name] * end for end in ends)
+            for name, ends in vars(given_box).items()
+            if ends
+        }
         return StateBox(**ends)
 
     def in_units(acceleration_m_s2: float | None) -> float | None:
         return None if acceleration_m_s2 is None else acceleration * acceleration_m_s2
 
-    model, engine, sun, target = scenario.set_model, scenario.thruster, scenario.sun, scenario.target
-    ranging, rating = scenario.range_sensor, scenario.rate_sensor
+    model = scenario.set_model
+    engine = scenario.thruster
+    sun = scenario.sun
+    target = scenario.target
+    ranging = scenario.range_sensor
+    rating = scenario.rate_sensor
     sensor = replace(model.angle_sensor, period_s=time * model.angle_sensor.period_s)
     if isinstance(sensor, AngleSensor):
         sensor = replace(sensor, nominal_range_m=length * sensor.nominal_range_m)
@@ -218,11 +243,18 @@ def scaled(scenario: Scenario, draws: Draws, length: float, time: float) -> tupl
         if sun is None
         else replace(
             sun,
-            gravitational_parameter_m3_s2=length * acceleration * length * sun.gravitational_parameter_m3_s2,
+            gravitational_parameter_m3_s2=length
+            * acceleration
+            * length
+            * sun.gravitational_parameter_m3_s2,
             distance_m=length * sun.distance_m,
         ),
-        range_sensor=None if ranging is None else replace(ranging, period_s=time * ranging.period_s),
-        rate_sensor=None if rating is None else RateSensor(time * rating.period_s, rating.error_rad_s / time),
+        range_sensor=None
+        if ranging is None
+        else replace(ranging, period_s=time * ranging.period_s),
+        rate_sensor=None
+        if rating is None
+        else RateSensor(time * rating.period_s, rating.error_rad_s / time),
         target=None
         if target is None
         else Target(

@@ -7,19 +7,91 @@ import re
 from collections.abc import Callable
 
 VALUES = (
-    *("nan", "inf", "-inf", "-1", "0", "-0.0", "1e999999999", "1e-999999999", "1e308", "1e15", "1e-100", "1e-300"),
-    *("9" * 400, "0x7fffffffffffffffff", "true", '""', '"text"', '"\\u0000\\u001b[2J"', '"\\ud800"', "[]", "{}"),
-    *("[[]]", "[nan, 1]", "[1, 2]", "[2, 1]", "[1, 2, 3]", "[1e15, -1e15, 1e-100]", "{a.b.c = 1}", "1979-05-27"),
-    *("07:32:00", "'''", '"""', "[" * 300, "[" * 300 + "]" * 300, "{a=" * 100 + "1" + "}" * 100, "\x00", "1__0", "١"),
+    *(
+        "nan",
+        "inf",
+        "-inf",
+        "-1",
+        "0",
+        "-0.0",
+        "1e999999999",
+        "1e-999999999",
+        "1e308",
+        "1e15",
+        "1e-100",
+        "1e-300",
+    ),
+    *(
+        "9" * 400,
+        "0x7fffffffffffffffff",
+        "true",
+        '""',
+        '"text"',
+        '"\\u0000\\u001b[2J"',
+        '"\\ud800"',
+        "[]",
+        "{}",
+    ),
+    *(
+        "[[]]",
+        "[nan, 1]",
+        "[1, 2]",
+        "[2, 1]",
+        "[1, 2, 3]",
+        "[1e15, -1e15, 1e-100]",
+        "{a.b.c = 1}",
+        "1979-05-27",
+    ),
+    *(
+        "07:32:00",
+        "'''",
+        '"""',
+        "[" * 300,
+        "[" * 300 + "]" * 300,
+        "{a=" * 100 + "1" + "}" * 100,
+        "\x00",
+        "1__0",
+        "١",
+    ),
 )
 """Values of every type of TOML, and some of none."""
 
 _LINES = (
-    *("[target]", "[[target]]", "[sun]", "[[sun]]", "[[craft]]", "[[keep_in]]", "[]", "[a.b.c]", "kind = 2"),
-    *("kind = 3", "a" * 2000 + " = 1", ".".join("a" * 400) + " = 1", "'' = 1", '"\\u001b" = 1', "= 1", "\ufeff", "\r"),
+    *(
+        "[target]",
+        "[[target]]",
+        "[sun]",
+        "[[sun]]",
+        "[[craft]]",
+        "[[keep_in]]",
+        "[]",
+        "[a.b.c]",
+        "kind = 2",
+    ),
+    *(
+        "kind = 3",
+        "a" * 2000 + " = 1",
+        ".".join("a" * 400) + " = 1",
+        "'' = 1",
+        '"\\u001b" = 1',
+        "= 1",
+        "\ufeff",
+        "\r",
+    ),
 )
 
-_BYTES = (b"\0", b"\xff", b"\x80", b"\xc0\xaf", b"\xed\xa0\x80", b"\x7f", b"\n", b'"', b"[", b"\xff\xff\xff\xff")
+_BYTES = (
+    b"\0",
+    b"\xff",
+    b"\x80",
+    b"\xc0\xaf",
+    b"\xed\xa0\x80",
+    b"\x7f",
+    b"\n",
+    b'"',
+    b"[",
+    b"\xff\xff\xff\xff",
+)
 
 
 def mutated_toml(text: str, draw: random.Random) -> bytes:
@@ -31,9 +103,14 @@ def mutated_toml(text: str, draw: random.Random) -> bytes:
 
 
 def mutated_bytes(content: bytes, draw: random.Random) -> bytes:
-    """Return bytes with a bit flipped, bytes put in, taken out, repeated or written over, or the end cut off."""
-    at, size = draw.randrange(len(content) + 1), draw.choice((1, 1, 2, 4, 8, 100))
-    match draw.choice(("flip", "flip", "flip", "put in", "take out", "repeat", "write over", "cut off")):
+    """Return bytes with a bit flipped, bytes put in, taken out, repeated or written over, or the
+    end cut off.
+    """
+    at = draw.randrange(len(content) + 1)
+    size = draw.choice((1, 1, 2, 4, 8, 100))
+    match draw.choice(
+        ("flip", "flip", "flip", "put in", "take out", "repeat", "write over", "cut off")
+    ):
         case "flip" if content:
             at = min(at, len(content) - 1)
             return content[:at] + bytes([content[at] ^ 1 << draw.randrange(8)]) + content[at + 1 :]
@@ -67,7 +144,9 @@ def _repeat(lines: list[str], draw: random.Random) -> str:
 def _rename(lines: list[str], draw: random.Random) -> str:
     at = draw.choice(_keys(lines))
     name, equals, value = lines[at].partition("=")
-    name = draw.choice((name[:-2], f"x{name}", name.upper(), f'"{name}"', f"a.{name}", "", draw.choice(lines)))
+    name = draw.choice(
+        (name[:-2], f"x{name}", name.upper(), f'"{name}"', f"a.{name}", "", draw.choice(lines))
+    )
     return "\n".join([*lines[:at], name + equals + value, *lines[at + 1 :]])
 
 
@@ -85,14 +164,24 @@ def _renumber(lines: list[str], draw: random.Random) -> str:
         return text
     number = draw.choice(found)
     exponent = draw.choice((-200, -90, -30, -9, -3, -1, 1, 3, 9, 14, 30, 300))
-    new = draw.choice((f"-{number[0]}", f"{float(number[0][:300])!r}e{exponent}", "0", "nan", "inf", f'"{number[0]}"'))
+    new = draw.choice(
+        (
+            f"-{number[0]}",
+            f"{float(number[0][:300])!r}e{exponent}",
+            "0",
+            "nan",
+            "inf",
+            f'"{number[0]}"',
+        )
+    )
     if "e" in number[0].lower() or "e" in repr(float(number[0][:300])):
         new = draw.choice((f"1e{exponent}", f"-1e{exponent}", "0.0", "inf"))
     return text[: number.start()] + new + text[number.end() :]
 
 
 def _swap(lines: list[str], draw: random.Random) -> str:
-    one, other = draw.randrange(len(lines)), draw.randrange(len(lines))
+    one = draw.randrange(len(lines))
+    other = draw.randrange(len(lines))
     lines[one], lines[other] = lines[other], lines[one]
     return "\n".join(lines)
 
@@ -108,5 +197,18 @@ def _cut(lines: list[str], draw: random.Random) -> str:
 
 
 _TEXT_MUTATIONS: tuple[Callable[[list[str], random.Random], str], ...] = (
-    *(_drop, _repeat, _rename, _rename, _revalue, _revalue, _revalue, _renumber, _renumber, _swap, _insert, _cut),
+    *(
+        _drop,
+        _repeat,
+        _rename,
+        _rename,
+        _revalue,
+        _revalue,
+        _revalue,
+        _renumber,
+        _renumber,
+        _swap,
+        _insert,
+        _cut,
+    ),
 )

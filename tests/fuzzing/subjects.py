@@ -14,7 +14,11 @@ import numpy as np
 from infoset.experiments.common.built_in_files import SCENARIO, built_in_files
 from infoset.experiments.common.input_file import load_problem, read_text, to_toml
 from infoset.experiments.interception import record_file
-from infoset.experiments.interception.scenario_file import feasibility_warnings, load_scenario, scenario_warnings
+from infoset.experiments.interception.scenario_file import (
+    feasibility_warnings,
+    load_scenario,
+    scenario_warnings,
+)
 from infoset.experiments.interception.trajectory_file import Trajectory
 from infoset.experiments.multipoint.file import MultipointProblem
 from infoset.experiments.observer.file import ObserverProblem
@@ -29,7 +33,9 @@ Found = TypeVar("Found")
 
 
 def attempted(read: Callable[[], Found], refusal: type[Exception]) -> tuple[Found | None, str]:
-    """Return what reading gives and no message, or nothing and the message that it is refused with."""
+    """Return what reading gives and no message, or nothing and the message that it is refused
+    with.
+    """
     try:
         return read(), ""
     except refusal as error:
@@ -67,7 +73,9 @@ def text_files() -> Mapping[str, TextFile]:
         "reachable-system": (ReachableSystem, load_problem),
     }
     return {
-        kind: TextFile(owner, tuple(each.text for each in built_in_files().values() if each.kind == kind), load)
+        kind: TextFile(
+            owner, tuple(each.text for each in built_in_files().values() if each.kind == kind), load
+        )
         for kind, (owner, load) in readers.items()
     }
 
@@ -81,7 +89,8 @@ def small_record(scenario: str = "asteroid-1997") -> Record:
 def same_records(one: Record, other: Record) -> bool:
     """Whether two records are equal bit for bit."""
     names = ("scenario", "versions", "seed", "run", "strategy", "noise", "inconsistency")
-    arrays, others = record_file._to_arrays(one), record_file._to_arrays(other)
+    arrays = record_file._to_arrays(one)
+    others = record_file._to_arrays(other)
     return (
         all(getattr(one, name) == getattr(other, name) for name in names)
         and one.result.outcomes == other.result.outcomes
@@ -89,14 +98,24 @@ def same_records(one: Record, other: Record) -> bool:
     )
 
 
-def remade_record(content: bytes, change: Callable[[dict[str, Any], dict[str, bytes]], None]) -> bytes:
-    """Return a record after a change of its header and its members as bytes, with the sums of the archive."""
+def remade_record(
+    content: bytes, change: Callable[[dict[str, Any], dict[str, bytes]], None]
+) -> bytes:
+    """Return a record after a change of its header and its members as bytes, with the sums of the
+    archive.
+    """
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
-    header = json.loads(np.lib.format.read_array(io.BytesIO(members.pop("header.npy")), allow_pickle=False).tobytes())
+    header = json.loads(
+        np.lib.format.read_array(
+            io.BytesIO(members.pop("header.npy")), allow_pickle=False
+        ).tobytes()
+    )
     change(header, members)
     text = io.BytesIO()
-    np.lib.format.write_array(text, np.frombuffer(json.dumps(header).encode(), dtype=np.uint8), allow_pickle=False)
+    np.lib.format.write_array(
+        text, np.frombuffer(json.dumps(header).encode(), dtype=np.uint8), allow_pickle=False
+    )
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w") as archive:
         for name, member in {"header.npy": text.getvalue(), **members}.items():

@@ -1,21 +1,24 @@
-"""Engagements from a metre to a thousand million kilometres: each works to its tolerance, or is refused and told why.
+"""Engagements from a metre to a thousand million kilometres: each works to its tolerance, or is
+refused and told why.
 
-Angles of 1e-12 to 1 rad (beyond 0.01 rad in the guaranteed model only), ranges of 1 m to 1e9 km, closing speeds of
-1 m/s to 100 km/s, 1 to 500 sections, steps of 1 ms to 1000 s. `Works` means: no warning, and nothing that is not a
-finite number; in the guaranteed model the truth is in its section at every step, the set is not lost and the miss is
-not above Phi; the mirrored engagement is the mirrored one; and an engagement with lengths a times and times b times as
-long gives misses, impulses and bounds scaled by a, a/b and a, to 1e-9. (A miss is the difference of positions: it is
+Angles of 1e-12 to 1 rad (beyond 0.01 rad in the guaranteed model only), ranges of 1 m to 1e9 km,
+closing speeds of 1 m/s to 100 km/s, 1 to 500 sections, steps of 1 ms to 1000 s. `Works` means: no
+warning, and nothing that is not a finite number; in the guaranteed model the truth is in its
+section at every step, the set is not lost and the miss is not above Phi; the mirrored engagement is
+the mirrored one; and an engagement with lengths a times and times b times as long gives misses,
+impulses and bounds scaled by a, a/b and a, to 1e-9. (A miss is the difference of positions: it is
 known to a few ulp of the range at best, and a miss of 1e-14 of the range to no nine digits.)
 
-Powers of two change exponents only, so they must give the same digits. They do not where times are scaled and the
-truth is integrated in more or fewer substeps for it: one is at most half a second, an absolute time. Strategies that
-count the last seconds (`patient`, `kalman`) have a time of their own: it must be scaled too, and
-that of `patient` cannot be. `kalman` with a range sensor weighs by the logarithm of a length: the last digit moves.
+Powers of two change exponents only, so they must give the same digits. They do not where times are
+scaled and the truth is integrated in more or fewer substeps for it: one is at most half a second,
+an absolute time. Strategies that count the last seconds (`patient`, `kalman`) have a time of their
+own: it must be scaled too, and that of `patient` cannot be. `kalman` with a range sensor weighs by
+the logarithm of a length: the last digit moves.
 
-Other factors round differently, so what rounding decides is left out there: U_s where two sections tie, and all after a
-grid of labels is made anew, for it has sections that are points. Errors that are exactly at their bounds leave sets as
-thin as rounding, whose ends rounding decides: there the errors keep one part in a hundred off their bounds, and are
-not the game's.
+Other factors round differently, so what rounding decides is left out there: U_s where two sections
+tie, and all after a grid of labels is made anew, for it has sections that are points. Errors that
+are exactly at their bounds leave sets as thin as rounding, whose ends rounding decides: there the
+errors keep one part in a hundred off their bounds, and are not the game's.
 """
 
 from __future__ import annotations
@@ -73,7 +76,8 @@ def assert_works(scenario: Scenario, draws: Draws, steps: int | None = None) -> 
     back = fly(*mirrored(scenario, draws), steps=steps)
     size = TOLERANCE * np.abs(there.upper_m - there.lower_m).max()
     np.testing.assert_allclose(back.lower_m, -there.upper_m, rtol=TOLERANCE, atol=size)
-    # In space one component of an impulse may be zero up to rounding; in a plane such an impulse is not given.
+    # In space one component of an impulse may be zero up to rounding; in a plane such an impulse is
+    # not given.
     size = TOLERANCE * np.abs(there.impulse_m_s).max() if scenario.is_spatial else 0.0
     np.testing.assert_allclose(back.impulse_m_s, -there.impulse_m_s, rtol=TOLERANCE, atol=size)
     np.testing.assert_allclose(back.results.miss_m, there.results.miss_m, rtol=TOLERANCE)
@@ -81,7 +85,8 @@ def assert_works(scenario: Scenario, draws: Draws, steps: int | None = None) -> 
     return there
 
 
-# The grid -------------------------------------------------------------------------------------------------------
+# The grid
+# --------------------------------------------------------------------------------------------------
 
 GRID = list(itertools.product(ANGLES_RAD, RANGES_M, SPEEDS_M_S, SECTIONS, STEPS_S))
 
@@ -91,7 +96,9 @@ Combination = tuple[float, float, float, int, float]
 
 @EXAMPLES
 @given(st.sampled_from(GRID), st.sampled_from(Model), st.booleans())
-def test_combinations_work_or_are_refused(combination: Combination, model: Model, in_space: bool) -> None:
+def test_combinations_work_or_are_refused(
+    combination: Combination, model: Model, in_space: bool
+) -> None:
     angle_rad, range_m, speed_m_s, sections, step_s = combination
     assume(model is Model.GUARANTEED or angle_rad <= SMALL_ANGLE_RAD)
     if 1.1 * range_m / (speed_m_s * (1.0 - 1e-3)) / step_s > 1e5:
@@ -120,12 +127,15 @@ WHOLE_FLIGHTS = [
     st.booleans(),
     st.booleans(),
 )
-def test_whole_flights_work_however_few_their_steps(combination: Combination, in_space: bool, camera: bool) -> None:
+def test_whole_flights_work_however_few_their_steps(
+    combination: Combination, in_space: bool, camera: bool
+) -> None:
     scenario = engagement(*combination, in_space=in_space, camera=camera)
     assert assert_works(scenario, numbers(scenario, 1, batch=2)).ended
 
 
-# Scale ----------------------------------------------------------------------------------------------------------
+# Scale
+# --------------------------------------------------------------------------------------------------
 
 
 @st.composite
@@ -134,7 +144,8 @@ def engagements(draw_value: st.DrawFn) -> Scenario:
     model = draw_value(st.sampled_from(Model))
     most = -2.0 if model is Model.PAPER else 0.0
     angle = 10.0 ** draw_value(st.floats(-12.0, most))
-    range_m, speed = 10.0 ** draw_value(st.floats(0.0, 9.0)), 10.0 ** draw_value(st.floats(0.0, 5.0))
+    range_m = 10.0 ** draw_value(st.floats(0.0, 9.0))
+    speed = 10.0 ** draw_value(st.floats(0.0, 5.0))
     steps = 10.0 ** draw_value(st.floats(0.2, 1.5))
     step = range_m / speed / steps
     assume(STEPS_S[0] <= step <= STEPS_S[-1])
@@ -162,7 +173,9 @@ def engagements(draw_value: st.DrawFn) -> Scenario:
     )
 
 
-STRATEGIES = st.sampled_from([SymmetricMiss, ZeroEffortMiss, Kalman, ProportionalNavigation, Predictive])
+STRATEGIES = st.sampled_from(
+    [SymmetricMiss, ZeroEffortMiss, Kalman, ProportionalNavigation, Predictive]
+)
 STEADY = st.sampled_from([ZeroEffortMiss, Kalman])
 POWERS = st.integers(-20, 20)
 
@@ -173,28 +186,39 @@ def strategy_of(kind: type[Strategy], time: float) -> Strategy:
 
 
 def digits(scenario: Scenario, kind: type[Strategy]) -> float:
-    """What a power of two may change: nothing, but for the logarithm of a range's variance in the filters."""
+    """What a power of two may change: nothing, but for the logarithm of a range's variance in the
+    filters.
+    """
     uses_filters = kind in (Kalman, ProportionalNavigation, Predictive)
     return TOLERANCE if uses_filters and scenario.range_sensor is not None else 0.0
 
 
 def assert_scales(
-    scenario: Scenario, kind: type[Strategy], length: float, time: float, tolerance: float, seed: int
+    scenario: Scenario,
+    kind: type[Strategy],
+    length: float,
+    time: float,
+    tolerance: float,
+    seed: int,
 ) -> None:
     draws = numbers(scenario, seed)
     if tolerance > 0.0:
-        draws = replace(draws, errors={name: 0.99 * errors for name, errors in draws.errors.items()})
+        draws = replace(
+            draws, errors={name: 0.99 * errors for name, errors in draws.errors.items()}
+        )
     steps = max(3, int(2e2 / scenario.set_model.step_s))
     one = fly(scenario, draws, strategy_of(kind, 1.0), steps)
     other = fly(*scaled(scenario, draws, length, time), strategy_of(kind, time), steps)
     assert other.lower_m.shape == one.lower_m.shape
-    speed, ulps = length / time, 8.0 * 2.0**-52 * scenario.nominal_range_m
+    speed = length / time
+    ulps = 8.0 * 2.0**-52 * scenario.nominal_range_m
     if tolerance == 0.0:
         assert other.results.outcomes == one.results.outcomes
         for mine, yours, unit in zip(one.seen, other.seen, (length, length, speed), strict=True):
             assert (unit * mine).tolist() == yours.tolist()
         return
-    # A new grid has labels at the ends of those that live, where sections are points: rounding lets them die or not.
+    # A new grid has labels at the ends of those that live, where sections are points: rounding lets
+    # them die or not.
     alike = min(one.steps_before_a_new_grid, other.steps_before_a_new_grid)
     compared = [
         (one.lower_m[:alike], other.lower_m[:alike] / length, 0.0),
@@ -203,7 +227,10 @@ def assert_scales(
     ]
     if alike == len(one.lower_m):
         phi, other_phi = (flight.results.guaranteed_miss_m.filled(0.0) for flight in (one, other))
-        compared += [(one.results.miss_m, other.results.miss_m / length, ulps), (phi, other_phi / length, ulps)]
+        compared += [
+            (one.results.miss_m, other.results.miss_m / length, ulps),
+            (phi, other_phi / length, ulps),
+        ]
     for mine, yours, rounding in compared:
         size = tolerance * np.abs(mine).max(initial=0.0) + rounding
         np.testing.assert_allclose(yours, mine, rtol=tolerance, atol=size)
@@ -222,35 +249,50 @@ def test_lengths_and_times_a_power_of_two_as_long_give_the_same_digits(
 def test_other_units_give_the_scaled_answer(
     scenario: Scenario, kind: type[Strategy], length: float, time: float, seed: int
 ) -> None:
-    """In free space, where substeps are exact; random noise, for the game's choices jump where rounding decides.
+    """In free space, where substeps are exact; random noise, for the game's choices jump where
+    rounding decides.
 
-    So does U_s, where two sections reach the same extreme of the predicted miss: of which one the range counts. It is
-    flown below. Without a sensor of the rate: see `test_found_under_stress.py`.
+    So does U_s, where two sections reach the same extreme of the predicted miss: of which one the
+    range counts. It is flown below. Without a sensor of the rate: see `test_found_under_stress.py`.
     """
     honest = replace(scenario, noise=NoiseKind.RANDOM, sun=None, rate_sensor=None)
     assert_scales(honest, kind, 10.0**length, 10.0**time, TOLERANCE, seed)
 
 
-# Degenerate knowledge, and what must be refused -----------------------------------------------------------------
+# Degenerate knowledge, and what must be refused
+# --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("exact", ["z_m", "x_m", "vz_m_s", "vx_m_s", "all"])
 @pytest.mark.parametrize("model", list(Model))
 @pytest.mark.parametrize("sections", [1, 5])
 @pytest.mark.parametrize("in_space", [False, True])
-def test_what_is_known_exactly_is_no_trouble(exact: str, model: Model, sections: int, in_space: bool) -> None:
-    """Sections that are segments and points, labels that are one: the truth is in them up to rounding."""
+def test_what_is_known_exactly_is_no_trouble(
+    exact: str, model: Model, sections: int, in_space: bool
+) -> None:
+    """Sections that are segments and points, labels that are one: the truth is in them up to
+    rounding.
+    """
     scenario = engagement(1e-3, 1e6, 1e3, sections, 50.0, model, in_space=in_space)
     box = scenario.set_model.bounds
-    names = [name for name, ends in vars(box).items() if ends and exact in ("all", name.replace("y", "z"))]
+    names = [
+        name
+        for name, ends in vars(box).items()
+        if ends and exact in ("all", name.replace("y", "z"))
+    ]
     box = replace(box, **{name: (vars(box)[name][1],) * 2 for name in names})
-    scenario = replace(scenario, dispersion=box, **of_model(replace(scenario.set_model, bounds=box)))
+    scenario = replace(
+        scenario, dispersion=box, **of_model(replace(scenario.set_model, bounds=box))
+    )
     for disturbance in (scenario.set_model.disturbance_m_s2, 0.0):
-        still = replace(scenario, **of_model(replace(scenario.set_model, disturbance_m_s2=disturbance)))
+        still = replace(
+            scenario, **of_model(replace(scenario.set_model, disturbance_m_s2=disturbance))
+        )
         there = fly(still, numbers(still, 3))
         assert there.ended
         assert np.isfinite(there.results.miss_m).all()
         if model is Model.GUARANTEED:
             assert Outcome.SET_EMPTY not in there.results.outcomes
-            # Two thousand substeps of half a second round the truth's own position: two thousand ulp of 2 km.
+            # Two thousand substeps of half a second round the truth's own position: two thousand
+            # ulp of 2 km.
             assert there.results.truth_margin_m.min() >= -2200 * 2.0**-52 * 2e3

@@ -1,10 +1,12 @@
 """Laws that polytopes in R^n obey.
 
-Shown elsewhere: hulls and intersections are those of exact rationals, supports of sums, images and projections,
-members of intersections, flat sets, empty and unbounded ones (`tests/infoset/geometry/polytope`).
+Shown elsewhere: hulls and intersections are those of exact rationals, supports of sums, images and
+projections, members of intersections, flat sets, empty and unbounded ones
+(`tests/infoset/geometry/polytope`).
 
-Here: every operation is monotone and includes what it must; cuts, sums, hulls and intersections commute with linear
-maps (shear, shift, scaling, mirror); volumes scale by determinants, multiply in products and obey Brunn and Minkowski.
+Here: every operation is monotone and includes what it must; cuts, sums, hulls and intersections
+commute with linear maps (shear, shift, scaling, mirror); volumes scale by determinants, multiply in
+products and obey Brunn and Minkowski.
 """
 
 from __future__ import annotations
@@ -31,7 +33,9 @@ SEED = st.integers(0, 10**6)
 
 
 def solid(seed: int, space: int) -> Polytope:
-    """A hull of a dozen points of the box [-10, 10]^n, neither thin nor with facets nearly in one plane."""
+    """A hull of a dozen points of the box [-10, 10]^n, neither thin nor with facets nearly in one
+    plane.
+    """
     points = np.random.default_rng(seed).uniform(-SIZE, SIZE, (space + 8, space))
     return Polytope.from_vertices(points)
 
@@ -58,13 +62,16 @@ def same(one: Polytope, other: Polytope, by: float = ROUNDING) -> bool:
     return lies_in(one, other, by) and lies_in(other, one, by)
 
 
-# Polytopes ------------------------------------------------------------------------------------------------------
+# Polytopes
+# --------------------------------------------------------------------------------------------------
 
 
 @some
 @given(SEED, SPACE, KIND)
 def test_operations_commute_with_linear_maps(seed: int, space: int, kind: str) -> None:
-    one, other, matrix = solid(seed, space), solid(seed + 1, space), map_of(kind, seed, space)
+    one = solid(seed, space)
+    other = solid(seed + 1, space)
+    matrix = map_of(kind, seed, space)
     shift = np.random.default_rng(seed).uniform(-SIZE, SIZE, space)
 
     def moved(polytope: Polytope) -> Polytope:
@@ -76,7 +83,9 @@ def test_operations_commute_with_linear_maps(seed: int, space: int, kind: str) -
     offsets = normals @ middle + 0.4 * (one.support_function(normals) - normals @ middle)
     images = normals @ inverse
     assert same(
-        moved(one.cut(normals, upper=offsets)), moved(one).cut(images, upper=offsets + images @ shift), 1e-7 * SIZE
+        moved(one.cut(normals, upper=offsets)),
+        moved(one).cut(images, upper=offsets + images @ shift),
+        1e-7 * SIZE,
     )
     together = one.minkowski_sum(other)
     assert same(moved(together), moved(one).minkowski_sum(other.affine_map(matrix)), 1e-7 * SIZE)
@@ -91,11 +100,15 @@ def test_operations_commute_with_linear_maps(seed: int, space: int, kind: str) -
 
 @some
 @given(SEED, SPACE, st.floats(0.1, 1.0))
-def test_operations_are_monotone_and_include_what_they_must(seed: int, space: int, part: float) -> None:
-    outer, other = solid(seed, space), solid(seed + 1, space)
+def test_operations_are_monotone_and_include_what_they_must(
+    seed: int, space: int, part: float
+) -> None:
+    outer = solid(seed, space)
+    other = solid(seed + 1, space)
     middle = outer.vertices.mean(axis=0)
     inner = outer.affine_map(part * np.eye(space), (1.0 - part) * middle)
-    matrix, normal = map_of("shear", seed, space), np.ones((1, space))
+    matrix = map_of("shear", seed, space)
+    normal = np.ones((1, space))
     level = normal @ middle
     assert lies_in(inner, outer)
     assert lies_in(inner.affine_map(matrix), outer.affine_map(matrix))
@@ -105,7 +118,9 @@ def test_operations_are_monotone_and_include_what_they_must(seed: int, space: in
     assert lies_in(inner.intersection(outer), inner)
     assert lies_in(inner.project([0, 1]), outer.project([0, 1]))
     assert lies_in(product(inner, other), product(outer, other))
-    assert (inner.support_function(np.eye(space)) <= outer.support_function(np.eye(space)) + ROUNDING).all()
+    assert (
+        inner.support_function(np.eye(space)) <= outer.support_function(np.eye(space)) + ROUNDING
+    ).all()
     assert inner.volume() <= outer.volume() * (1.0 + 1e-9)
     hull = Polytope.from_vertices(np.vstack([outer.vertices, other.vertices]))
     assert lies_in(outer, hull)
@@ -115,7 +130,9 @@ def test_operations_are_monotone_and_include_what_they_must(seed: int, space: in
 @some
 @given(SEED, SPACE, KIND, st.floats(0.0, 1.0))
 def test_volumes(seed: int, space: int, kind: str, part: float) -> None:
-    one, other, matrix = solid(seed, space), solid(seed + 1, space), map_of(kind, seed, space)
+    one = solid(seed, space)
+    other = solid(seed + 1, space)
+    matrix = map_of(kind, seed, space)
     volume = one.volume()
     assert one.affine_map(matrix, np.ones(space)).volume() == pytest.approx(
         abs(float(np.linalg.det(matrix))) * volume, rel=1e-9
@@ -127,7 +144,8 @@ def test_volumes(seed: int, space: int, kind: str, part: float) -> None:
     line = Polytope.from_box([-1.0], [2.0])
     assert product(one, line).volume() == pytest.approx(3.0 * volume, rel=1e-9)
     normal = np.random.default_rng(seed).standard_normal((1, space))
-    low, high = -float(one.support_function(-normal)[0]), float(one.support_function(normal)[0])
+    low = -float(one.support_function(-normal)[0])
+    high = float(one.support_function(normal)[0])
     level = np.array([low + (0.05 + 0.9 * part) * (high - low)])
     pieces = one.cut(normal, upper=level).volume() + one.cut(-normal, upper=-level).volume()
     assert pieces == pytest.approx(volume, rel=1e-7)

@@ -1,4 +1,6 @@
-"""Damaged records are refused in one sentence, or are read as they were written: never a wrong picture."""
+"""Damaged records are refused in one sentence, or are read as they were written: never a wrong
+picture.
+"""
 
 from __future__ import annotations
 
@@ -60,7 +62,8 @@ def read_or_refused(file: Path) -> Record | None:
 
 
 def attack(content: bytes, record: Record, file: Path, times: int, seed: int) -> int:
-    draw, refused = random.Random(seed), 0
+    draw = random.Random(seed)
+    refused = 0
     for _ in range(times):
         damaged = damage(content, draw)
         file.write_bytes(damaged)
@@ -93,7 +96,9 @@ def test_damage_whose_sums_were_made_to_fit(content: bytes, tmp_path: Path) -> N
         name = draw.choice([*members])
         members[name] = mutated_bytes(members[name], draw)
         if draw.random() < 0.3:
-            header[draw.choice([*header])] = draw.choice([None, -1, 1e300, [], {}, "x", "\0", True, 10**400])
+            header[draw.choice([*header])] = draw.choice(
+                [None, -1, 1e300, [], {}, "x", "\0", True, 10**400]
+            )
 
     for _ in range(600):
         (tmp_path / "x.npz").write_bytes(remade_record(content, change))
@@ -104,7 +109,8 @@ def deflated_bomb(gigabytes: int) -> bytes:
     """An archive of a megabyte a gigabyte: one block of zeros, deflated, again and again."""
     packer = zlib.compressobj(9, zlib.DEFLATED, -15)
     block = packer.compress(bytes(1 << 20)) + packer.flush(zlib.Z_FULL_FLUSH)
-    data, sizes = block * 1024 + packer.flush(), struct.pack("<I", 1 << 30)
+    data = block * 1024 + packer.flush()
+    sizes = struct.pack("<I", 1 << 30)
     out = io.BytesIO()
     names = [f"{name}.npy" for name in record_file.MEMBERS]
     with zipfile.ZipFile(out, "w") as archive:
@@ -134,14 +140,19 @@ def claiming(content: bytes) -> bytes:
 def array_of_10_gb(content: bytes) -> bytes:
     """A member whose own header claims 10 GB."""
     text = b"{'descr': '<f8', 'fortran_order': False, 'shape': (1250000000,), }".ljust(117) + b"\n"
-    return remade_record(content, lambda _, members: members.update({"time_s.npy": b"\x93NUMPY\x01\0\x76\0" + text}))
+    return remade_record(
+        content, lambda _, members: members.update({"time_s.npy": b"\x93NUMPY\x01\0\x76\0" + text})
+    )
 
 
 def many_members(_: bytes) -> bytes:
     """Twenty megabytes of names, each of which a reader of archives makes an object of."""
-    local, name = b"PK\x03\x04" + bytes(26), b"PK\x01\x02" + bytes(42)
+    local = b"PK\x03\x04" + bytes(26)
+    name = b"PK\x01\x02" + bytes(42)
     count = 400_000
-    end = struct.pack("<4s4H2IH", b"PK\x05\x06", 0, 0, count & 0xFFFF, count & 0xFFFF, count * 46, len(local), 0)
+    end = struct.pack(
+        "<4s4H2IH", b"PK\x05\x06", 0, 0, count & 0xFFFF, count & 0xFFFF, count * 46, len(local), 0
+    )
     return local + name * count + end
 
 
@@ -164,11 +175,15 @@ def refusals(content: bytes, tmp_path_factory: pytest.TempPathFactory) -> Mappin
     folder = tmp_path_factory.mktemp("bombs")
     for name, (bomb, _) in BOMBS.items():
         (folder / f"{name}.npz").write_bytes(bomb(content))
-    return dict(zip(BOMBS, measured("record", *(folder / f"{name}.npz" for name in BOMBS)), strict=True))
+    return dict(
+        zip(BOMBS, measured("record", *(folder / f"{name}.npz" for name in BOMBS)), strict=True)
+    )
 
 
 @pytest.mark.parametrize("name", BOMBS)
-def test_a_bomb_is_refused_in_a_second_and_200_mb(name: str, refusals: Mapping[str, Measured]) -> None:
+def test_a_bomb_is_refused_in_a_second_and_200_mb(
+    name: str, refusals: Mapping[str, Measured]
+) -> None:
     assert BOMBS[name][1] in refusals[name].message
     assert refusals[name].seconds < 1.0
     assert refusals[name].megabytes < 200.0

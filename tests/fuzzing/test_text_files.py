@@ -1,4 +1,6 @@
-"""Damaged files of users and hostile settings are refused in one message with the file and the key."""
+"""Damaged files of users and hostile settings are refused in one message with the file and the
+key.
+"""
 
 from __future__ import annotations
 
@@ -53,7 +55,8 @@ def check_message(message: str, source: object) -> None:
 
 
 def attack(kind: str, times: int, seed: int, file: Path) -> int:
-    draw, refused = random.Random(seed), 0
+    draw = random.Random(seed)
+    refused = 0
     file.write_text(FILES[kind].texts[0])
     FILES[kind].read(str(file))  # imports modules and compiles kernels
     for _ in range(times):
@@ -74,14 +77,22 @@ def test_2000_mutated_files(kind: str, tmp_path: Path) -> None:
 
 
 def attack_settings(kind: str, times: int, seed: int) -> int:
-    draw, refused = random.Random(seed), 0
-    owner, keys = FILES[kind].owner, keys_of(FILES[kind].owner)
+    draw = random.Random(seed)
+    refused = 0
+    owner = FILES[kind].owner
+    keys = keys_of(FILES[kind].owner)
     for _ in range(times):
-        number = draw.choice((".1.", ".0.", ".-1.", ".0000012.", ".99999999999.", ".\u0661.", ".\u00b2.", "."))
+        number = draw.choice(
+            (".1.", ".0.", ".-1.", ".0000012.", ".99999999999.", ".\u0661.", ".\u00b2.", ".")
+        )
         key = draw.choice(keys).replace(".1.", number)
-        key = draw.choice((key, key, key, f"{key}.min", key[:-1], key.partition(".")[0], f".{key}", f"{key}.1"))
+        key = draw.choice(
+            (key, key, key, f"{key}.min", key[:-1], key.partition(".")[0], f".{key}", f"{key}.1")
+        )
         setting = f"{key}={draw.choice(VALUES)}"
-        read = functools.partial(read_text, owner, draw.choice(FILES[kind].texts), "mine.toml", [setting])
+        read = functools.partial(
+            read_text, owner, draw.choice(FILES[kind].texts), "mine.toml", [setting]
+        )
         _, message = attempted(read, InputError)
         if message:
             refused += 1
@@ -95,8 +106,11 @@ def test_5000_hostile_settings(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", FILES)
-def test_a_mutated_file_is_refused_with_exit_code_2(kind: str, infoset: Infoset, tmp_path: Path) -> None:
-    draw, file = random.Random(3), tmp_path / "mutated.toml"
+def test_a_mutated_file_is_refused_with_exit_code_2(
+    kind: str, infoset: Infoset, tmp_path: Path
+) -> None:
+    draw = random.Random(3)
+    file = tmp_path / "mutated.toml"
     done = 0
     while done < 3:
         file.write_bytes(mutated_toml(draw.choice(FILES[kind].texts), draw))
@@ -112,13 +126,18 @@ def test_a_mutated_file_is_refused_with_exit_code_2(kind: str, infoset: Infoset,
 
 
 LONG: dict[str, tuple[str, Callable[[str], str]]] = {
-    "dotted": ("scenario", lambda _: "".join(f"a{place}.{'b.' * 18}c = 1\n" for place in range(2000))),
+    "dotted": (
+        "scenario",
+        lambda _: "".join(f"a{place}.{'b.' * 18}c = 1\n" for place in range(2000)),
+    ),
     "a dotted key": ("scenario", lambda _: f"{'b.' * 45_000}c = 1\n"),
     "a dotted header": ("scenario", lambda _: f"[{'b.' * 45_000}c]\n"),
     "a dotted key in a table": ("scenario", lambda _: f"x = {{{'b.' * 45_000}c = 1}}\n"),
     "keys below a dotted header": (
         "scenario",
-        lambda _: f"[{'b.' * 19}c]\n" + "".join(f"k{place}.{'d.' * 18}e = 1\n" for place in range(2000)),
+        lambda _: (
+            f"[{'b.' * 19}c]\n" + "".join(f"k{place}.{'d.' * 18}e = 1\n" for place in range(2000))
+        ),
     ),
     "a line of numbers": ("scenario", lambda _: f"x = [{'1.5, ' * 19_000}]\n"),
     "a line of tables": ("scenario", lambda _: f"x = [{'{a = 1}, ' * 10_000}]\n"),
@@ -135,7 +154,11 @@ LONG: dict[str, tuple[str, Callable[[str], str]]] = {
         "reachable-rendezvous",
         lambda text: (
             text
-            + "[[keep_in]]\nnormals=[[1,0,0],[-1,0,0],[0,1,0],[0,-1,0],[0,0,1],[0,0,-1]]\noffsets_m=[1,1,1,1,1,1]\n"
+            + (
+                "[[keep_in]]\n"
+                "normals=[[1,0,0],[-1,0,0],[0,1,0],[0,-1,0],[0,0,1],[0,0,-1]]\n"
+                "offsets_m=[1,1,1,1,1,1]\n"
+            )
             * 900
         ),
     ),
@@ -145,7 +168,8 @@ LONG: dict[str, tuple[str, Callable[[str], str]]] = {
 @pytest.mark.parametrize("name", LONG)
 def test_as_much_text_as_is_read_takes_under_two_seconds(name: str, tmp_path: Path) -> None:
     kind, make = LONG[name]
-    text, file = make(FILES[kind].texts[0]), tmp_path / "long.toml"
+    text = make(FILES[kind].texts[0])
+    file = tmp_path / "long.toml"
     assert 80_000 < len(text) <= MAX_FILE_BYTES
     file.write_text(text)
     begun = time.process_time()

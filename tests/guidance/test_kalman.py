@@ -20,7 +20,14 @@ RANGE_M = 2.0**17
 
 def set_model(box: StateBox) -> SetModel:
     """Angles of y without error, and of z with an error bound that is negligible too."""
-    sensor = AngleSensor(STEP_S, 1e-60, 1e-60, RANGE_M, error_at_nominal_range_y_rad=0.0, error_at_zero_range_y_rad=0.0)
+    sensor = AngleSensor(
+        STEP_S,
+        1e-60,
+        1e-60,
+        RANGE_M,
+        error_at_nominal_range_y_rad=0.0,
+        error_at_zero_range_y_rad=0.0,
+    )
     return SetModel(CLOSING_SPEED, STEP_S, box, sensor)
 
 
@@ -29,12 +36,19 @@ def box_of(offset_m: float, speed_m_s: float, range_m: float) -> StateBox:
     lateral = (300.0 - offset_m, 300.0 + offset_m)
     fast = (-2.0 - speed_m_s, -2.0 + speed_m_s)
     return StateBox(
-        lateral, (RANGE_M - range_m, RANGE_M + range_m), fast, (-CLOSING_SPEED, -CLOSING_SPEED), lateral, fast
+        lateral,
+        (RANGE_M - range_m, RANGE_M + range_m),
+        fast,
+        (-CLOSING_SPEED, -CLOSING_SPEED),
+        lateral,
+        fast,
     )
 
 
 def after(box: StateBox, angles_rad: Floats) -> tuple[KalmanBank, Situation]:
-    """Return the bank after equal angles of both axes, one a step, without impulses, and its last situation."""
+    """Return the bank after equal angles of both axes, one a step, without impulses, and its last
+    situation.
+    """
     model = set_model(box)
     bank = KalmanBank((2, 1))
     view = InformationSet(model).view()
@@ -63,7 +77,9 @@ def line(z_m: float, v_m_s: float, range_m: float, steps: int) -> Floats:
 
 
 def test_two_exact_angles_give_the_motion_at_a_known_range() -> None:
-    """The error of an angle, an ulp, is 2e-16 of 300 m, and that of V is twice that over the step."""
+    """The error of an angle, an ulp, is 2e-16 of 300 m, and that of V is twice that over the
+    step.
+    """
     bank, now = after(box_of(5e3, 50.0, 0.0), line(1234.5, -7.25, RANGE_M, 2))
 
     position_m = 1234.5 - 7.25 * STEP_S
@@ -92,8 +108,11 @@ def test_exact_angle_conditions_the_prior_on_a_line_of_sight() -> None:
         for i in range(4):
             deviation = float(variances[i]) ** 0.5
             expected = float(mean[i] + column[i] * off / total)
-            # The root of the covariance and its product have some ten roundings of an ulp of the deviations.
-            np.testing.assert_allclose(bank.mean[:, 0, member, i], expected, rtol=1e-14, atol=1e-13 * deviation)
+            # The root of the covariance and its product have some ten roundings of an ulp of the
+            # deviations.
+            np.testing.assert_allclose(
+                bank.mean[:, 0, member, i], expected, rtol=1e-14, atol=1e-13 * deviation
+            )
             for j in range(4):
                 scale = deviation * float(variances[j]) ** 0.5
                 expected = float((variances[i] if i == j else 0) - column[i] * column[j] / total)
@@ -148,7 +167,9 @@ def nan_scenario(strategy: str) -> Scenario:
             error_at_nominal_range_y_rad=0.0,
             error_at_zero_range_y_rad=0.0,
         ),
-        thruster=Thruster(5084.5, 698.2, 3308.7, execution_error_relative=0.05, pointing_error_rad=0.3),
+        thruster=Thruster(
+            5084.5, 698.2, 3308.7, execution_error_relative=0.05, pointing_error_rad=0.3
+        ),
         information_set=SetSettings(sections=1, fewest_sections=1),
     )
 
@@ -161,7 +182,9 @@ def test_flight_with_an_exact_angle_gives_finite_impulses(strategy: str) -> None
 
 
 def random_scenario(number: int) -> Scenario:
-    """An engagement in space with precise angles: of y, which is exact, or of both axes, and known starts."""
+    """An engagement in space with precise angles: of y, which is exact, or of both axes, and known
+    starts.
+    """
     generator = np.random.default_rng([54, number])
 
     def decades(minimum: float, maximum: float) -> float:
@@ -225,12 +248,16 @@ def random_scenario(number: int) -> Scenario:
             sections=2,
             fewest_sections=2,
             range_threshold_m=1e-3 * range_m,
-            disturbance_m_s2=wide_m / (steps * step_s) ** 2 * decades(-3.0, 0.0) if often(0.5) else 0.0,
+            disturbance_m_s2=wide_m / (steps * step_s) ** 2 * decades(-3.0, 0.0)
+            if often(0.5)
+            else 0.0,
         ),
     )
 
 
-@pytest.mark.parametrize("number", [*range(6), *(pytest.param(n, marks=pytest.mark.thorough) for n in range(6, 300))])
+@pytest.mark.parametrize(
+    "number", [*range(6), *(pytest.param(n, marks=pytest.mark.thorough) for n in range(6, 300))]
+)
 def test_random_flights_with_precise_angles_have_finite_impulses(number: int) -> None:
     scenario = random_scenario(number)
     for strategy in BASELINES:

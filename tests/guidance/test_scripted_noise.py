@@ -30,7 +30,9 @@ ROUNDING = 4 * np.finfo(float).eps
 errors = st.floats(-1.0, 1.0)
 
 
-def sight(alpha: Any, distance: Any, step: int = 0, ranging: bool = True, rating: bool = True) -> LineOfSight:
+def sight(
+    alpha: Any, distance: Any, step: int = 0, ranging: bool = True, rating: bool = True
+) -> LineOfSight:
     alpha = np.atleast_2d(np.asarray(alpha, dtype=np.float64))
     sensors: dict[str, Sensor] = {"angle": SENSOR}
     if ranging:
@@ -54,7 +56,11 @@ def test_what_is_measured_stays_within_the_bounds_to_rounding(
     alpha: float, distance: float, angle: float, far: float, fast: float
 ) -> None:
     seen = sight(alpha, distance)
-    script = {"angle": np.array([[[angle]]]), "range": np.array([[far]]), "rate": np.array([[[fast]]])}
+    script = {
+        "angle": np.array([[[angle]]]),
+        "range": np.array([[far]]),
+        "rate": np.array([[[fast]]]),
+    }
     found = ScriptedNoise(script).measure(seen, looked_at())
     bound = SENSOR.error_bound(distance)
     assert abs(found["angle"].item() - alpha) <= bound + ROUNDING * (abs(alpha) + bound)
@@ -71,7 +77,9 @@ def test_errors_are_found_again_from_what_was_measured(
     found = errors_made(seen, measure_with_errors(seen, given_errors))
     assert all(np.abs(error).max() <= 1.0 for error in found.values())
     # A rounding of the measured value, in units of the bound.
-    np.testing.assert_allclose(found["angle"], angle, atol=ROUNDING * (1.0 + abs(alpha) / SENSOR.error_bound(distance)))
+    np.testing.assert_allclose(
+        found["angle"], angle, atol=ROUNDING * (1.0 + abs(alpha) / SENSOR.error_bound(distance))
+    )
     np.testing.assert_allclose(found["range"], far, atol=20.0 * ROUNDING)
     np.testing.assert_allclose(found["rate"], fast, atol=ROUNDING * (1.0 + abs(alpha) / 1e-6))
 
@@ -101,7 +109,9 @@ def test_a_script_that_ends_before_the_flight_is_refused() -> None:
         ScriptedNoise({"angle": np.zeros((1, 1, 3))}).measure(sight(0.0, 3e6, step=3), looked_at())
 
 
-def test_switching_noise_is_the_game_where_both_extremes_are_equally_bad_and_keeps_its_order_elsewhere() -> None:
+def test_switching_noise_is_the_game_where_both_extremes_are_equally_bad_and_keeps_its_order_elsewhere() -> (
+    None
+):
     information = InformationSet(MODEL, 1)
     seen = sight(0.0, 5801.3e3, ranging=False, rating=False)
 
@@ -112,6 +122,10 @@ def test_switching_noise_is_the_game_where_both_extremes_are_equally_bad_and_kee
     unused = np.zeros((1, 1, 1))
     assert measured(upper) == measured(GameNoise(TieRule.UPPER, unused))
     assert measured(lower) == measured(GameNoise(TieRule.LOWER, unused))
-    assert abs(measured(upper) - measured(lower)) == pytest.approx(2.0 * SENSOR.error_bound(5801.3e3), rel=1e-12)
-    information.shift(5.0)  # now the lower extreme is the worse one, and the game keeps it whatever its tie rule
+    assert abs(measured(upper) - measured(lower)) == pytest.approx(
+        2.0 * SENSOR.error_bound(5801.3e3), rel=1e-12
+    )
+    information.shift(
+        5.0
+    )  # now the lower extreme is the worse one, and the game keeps it whatever its tie rule
     assert measured(GameNoise(TieRule.UPPER, unused)) == measured(lower) != measured(upper)

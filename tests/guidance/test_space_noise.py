@@ -30,17 +30,33 @@ from infoset.sensors import Sensor
 
 BATCH = 4
 SENSOR = AngleSensor(0.5, 0.00015, 0.00023, 5801.3e3)
-METER, RATE = RangeSensor(0.5, 0.05), RateSensor(0.5, 1e-6)
-BOX = StateBox((-10e3, 10e3), (5301.3e3, 6301.3e3), (-100.0, 100.0), (-59e3, -57e3), (-10e3, 10e3), (-100.0, 100.0))
+METER = RangeSensor(0.5, 0.05)
+RATE = RateSensor(0.5, 1e-6)
+BOX = StateBox(
+    (-10e3, 10e3),
+    (5301.3e3, 6301.3e3),
+    (-100.0, 100.0),
+    (-59e3, -57e3),
+    (-10e3, 10e3),
+    (-100.0, 100.0),
+)
 MODEL = SetModel(
-    closing_speed_m_s=58e3, step_s=0.5, bounds=BOX, angle_sensor=SENSOR, disturbance_m_s2=0.005, model=Model.PAPER
+    closing_speed_m_s=58e3,
+    step_s=0.5,
+    bounds=BOX,
+    angle_sensor=SENSOR,
+    disturbance_m_s2=0.005,
+    model=Model.PAPER,
 )
 
 
-def sight(sensors: dict[str, Sensor], seed: int = 0, step: int = 0, batch: int = BATCH) -> LineOfSight:
+def sight(
+    sensors: dict[str, Sensor], seed: int = 0, step: int = 0, batch: int = BATCH
+) -> LineOfSight:
     random = np.random.default_rng(seed)
     x, y, z = 5.8e6 + random.uniform(-2e5, 2e5, batch), *random.uniform(-1e3, 1e3, (2, batch))
-    speed, velocity = -58e3, random.uniform(-50.0, 50.0, (2, batch))
+    speed = -58e3
+    velocity = random.uniform(-50.0, 50.0, (2, batch))
     across = np.array([y, z])
     omega = (velocity * x - speed * across) / (x * x + across * across)
     return LineOfSight(step, np.arctan2(across, x), omega, np.hypot(x, np.hypot(y, z)), sensors)
@@ -62,7 +78,8 @@ def of_axis(whole: LineOfSight, number: int) -> LineOfSight:
 def moved(model: SetModel = MODEL, seed: int = 1, axis: int | None = None) -> InformationSetView:
     """A set after a few steps with impulses, or that of the plane of one axis."""
     planar = model if axis is None else model.axis("yz"[axis])
-    information, random = InformationSet(planar, BATCH), np.random.default_rng(seed)
+    information = InformationSet(planar, BATCH)
+    random = np.random.default_rng(seed)
     for _ in range(3):
         impulse = random.uniform(-5.0, 5.0, (2, BATCH))
         information.shift(impulse if axis is None else impulse[[axis]])
@@ -93,13 +110,18 @@ def test_the_game_of_each_axis_is_that_of_the_plane(tie: TieRule, at_tie: bool) 
 
 
 def test_tie_rules_differ() -> None:
-    view, seen = InformationSet(MODEL, BATCH).view(), sight({"angle": SENSOR})
-    upper, lower = (GameNoise(tie, draws()).measure(seen, view)["angle"] for tie in (TieRule.UPPER, TieRule.LOWER))
+    view = InformationSet(MODEL, BATCH).view()
+    seen = sight({"angle": SENSOR})
+    upper, lower = (
+        GameNoise(tie, draws()).measure(seen, view)["angle"]
+        for tie in (TieRule.UPPER, TieRule.LOWER)
+    )
     assert (upper != lower).all()
 
 
 def test_a_shift_along_one_axis_keeps_the_errors_possible() -> None:
-    seen, view = sight({"angle": SENSOR}), moved()
+    seen = sight({"angle": SENSOR})
+    view = moved()
     for rule in TieRule:
         measured = GameNoise(rule, draws(), np.array([[1e9]])).measure(seen, view)["angle"]
         assert np.abs(SENSOR.error(seen, measured)).max() <= 1.0 + 1e-9
@@ -108,18 +130,22 @@ def test_a_shift_along_one_axis_keeps_the_errors_possible() -> None:
 def test_bounds_by_axis_are_used_by_the_game() -> None:
     angle = replace(SENSOR, error_at_nominal_range_y_rad=0.0003, error_at_zero_range_y_rad=0.0001)
     model = replace(MODEL, angle_sensor=angle)
-    seen, view = sight({"angle": angle}), moved(model)
+    seen = sight({"angle": angle})
+    view = moved(model)
     measured = GameNoise(TieRule.UPPER, draws()).measure(seen, view)["angle"]
     for number in range(2):
         plane = moved(model, axis=number)
-        planar = GameNoise(TieRule.UPPER, draws()[[number]]).measure(of_axis(seen, number), plane)["angle"]
+        planar = GameNoise(TieRule.UPPER, draws()[[number]]).measure(of_axis(seen, number), plane)[
+            "angle"
+        ]
         assert np.array_equal(measured[number], planar[0])
 
 
 @pytest.mark.parametrize("make", [GameNoise, SwitchingNoise])
 def test_the_game_is_possible(make: type[GameNoise]) -> None:
     for seed in range(10):
-        seen, view = sight(all_sensors(SENSOR), seed), moved(seed=seed)
+        seen = sight(all_sensors(SENSOR), seed)
+        view = moved(seed=seed)
         noise = make(TieRule.RANDOM, draws(seed))
         measured = checked_measurements(noise.measure(seen, view), seen, noise)
         assert {name: values.shape for name, values in measured.items()} == {
@@ -128,7 +154,8 @@ def test_the_game_is_possible(make: type[GameNoise]) -> None:
             "rate": (2, BATCH),
         }
         size = np.abs(SENSOR.error(seen, measured["angle"])).max()
-        # On the border, as in the plane: the extremes are far outside of the bounds of one measurement.
+        # On the border, as in the plane: the extremes are far outside of the bounds of one
+        # measurement.
         assert 0.99 < size <= 1.0 + 1e-9
         again = measure_with_errors(seen, errors_made(seen, measured))
         for name, values in again.items():
@@ -136,10 +163,14 @@ def test_the_game_is_possible(make: type[GameNoise]) -> None:
 
 
 class Misses:
-    """The part of a view that the game's rule for ranges reads, with misses by section, shape (2, B, S)."""
+    """The part of a view that the game's rule for ranges reads, with misses by section, shape (2,
+    B, S).
+    """
 
     def __init__(self, lower: Floats, upper: Floats, ranges: Floats) -> None:
-        self.lower, self.upper, self.ranges_m = lower, upper, ranges
+        self.lower = lower
+        self.upper = upper
+        self.ranges_m = ranges
         self.living = np.ones(ranges.shape, dtype=bool)
 
     def predicted_miss_by_section_m(self) -> tuple[Floats, Floats]:
@@ -152,22 +183,29 @@ class Misses:
         return self.ranges_m.min(axis=1), self.ranges_m.max(axis=1)
 
     def predicted_miss(self, pending: object = ()) -> PredictedMiss:
-        none, exists = np.zeros(self.lower.shape[:-1]), np.ones(len(self.ranges_m), dtype=bool)
-        lower, upper = self.lower.argmin(axis=-1), self.upper.argmax(axis=-1)
+        none = np.zeros(self.lower.shape[:-1])
+        exists = np.ones(len(self.ranges_m), dtype=bool)
+        lower = self.lower.argmin(axis=-1)
+        upper = self.upper.argmax(axis=-1)
         points = (ExtremePoints(none, none, self.ranges_m[0, which]) for which in (lower, upper))
         return PredictedMiss(exists, self.lower.min(axis=-1), self.upper.max(axis=-1), *points)
 
 
 def ranged(noise: GameNoise, misses: Any, distance: float) -> float:
-    seen = LineOfSight(0, np.zeros((2, 1)), np.zeros((2, 1)), np.array([distance]), {"range": METER})
+    seen = LineOfSight(
+        0, np.zeros((2, 1)), np.zeros((2, 1)), np.array([distance]), {"range": METER}
+    )
     return float(noise.measure(seen, misses)["range"][0])
 
 
 @pytest.mark.parametrize(("opposite", "share"), [(0, 0.95), (1, 0.95), (2, 1.05)])
 def test_the_range_keeps_the_section_of_the_worst_corner(opposite: int, share: float) -> None:
-    """The section of the worst corner is the second one; measured ranges end there, on the side of the opposite one."""
+    """The section of the worst corner is the second one; measured ranges end there, on the side of
+    the opposite one.
+    """
     ranges = np.array([[3.0e6, 5.8e6, 8.0e6]])
-    # Corners of modulus 5, 13 and 10: the largest components are in two sections. The opposite ones: 2 and once 20.
+    # Corners of modulus 5, 13 and 10: the largest components are in two sections. The opposite
+    # ones: 2 and once 20.
     upper = np.array([[[3.0, 5.0, 8.0]], [[4.0, 12.0, 6.0]]])
     lower = np.full((2, 1, 3), -(2.0**0.5))
     lower[:, 0, opposite] = -12.0, -16.0
@@ -189,6 +227,8 @@ def test_scripted_errors_are_those_of_the_measurements() -> None:
             noise = make(scripts)
             measured = checked_measurements(noise.measure(seen, view), seen, noise)  # type: ignore[arg-type]
             for name, sensor in seen.sensors.items():
-                assert np.array_equal(measured[name], sensor.measured(seen, scripts[name][..., step]))
+                assert np.array_equal(
+                    measured[name], sensor.measured(seen, scripts[name][..., step])
+                )
             for name, errors in errors_made(seen, measured).items():
                 np.testing.assert_allclose(errors, scripts[name][..., step], atol=1e-9)

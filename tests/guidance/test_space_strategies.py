@@ -37,24 +37,35 @@ from infoset.sim import Scenario, simulate
 
 BATCH = 3
 SENSOR = AngleSensor(0.5, 0.00015, 0.00023, 5801.3e3)
-BOX = StateBox((-10e3, 10e3), (5301.3e3, 6301.3e3), (-100.0, 100.0), (-59e3, -57e3), (-8e3, 6e3), (-50.0, 80.0))
-MODEL = SetModel(58e3, 0.5, BOX, SENSOR, disturbance_m_s2=0.005, disturbance_y_m_s2=0.002, model=Model.PAPER)
+BOX = StateBox(
+    (-10e3, 10e3), (5301.3e3, 6301.3e3), (-100.0, 100.0), (-59e3, -57e3), (-8e3, 6e3), (-50.0, 80.0)
+)
+MODEL = SetModel(
+    58e3, 0.5, BOX, SENSOR, disturbance_m_s2=0.005, disturbance_y_m_s2=0.002, model=Model.PAPER
+)
 AXES = ("y", "z")
 
 
-def situations(model: SetModel, seed: int = 0, steps: int = 5) -> list[tuple[Situation, list[Situation]]]:
-    """The situations of a few steps, whose impulses are drawn at random, and the same in the plane of each axis."""
+def situations(
+    model: SetModel, seed: int = 0, steps: int = 5
+) -> list[tuple[Situation, list[Situation]]]:
+    """The situations of a few steps, whose impulses are drawn at random, and the same in the plane
+    of each axis.
+    """
     random = np.random.default_rng(seed)
     sets = [InformationSet(each, BATCH) for each in (model, *map(model.axis, AXES))]
     rows: list[slice] = [slice(0, 2), slice(0, 1), slice(1, 2)]
-    last, measured, made = np.zeros((2, BATCH)), dict[str, Floats](), []
+    last = np.zeros((2, BATCH))
+    measured = dict[str, Floats]()
+    made = []
     alpha = 1e-4 * random.uniform(-1.0, 1.0, (2, BATCH))
     for step in range(steps):
         errors = SENSOR.error_bound(5e6) * random.uniform(-0.5, 0.5, (2, BATCH))
         new = {"angle": alpha + errors, "rate": errors * 1e-3}
         if step % 2 == 0:
             new["range"] = random.uniform(5.6e6, 5.7e6, BATCH) - 29e3 * step
-        measured, now = measured | new, []
+        measured = measured | new
+        now = []
         for information, row in zip(sets, rows, strict=True):
             if "range" in new:
                 information.measure_range(new["range"], 0.05, alpha_rad=new["angle"][row])
@@ -68,11 +79,18 @@ def situations(model: SetModel, seed: int = 0, steps: int = 5) -> list[tuple[Sit
                     budget_left_m_s=np.full(BATCH, 900.0 - step),
                     thruster=Thruster(1000.0, 0.25, 7.5),
                     closing_speed_m_s=58e3,
-                    measured={name: each if each.ndim == 1 else each[row] for name, each in measured.items()},
+                    measured={
+                        name: each if each.ndim == 1 else each[row]
+                        for name, each in measured.items()
+                    },
                     last_impulse_m_s=last[row],
                     information=information.copy().view(),
                     new=frozenset(new),
-                    sensors={"range": RangeSensor(1.0, 0.05), "angle": SENSOR, "rate": RateSensor(0.5, 1e-6)},
+                    sensors={
+                        "range": RangeSensor(1.0, 0.05),
+                        "angle": SENSOR,
+                        "rate": RateSensor(0.5, 1e-6),
+                    },
                 )
             )
         made.append((now[0], now[1:]))
@@ -98,7 +116,8 @@ EAGER: dict[str, Strategy] = {
 
 @pytest.mark.parametrize("strategy", EAGER.values(), ids=EAGER)
 def test_built_in_strategies_decide_along_each_axis_as_in_its_plane(strategy: Strategy) -> None:
-    state, planar = strategy.start((2, BATCH)), [strategy.start((1, BATCH)) for _ in AXES]
+    state = strategy.start((2, BATCH))
+    planar = [strategy.start((1, BATCH)) for _ in AXES]
     for whole, planes in situations(MODEL):
         wanted = strategy.decide(whole, state)
         assert wanted.shape == (2, BATCH)
@@ -121,7 +140,9 @@ def space() -> Scenario:
 
 
 @pytest.mark.parametrize("name", strategy_names())
-@pytest.mark.parametrize("noise", [pytest.param(NoiseKind.RANDOM, marks=pytest.mark.thorough), NoiseKind.GAME])
+@pytest.mark.parametrize(
+    "noise", [pytest.param(NoiseKind.RANDOM, marks=pytest.mark.thorough), NoiseKind.GAME]
+)
 def test_all_strategies_arrive_in_space(name: str, noise: NoiseKind) -> None:
     results = simulate(replace(space(), noise=noise), 6, strategy=name)
     assert np.median(results.miss_m) < 60.0

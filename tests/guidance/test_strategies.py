@@ -7,7 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from infoset import AngleSensor, ExtremePoints, InformationSet, Model, PredictedMiss, RangeSensor, SetModel, StateBox
+from infoset import (
+    AngleSensor,
+    ExtremePoints,
+    InformationSet,
+    Model,
+    PredictedMiss,
+    RangeSensor,
+    SetModel,
+    StateBox,
+)
 from infoset.experiments import load_scenario
 from infoset.guidance import (
     Kalman,
@@ -37,9 +46,15 @@ MODEL = SetModel(
 
 
 def situation(
-    lower: float, upper: float, lower_to_go_s: float = 50.0, upper_to_go_s: float = 50.0, budget: float = 1000.0
+    lower: float,
+    upper: float,
+    lower_to_go_s: float = 50.0,
+    upper_to_go_s: float = 50.0,
+    budget: float = 1000.0,
 ) -> Situation:
-    """One engagement with this predicted-miss interval, reached at ranges that are so many seconds away."""
+    """One engagement with this predicted-miss interval, reached at ranges that are so many seconds
+    away.
+    """
 
     def point(to_go_s: float) -> ExtremePoints:
         return ExtremePoints(np.zeros((1, 1)), np.zeros((1, 1)), np.array([[E * to_go_s]]))
@@ -49,7 +64,11 @@ def situation(
         step=0,
         step_s=0.5,
         predicted_miss=PredictedMiss(
-            np.array([True]), np.array([[lower]]), np.array([[upper]]), point(lower_to_go_s), point(upper_to_go_s)
+            np.array([True]),
+            np.array([[lower]]),
+            np.array([[upper]]),
+            point(lower_to_go_s),
+            point(upper_to_go_s),
         ),
         budget_left_m_s=np.array([budget]),
         thruster=THRUSTER,
@@ -66,13 +85,21 @@ def wanted(now: Situation, share: float = 0.5) -> float:
 
 @pytest.mark.parametrize("budget", [0.0, 7.0, 100.0, 1000.0])
 @pytest.mark.parametrize("to_go_s", [0.2, 0.5, 0.7, 3.0, 50.1, 100.0])
-def test_what_can_be_corrected_later_is_the_sum_over_the_steps(to_go_s: float, budget: float) -> None:
+def test_what_can_be_corrected_later_is_the_sum_over_the_steps(
+    to_go_s: float, budget: float
+) -> None:
     """Step by step: mu2 x_j/e as long as the object is ahead and the budget pays."""
-    expected, left, ahead = 0.0, budget, to_go_s - 0.5
+    expected = 0.0
+    left = budget
+    ahead = to_go_s - 0.5
     while ahead > 1e-9 and left >= 7.5:
-        expected, left, ahead = expected + 7.5 * ahead, left - 7.5, ahead - 0.5
+        expected = expected + 7.5 * ahead
+        left = left - 7.5
+        ahead = ahead - 0.5
     now = situation(-1.0, 1.0, to_go_s, to_go_s, budget)
-    assert correctable_later_m(now, np.array([[E * to_go_s]])).item() == pytest.approx(expected, abs=1e-9)
+    assert correctable_later_m(now, np.array([[E * to_go_s]])).item() == pytest.approx(
+        expected, abs=1e-9
+    )
 
 
 @pytest.mark.parametrize(
@@ -90,7 +117,9 @@ def test_patient_corrects_only_what_is_certain(lower: float, upper: float, expec
 
 def test_patient_corrects_what_could_not_be_corrected_later() -> None:
     # With 10 s to go the 19 impulses to come can correct 7.5 (9.5 + ... + 0.5) = 712.5 m.
-    assert correctable_later_m(situation(0.0, 0.0), np.array([[10.0 * E]])).item() == pytest.approx(712.5)
+    assert correctable_later_m(situation(0.0, 0.0), np.array([[10.0 * E]])).item() == pytest.approx(
+        712.5
+    )
     assert wanted(situation(-100.0, 356.0, 10.0, 10.0)) == 0.0
     assert wanted(situation(-100.0, 356.25 + 30.0, 10.0, 10.0)) == pytest.approx(3.0)
     assert wanted(situation(-356.25 - 30.0, 100.0, 10.0, 10.0)) == pytest.approx(-3.0)
@@ -108,7 +137,10 @@ class Straight:
     """Straight motion, as the estimators assume it."""
 
     def __init__(self, z: float, vz: float, x: float, speed: float) -> None:
-        self.z, self.vz, self.x, self.speed = z, vz, x, speed
+        self.z = z
+        self.vz = vz
+        self.x = x
+        self.speed = speed
 
     def fire(self, impulse_m_s: float) -> None:
         self.vz -= impulse_m_s
@@ -122,9 +154,11 @@ SENSOR = RangeSensor(period_s=2.0, relative_error=0.05)
 
 def test_the_filters_find_the_motion_without_noise() -> None:
     """Driven past by a known push, the estimate converges to the truth, its scale included."""
-    strategy, truth = Kalman(), Straight(800.0, -60.0, 5850e3, 58.05e3)
+    strategy = Kalman()
+    truth = Straight(800.0, -60.0, 5850e3, 58.05e3)
     state = strategy.start((1, 1))
-    view, last = InformationSet(MODEL).view(), 0.0
+    view = InformationSet(MODEL).view()
+    last = 0.0
     for step in range(190):
         now = replace(
             situation(0.0, 0.0),
@@ -141,7 +175,10 @@ def test_the_filters_find_the_motion_without_noise() -> None:
         )
         strategy.decide(now, state)
         last = 1.0 if step % 40 == 20 else 0.0
-        z, vz, x, speed = truth.z, truth.vz, truth.x, truth.speed
+        z = truth.z
+        vz = truth.vz
+        x = truth.x
+        speed = truth.speed
         truth.fire(last)
         truth.advance(0.5)
     found = state.mean[0, 0, int(state.log_weight[0, 0].argmax())]
@@ -188,11 +225,14 @@ def fly(scenario: Scenario, draws: Draws) -> Results:
 
 
 @pytest.mark.parametrize("name", strategy_names())
-@pytest.mark.parametrize("noise", [pytest.param(NoiseKind.RANDOM, marks=pytest.mark.thorough), NoiseKind.GAME])
+@pytest.mark.parametrize(
+    "noise", [pytest.param(NoiseKind.RANDOM, marks=pytest.mark.thorough), NoiseKind.GAME]
+)
 def test_a_mirrored_engagement_is_mirrored(name: str, noise: NoiseKind) -> None:
     scenario = replace(with_long_steps(load_scenario("asteroid-1997")), strategy=name, noise=noise)
     draws = draw(scenario, range(8), 3)
-    there, back = fly(scenario, draws), fly(*mirrored(scenario, draws))
+    there = fly(scenario, draws)
+    back = fly(*mirrored(scenario, draws))
     np.testing.assert_allclose(back.miss_m, there.miss_m, rtol=1e-6)
     np.testing.assert_allclose(back.impulse_m_s, there.impulse_m_s, rtol=1e-6)
 
@@ -215,7 +255,9 @@ def test_patient_spends_little_for_the_same_miss(meter: bool) -> None:
 
 @pytest.mark.thorough
 def test_the_filters_are_good_ones() -> None:
-    """A filter of two states with plain zero-effort guidance: 3.3 m for 379 m/s, in an independent implementation."""
+    """A filter of two states with plain zero-effort guidance: 3.3 m for 379 m/s, in an independent
+    implementation.
+    """
     results = flown("kalman", NoiseKind.RANDOM, meter=True)
     assert np.median(results.miss_m) < 3.0
     assert np.median(results.impulse_m_s) < 120.0

@@ -26,7 +26,8 @@ def test_listed_impulses_are_at_the_nearest_steps_and_not_after_the_cut_off() ->
 
 
 def test_a_period_is_the_list_of_its_times() -> None:
-    draw, compared = random.Random(2), 0
+    draw = random.Random(2)
+    compared = 0
     while compared < 300:
         step_s = decimal(draw, 20)
         arrival_s = decimal(draw, 3000)
@@ -40,7 +41,12 @@ def test_a_period_is_the_list_of_its_times() -> None:
             continue
         compared += 1
         listed = replace(ENGINE, impulses_s=tuple(map(float, times_s)), delay_steps=delay)
-        periodic = replace(ENGINE, last_impulse_s=float(last_s), impulse_period_s=float(period_s), delay_steps=delay)
+        periodic = replace(
+            ENGINE,
+            last_impulse_s=float(last_s),
+            impulse_period_s=float(period_s),
+            delay_steps=delay,
+        )
         assert periodic.impulse_steps(float(arrival_s), float(step_s)) == listed.impulse_steps(
             float(arrival_s), float(step_s)
         )
@@ -52,7 +58,10 @@ def test_a_period_is_the_list_of_its_times() -> None:
         (None, [4, 16, 28, 40, 52, 64, 76, 88]),
         (600.0, [40, 52, 64, 76, 88]),
         (590.0, [40, 52, 64, 76, 88]),
-        (540.0, [40, 52, 64, 76, 88]),  # in the middle of two impulses: the earlier one is the first
+        (
+            540.0,
+            [40, 52, 64, 76, 88],
+        ),  # in the middle of two impulses: the earlier one is the first
         (530.0, [52, 64, 76, 88]),
         (120.0, [88]),
     ],
@@ -77,10 +86,22 @@ def test_a_first_impulse_without_a_period() -> None:
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"impulse_period_s": 60.0}, "impulse_period_s is counted back from last_impulse_s: set last_impulse_s"),
-        ({"impulse_period_s": 60.0, "impulses_s": (60.0,)}, "impulse_period_s and impulses_s exclude each other"),
-        ({"first_impulse_s": 60.0, "impulses_s": (60.0,)}, "first_impulse_s and impulses_s exclude each other"),
-        ({"first_impulse_s": 60.0, "last_impulse_s": 61.0}, "first_impulse_s must be at least last_impulse_s"),
+        (
+            {"impulse_period_s": 60.0},
+            "impulse_period_s is counted back from last_impulse_s: set last_impulse_s",
+        ),
+        (
+            {"impulse_period_s": 60.0, "impulses_s": (60.0,)},
+            "impulse_period_s and impulses_s exclude each other",
+        ),
+        (
+            {"first_impulse_s": 60.0, "impulses_s": (60.0,)},
+            "first_impulse_s and impulses_s exclude each other",
+        ),
+        (
+            {"first_impulse_s": 60.0, "last_impulse_s": 61.0},
+            "first_impulse_s must be at least last_impulse_s",
+        ),
         ({"impulse_period_s": 0.0, "last_impulse_s": 1.0}, "impulse_period_s"),
     ],
 )
@@ -92,13 +113,27 @@ def test_contradictions_are_refused(fields: dict[str, object], message: str) -> 
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"impulse_period_s": 9.0}, "thruster.impulse_period_s must be at least a step, 10 s: got 9.0"),
-        ({"impulse_period_s": 10.0, "first_impulse_s": 106.0}, "thruster.first_impulse_s: the first impulse can be"),
-        ({"first_impulse_s": 90.0, "delay_steps": 2}, "thruster.first_impulse_s: the first impulse can be given 80 s"),
-        ({"impulse_period_s": 10.0, "last_impulse_s": 106.0}, "thruster.last_impulse_s excludes all impulses"),
+        (
+            {"impulse_period_s": 9.0},
+            "thruster.impulse_period_s must be at least a step, 10 s: got 9.0",
+        ),
+        (
+            {"impulse_period_s": 10.0, "first_impulse_s": 106.0},
+            "thruster.first_impulse_s: the first impulse can be",
+        ),
+        (
+            {"first_impulse_s": 90.0, "delay_steps": 2},
+            "thruster.first_impulse_s: the first impulse can be given 80 s",
+        ),
+        (
+            {"impulse_period_s": 10.0, "last_impulse_s": 106.0},
+            "thruster.last_impulse_s excludes all impulses",
+        ),
     ],
 )
-def test_times_that_the_steps_do_not_have_are_refused(fields: dict[str, object], message: str) -> None:
+def test_times_that_the_steps_do_not_have_are_refused(
+    fields: dict[str, object], message: str
+) -> None:
     engine = replace(ENGINE, **{"last_impulse_s": 20.0, **fields})  # type: ignore[arg-type]
     with pytest.raises(ValueError, match=message):
         engine.impulse_steps(100.0, 10.0)
@@ -111,8 +146,11 @@ def test_a_period_with_more_impulses_than_steps_of_a_flight_is_refused() -> None
 
 
 def test_half_a_step_is_the_greatest_difference() -> None:
-    arrival_s, step_s = Fraction(1079, 10), Fraction(6)
+    arrival_s = Fraction(1079, 10)
+    step_s = Fraction(6)
     for tenths in range(30, 1079):
-        steps = replace(ENGINE, last_impulse_s=tenths / 10).impulse_steps(float(arrival_s), float(step_s))
+        steps = replace(ENGINE, last_impulse_s=tenths / 10).impulse_steps(
+            float(arrival_s), float(step_s)
+        )
         assert steps is not None
         assert abs(arrival_s - steps[-1] * step_s - Fraction(tenths, 10)) <= step_s / 2

@@ -12,7 +12,9 @@ from infoset.clock import steps_between
 
 
 def nearest_step(start_s: Fraction, time_s: Fraction, step_s: Fraction) -> int:
-    """Return the step with the least distance, the earlier of two, among those until the arrival."""
+    """Return the step with the least distance, the earlier of two, among those until the
+    arrival.
+    """
     below = math.floor((start_s - time_s) / step_s)
     last = math.ceil(start_s / step_s) - 1
     steps = [step for step in range(below - 1, below + 3) if step <= last] or [last]
@@ -21,7 +23,9 @@ def nearest_step(start_s: Fraction, time_s: Fraction, step_s: Fraction) -> int:
 
 def decimal(draw: random.Random, maximum: int) -> Fraction:
     """Return a decimal number of at most three digits after the point."""
-    return Fraction(draw.randint(1, 1000 * maximum), 10 ** draw.choice((0, 1, 2, 3))) % maximum + Fraction(1, 1000)
+    return Fraction(
+        draw.randint(1, 1000 * maximum), 10 ** draw.choice((0, 1, 2, 3))
+    ) % maximum + Fraction(1, 1000)
 
 
 @pytest.mark.parametrize("count", [4_000, pytest.param(20_000, marks=pytest.mark.thorough)])
@@ -34,7 +38,11 @@ def test_it_is_the_nearest_step_of_random_times(count: int) -> None:
         if draw.random() < 0.5:  # at a step, or in the middle of two
             time_s = start_s - Fraction(draw.randint(0, 200), 2) * step_s
         expected = nearest_step(start_s, time_s, step_s)
-        assert steps_between(float(start_s), float(time_s), float(step_s)) == expected, (start_s, time_s, step_s)
+        assert steps_between(float(start_s), float(time_s), float(step_s)) == expected, (
+            start_s,
+            time_s,
+            step_s,
+        )
 
 
 @pytest.mark.parametrize(

@@ -24,29 +24,40 @@ from infoset.arrays import Floats
 E, STEP = 58e3, 0.5
 SENSOR = AngleSensor(0.5, 0.00015, 0.00023, 5801.3e3)
 KNOWN = StateBox((-10e3, 10e3), (5301.3e3, 6301.3e3), (-100.0, 100.0), (-59e3, -57e3))
-MODEL = SetModel(E, STEP, KNOWN, SENSOR, disturbance_m_s2=0.005, range_threshold_m=5e3, model=Model.PAPER)
+MODEL = SetModel(
+    E, STEP, KNOWN, SENSOR, disturbance_m_s2=0.005, range_threshold_m=5e3, model=Model.PAPER
+)
 
 
 def living_range_interval_m(information: InformationSet) -> tuple[Floats, Floats]:
-    """Return the minimum and the maximum range that agree with the history, to rounding, m, shape (B,)."""
+    """Return the minimum and the maximum range that agree with the history, to rounding, m, shape
+    (B,).
+    """
     refined = information.copy()
     refined._state.refine(refined.tracking, 2)
     return refined.stored_range_interval_m()
 
 
 def flown(model: SetModel, steps: int, seed: int = 0, batch: int = 1) -> InformationSet:
-    """A set after some steps of a model motion with random noise and impulses, before the next measurement."""
+    """A set after some steps of a model motion with random noise and impulses, before the next
+    measurement.
+    """
     random = np.random.default_rng(seed)
-    z, v, x = random.uniform(-1e3, 1e3, (1, batch)), random.uniform(-50.0, 50.0, (1, batch)), 5801.3e3
+    z = random.uniform(-1e3, 1e3, (1, batch))
+    v = random.uniform(-50.0, 50.0, (1, batch))
+    x = 5801.3e3
     information = InformationSet(model, batch)
     for _ in range(steps):
-        information.measure_angle(z / x + random.uniform(-1.0, 1.0, (1, batch)) * SENSOR.error_bound(x))
+        information.measure_angle(
+            z / x + random.uniform(-1.0, 1.0, (1, batch)) * SENSOR.error_bound(x)
+        )
         impulse = random.uniform(-3.0, 3.0, (1, batch))
         information.shift(impulse)
         v = v - impulse
         information.drop_below_threshold()
         information.predict()
-        z, x = z + STEP * v, x - E * STEP
+        z = z + STEP * v
+        x = x - E * STEP
     return information
 
 
@@ -56,14 +67,17 @@ def test_a_section_replayed_equals_the_one_carried_from_the_start() -> None:
     assert len(carried) >= 2
     for section in carried:
         replayed = information.section_at(section.label_m)
-        np.testing.assert_allclose(replayed.polygons[0].polygon(), section.polygons[0].polygon(), rtol=1e-12, atol=0.0)
+        np.testing.assert_allclose(
+            replayed.polygons[0].polygon(), section.polygons[0].polygon(), rtol=1e-12, atol=0.0
+        )
         assert replayed.range_m == section.range_m
 
 
 @pytest.mark.parametrize("rates", range(1, 9))
 def test_rates_of_one_engagement_leave_room_for_the_sections_of_another_one(rates: int) -> None:
     model = replace(MODEL, sections=3, fewest_sections=1)
-    alone, both = InformationSet(model), InformationSet(model, 2)
+    alone = InformationSet(model)
+    both = InformationSet(model, 2)
     for _ in range(90):
         both.measure_angle(0.0, [True, False])
         for _ in range(rates):
@@ -77,15 +91,24 @@ def test_rates_of_one_engagement_leave_room_for_the_sections_of_another_one(rate
 def test_in_space_a_value_is_that_of_all_axes_and_engagements_or_one_is_needed_for_each() -> None:
     model = replace(MODEL, bounds=replace(KNOWN, y_m=(-8e3, 8e3), vy_m_s=(-80.0, 80.0)))
     for batch in (1, 3):
-        one, each = InformationSet(model, batch), InformationSet(model, batch)
+        one = InformationSet(model, batch)
+        each = InformationSet(model, batch)
         one.measure_angle(0.0002)
         one.shift(1.0)
         each.measure_angle(np.full((2, batch), 0.0002))
         each.shift(np.full((2, batch), 1.0))
         np.testing.assert_array_equal(one.predicted_miss().upper_m, each.predicted_miss().upper_m)
         for change in (one.measure_angle, one.shift):
-            for value in ([0.0004], [0.1, 0.2, 0.3], [[0.1, 0.2]] * 3, [[np.nan] * batch] * 2, "ab"):
-                with pytest.raises((ValueError, TypeError), match=r"have the shape \(2, [13]\)|finite|numbers"):
+            for value in (
+                [0.0004],
+                [0.1, 0.2, 0.3],
+                [[0.1, 0.2]] * 3,
+                [[np.nan] * batch] * 2,
+                "ab",
+            ):
+                with pytest.raises(
+                    (ValueError, TypeError), match=r"have the shape \(2, [13]\)|finite|numbers"
+                ):
                     change(value)
         np.testing.assert_array_equal(one.predicted_miss().upper_m, each.predicted_miss().upper_m)
 
@@ -96,7 +119,9 @@ def test_regridding_gives_twice_the_fewest_and_one_over_the_living_range_ends_in
     information.measure_range(5801.3e3, 0.05)
     ranges = np.array([section.range_m for section in information.sections()])
     assert len(ranges) == 11
-    np.testing.assert_allclose(ranges, np.linspace(5801.3e3 / 1.05, 5801.3e3 / 0.95, 11), rtol=1e-12)
+    np.testing.assert_allclose(
+        ranges, np.linspace(5801.3e3 / 1.05, 5801.3e3 / 0.95, 11), rtol=1e-12
+    )
 
 
 def test_a_range_measurement_keeps_exactly_the_ranges_it_allows() -> None:
@@ -112,7 +137,8 @@ def test_a_range_measurement_keeps_exactly_the_ranges_it_allows() -> None:
 
 @pytest.mark.parametrize("seed", range(6))
 def test_the_ends_of_the_range_are_alive_and_just_beyond_them_is_dead(seed: int) -> None:
-    # A sharp sensor and a large offset make angles tell range, so that the ends are found between stored labels.
+    # A sharp sensor and a large offset make angles tell range, so that the ends are found between
+    # stored labels.
     sharp = AngleSensor(0.5, 2e-6, 2e-6, 5801.3e3)
     model = replace(MODEL, angle_sensor=sharp, disturbance_m_s2=0.0, sections=15, fewest_sections=2)
     random = np.random.default_rng(seed)
@@ -125,14 +151,19 @@ def test_the_ends_of_the_range_are_alive_and_just_beyond_them_is_dead(seed: int)
         v -= impulse
         information.drop_below_threshold()
         information.predict()
-        z, x = z + STEP * v, x - E * STEP
+        z = z + STEP * v
+        x = x - E * STEP
     assert information.tracking[0]
     travelled = E * information.time_s
     minimum, maximum = living_range_interval_m(information)
     assert maximum[0] - minimum[0] < 0.9 * 1000e3
     for end, outward in ((minimum[0], -1.0), (maximum[0], 1.0)):
         assert not information.section_at(end + travelled).polygons[0].is_empty
-        assert information.section_at(end + travelled + outward * 2e-9 * (end + travelled)).polygons[0].is_empty
+        assert (
+            information.section_at(end + travelled + outward * 2e-9 * (end + travelled))
+            .polygons[0]
+            .is_empty
+        )
 
 
 def test_the_initial_rectangle_is_the_papers() -> None:
@@ -154,20 +185,26 @@ def test_the_initial_box_is_the_bounds() -> None:
 
 def test_one_step_by_hand() -> None:
     """Band, shift, shear and disturbance of a box, from the formulas of the theory."""
-    model = replace(MODEL, initial_set=InitialSet.BOX, sections=1, fewest_sections=1, disturbance_m_s2=0.02)
+    model = replace(
+        MODEL, initial_set=InitialSet.BOX, sections=1, fewest_sections=1, disturbance_m_s2=0.02
+    )
     information = InformationSet(model)
     x = information.sections()[0].range_m
     bound = SENSOR.error_bound(x)
     information.measure_angle(0.001)
     lower, upper = information.sections()[0].polygons[0].bounding_box()
-    np.testing.assert_allclose((lower[1], upper[1]), (x * (0.001 - bound), x * (0.001 + bound)), rtol=1e-13)
+    np.testing.assert_allclose(
+        (lower[1], upper[1]), (x * (0.001 - bound), x * (0.001 + bound)), rtol=1e-13
+    )
     information.shift(4.0)
     information.predict()
     section = information.sections()[0]
     assert section.range_m == pytest.approx(x - E * STEP, rel=1e-15)
     nu = 0.02
     for direction in ((1.0, 0.0), (0.0, 1.0), (0.3, 1.0), (-1.0, 0.2), (-0.3, -1.0)):
-        corners = [(v - 4.0, z + STEP * (v - 4.0)) for v in (-100.0, 100.0) for z in (lower[1], upper[1])]
+        corners = [
+            (v - 4.0, z + STEP * (v - 4.0)) for v in (-100.0, 100.0) for z in (lower[1], upper[1])
+        ]
         push = abs(direction[0] * nu * STEP + direction[1] * 0.5 * nu * STEP**2)
         expected = max(direction[0] * v + direction[1] * z for v, z in corners) + push
         assert section.polygons[0].support_function(direction) == pytest.approx(expected, rel=1e-13)
@@ -181,7 +218,9 @@ def test_predicted_miss_by_hand() -> None:
     assert miss.upper_m[0] == pytest.approx(expected, rel=1e-13)
     assert miss.lower_m[0] == pytest.approx(-expected, rel=1e-13)
     assert miss.upper_point.range_m[0] == 6301.3e3
-    assert miss.upper_point.omega_rad_s[0] * 6301.3e3**2 / E == pytest.approx(10e3 + 100.0 * time_to_go, rel=1e-13)
+    assert miss.upper_point.omega_rad_s[0] * 6301.3e3**2 / E == pytest.approx(
+        10e3 + 100.0 * time_to_go, rel=1e-13
+    )
 
 
 def test_the_point_of_an_extreme_edge_is_its_lowest_above_and_its_highest_below() -> None:
@@ -193,12 +232,18 @@ def test_the_point_of_an_extreme_edge_is_its_lowest_above_and_its_highest_below(
     lower, upper = information.sections()[0].omega_alpha[0].bounding_box()
     points = information.sections()[0].omega_alpha[0].polygon()
     tolerance = 1e-9 * (upper[0] - lower[0])
-    assert miss.upper_point.alpha_rad[0, 0] == pytest.approx(points[points[:, 0] > upper[0] - tolerance, 1].min())
-    assert miss.lower_point.alpha_rad[0, 0] == pytest.approx(points[points[:, 0] < lower[0] + tolerance, 1].max())
+    assert miss.upper_point.alpha_rad[0, 0] == pytest.approx(
+        points[points[:, 0] > upper[0] - tolerance, 1].min()
+    )
+    assert miss.lower_point.alpha_rad[0, 0] == pytest.approx(
+        points[points[:, 0] < lower[0] + tolerance, 1].max()
+    )
     assert miss.upper_point.alpha_rad[0, 0] < miss.lower_point.alpha_rad[0, 0]
 
 
-def test_inconsistent_measurements_are_told_and_the_set_goes_on_from_the_last_consistent_one() -> None:
+def test_inconsistent_measurements_are_told_and_the_set_goes_on_from_the_last_consistent_one() -> (
+    None
+):
     information = InformationSet(MODEL, batch=2)
     information.measure_angle(0.001)
     before = information.copy()
@@ -208,13 +253,17 @@ def test_inconsistent_measurements_are_told_and_the_set_goes_on_from_the_last_co
     assert step.tolist() == [None, 0]
     assert MODEL.bounds.x_m[0] <= label[1] <= MODEL.bounds.x_m[1]
     assert information.status == [SetStatus.TRACKING, SetStatus.TRACKING]
-    # As before the measurement, and wider by what one measurement may err: e b in V, which is x b of miss.
+    # As before the measurement, and wider by what one measurement may err: e b in V, which is x b
+    # of miss.
     x, slack = 5801.3e3, 1e-9
     bound = MODEL.angle_sensor.error_bound(x)
-    old, new = before.section_at(x, 1).polygons[0], information.section_at(x, 1).polygons[0]
+    old = before.section_at(x, 1).polygons[0]
+    new = information.section_at(x, 1).polygons[0]
     grown = old.minkowski_sum(ConvexPolygons.from_box((-E * bound, 0.0), (E * bound, 0.0)))
     for direction in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (1.0, 0.01), (-1.0, 0.02)):
-        assert new.support_function(direction) == pytest.approx(float(grown.support_function(direction)), rel=slack)
+        assert new.support_function(direction) == pytest.approx(
+            float(grown.support_function(direction)), rel=slack
+        )
     information.predict()
     information.shift(1.0)
     assert information.predicted_miss().exists.all()
@@ -233,13 +282,20 @@ def test_measuring_some_of_a_batch_leaves_the_others_alone() -> None:
     before = information.sections(1)[3].polygons[0].polygon()
     information.measure_angle(0.0003, where=[True, False])
     np.testing.assert_array_equal(information.sections(1)[3].polygons[0].polygon(), before)
-    assert information.sections(0)[3].polygons[0].area() < information.sections(1)[3].polygons[0].area()
+    assert (
+        information.sections(0)[3].polygons[0].area()
+        < information.sections(1)[3].polygons[0].area()
+    )
 
 
 @pytest.mark.parametrize("recovery", list(Recovery))
 def test_a_copy_of_a_view_goes_on_as_the_set_does(recovery: Recovery) -> None:
-    """Labels have left, then comes a contradiction: what has left decides what becomes of the set."""
-    information = InformationSet(replace(MODEL, model=Model.GUARANTEED, initial_set=InitialSet.BOX, recovery=recovery))
+    """Labels have left, then comes a contradiction: what has left decides what becomes of the
+    set.
+    """
+    information = InformationSet(
+        replace(MODEL, model=Model.GUARANTEED, initial_set=InitialSet.BOX, recovery=recovery)
+    )
     while not information.guaranteed_miss()[1].any():
         information.drop_below_threshold()
         information.predict()
@@ -254,7 +310,9 @@ def test_a_copy_of_a_view_goes_on_as_the_set_does(recovery: Recovery) -> None:
 
 
 @pytest.mark.parametrize(("range_m", "nearest"), [(5.0e6, "minimum"), (6.5e6, "maximum")])
-def test_a_range_that_contradicts_names_the_living_label_nearest_to_it(range_m: float, nearest: str) -> None:
+def test_a_range_that_contradicts_names_the_living_label_nearest_to_it(
+    range_m: float, nearest: str
+) -> None:
     information = InformationSet(MODEL)
     information.measure_range(5.5e6, 1e-3)
     living = information.labels_m[information.living]
@@ -274,13 +332,19 @@ def test_exact_knowledge_gives_segments_and_points() -> None:
 
 
 def test_many_cuts_in_one_step_keep_the_vertex_cap() -> None:
-    """Each cut may add two vertices: at the cap they are taken off again, and no section outgrows its room."""
-    information = InformationSet(replace(MODEL, sections=3, fewest_sections=1, initial_set=InitialSet.BOX))
+    """Each cut may add two vertices: at the cap they are taken off again, and no section outgrows
+    its room.
+    """
+    information = InformationSet(
+        replace(MODEL, sections=3, fewest_sections=1, initial_set=InitialSet.BOX)
+    )
     for _ in range(140):
         information.predict()
     section = information.sections()[1]
     bound = float(SENSOR.error_bound(section.range_m))
-    minimum, maximum = (float(corner[1]) / section.range_m for corner in section.polygons[0].bounding_box())
+    minimum, maximum = (
+        float(corner[1]) / section.range_m for corner in section.polygons[0].bounding_box()
+    )
     assert maximum - minimum > 2.0 * bound
     for share in np.linspace(0.0, 0.9, 12):
         information.measure_angle(minimum + (1.0 + share) * bound)
@@ -290,16 +354,22 @@ def test_many_cuts_in_one_step_keep_the_vertex_cap() -> None:
 
 def test_the_vertex_cap_is_kept_and_outward() -> None:
     """Without cuts every step adds two vertices; the reduced section contains the exact one."""
-    information = InformationSet(replace(MODEL, sections=1, fewest_sections=1, initial_set=InitialSet.BOX))
+    information = InformationSet(
+        replace(MODEL, sections=1, fewest_sections=1, initial_set=InitialSet.BOX)
+    )
     exact = information.sections()[0].polygons[0]
     nu = MODEL.disturbance_m_s2
     for _ in range(150):
         information.predict()
-        exact = exact.linear_map([[1.0, 0.0], [STEP, 1.0]]).add_segment([nu * STEP, 0.5 * nu * STEP**2])
+        exact = exact.linear_map([[1.0, 0.0], [STEP, 1.0]]).add_segment(
+            [nu * STEP, 0.5 * nu * STEP**2]
+        )
     kept = information.sections()[0].polygons[0]
     assert int(kept.counts) <= 256
     assert int(exact.counts) > 256
-    normals = np.column_stack((np.cos(np.linspace(0, 6.28, 60)), np.sin(np.linspace(0, 6.28, 60)))) * (50.0, 1.0)
+    normals = np.column_stack(
+        (np.cos(np.linspace(0, 6.28, 60)), np.sin(np.linspace(0, 6.28, 60)))
+    ) * (50.0, 1.0)
     for normal in normals:
         assert kept.support_function(normal) >= exact.support_function(normal) * (1.0 - 1e-13)
     assert kept.area() <= exact.area() * 1.001

@@ -39,14 +39,18 @@ def compile_within(notice: CompileNotice, *modules: str) -> None:
         notice.on_end(kernel_of(module))
 
 
-def test_kernels_of_several_modules_give_one_notice_and_one_summary(caplog: pytest.LogCaptureFixture) -> None:
+def test_kernels_of_several_modules_give_one_notice_and_one_summary(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     notice = CompileNotice()
     with notice.of("infoset engage"):
         compile_within(notice, "infoset.engine.chains", "infoset.geometry.polygon")
         compile_within(notice, "infoset.sim.kepler")
         compile_within(notice, "numba.core")  # not ours
     first, last = caplog.messages
-    assert first.startswith("compiling the numerical kernels of infoset engage (up to about 25 s), ")
+    assert first.startswith(
+        "compiling the numerical kernels of infoset engage (up to about 25 s), "
+    )
     assert last.startswith("compiled 3 kernels of infoset engage in ")
     assert last.endswith(" s (infoset.engine, infoset.geometry, infoset.sim)")
 
@@ -71,7 +75,9 @@ def test_time_within_nested_kernels_counts_once(
     assert "compiled 2 kernels of infoset pareto in 5.0 s" in caplog.messages[-1]
 
 
-def test_nothing_is_said_if_nothing_is_compiled_or_the_command_is_quiet(caplog: pytest.LogCaptureFixture) -> None:
+def test_nothing_is_said_if_nothing_is_compiled_or_the_command_is_quiet(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     notice = CompileNotice()
     with notice.of("infoset engage"):
         pass
@@ -90,7 +96,10 @@ def test_a_first_command_says_what_it_compiles_and_the_second_says_nothing(tmp_p
         return [line for line in done.stderr.splitlines() if "compil" in line]
 
     first, last = said()
-    assert "compiling the numerical kernels of infoset pareto (up to about 25 s), once; later runs load " in first
+    assert (
+        "compiling the numerical kernels of infoset pareto (up to about 25 s), once; later "
+        "runs load "
+    ) in first
     assert str(tmp_path) in first
     assert " of infoset pareto in " in last
     assert "(infoset.rendezvous)" in last

@@ -13,7 +13,8 @@ from infoset.sensors import SENSORS
 def rate_sensor_without(name: str) -> type[Sensor]:
     """A sensor of the rate of the line of sight that has all methods of the contract but one."""
     methods: dict[str, Any] = {
-        method: getattr(RateSensor, method) for method in ("true_value", "bound", "cut", "band", "share")
+        method: getattr(RateSensor, method)
+        for method in ("true_value", "bound", "cut", "band", "share")
     }
     del methods[name]
     return type("Forgetful", (Sensor,), methods)

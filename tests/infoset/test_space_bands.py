@@ -1,4 +1,6 @@
-"""Bands of the guaranteed model in space: they contain the truth at every label, and are convex in the label."""
+"""Bands of the guaranteed model in space: they contain the truth at every label, and are convex in
+the label.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,8 @@ from infoset.engine.section_law import section_laws
 from tests.kernels import callable_kernels
 
 EPS = float(np.finfo(np.float64).eps)
-WIDE, SLOW = (-1e7, 1e7), (-100.0, 100.0)
+WIDE = (-1e7, 1e7)
+SLOW = (-100.0, 100.0)
 KNOWN = StateBox(WIDE, (5.3e6, 6.3e6), SLOW, (-59e3, -57e3), WIDE, SLOW)
 
 slope_band = callable_kernels(section_life).slope_band
@@ -42,7 +45,9 @@ def sight(x_m: float, angles: tuple[float, float]) -> Sight:
     return Sight(alpha, x_m * np.sqrt(1.0 + (np.tan(alpha) ** 2).sum(axis=0)))
 
 
-def bands(model: SetModel, measured: Floats, elapsed_m: float) -> Callable[[float], list[tuple[float, float]]]:
+def bands(
+    model: SetModel, measured: Floats, elapsed_m: float
+) -> Callable[[float], list[tuple[float, float]]]:
     """Return the bands of y/x and z/x of the engine as a function of the label."""
     y, z = measured[:, 0].tolist()
     law_y, law_z = section_laws(model)
@@ -71,13 +76,16 @@ def test_bands_contain_the_truth_and_are_convex(
     sensor = AngleSensor(0.5, at_nominal, max(at_zero, 0.3 * at_nominal), 5.8e6)
     if of_y is not None:
         at_zero_y = max(of_y[1], 0.3 * of_y[0])
-        sensor = replace(sensor, error_at_nominal_range_y_rad=of_y[0], error_at_zero_range_y_rad=at_zero_y)
+        sensor = replace(
+            sensor, error_at_nominal_range_y_rad=of_y[0], error_at_zero_range_y_rad=at_zero_y
+        )
     # The falling bound must be positive up to the maximum distance.
     if min(sensor.error_bounds(np.array([3e7]))[..., 0].min(), sensor.error_bound(3e7)) < 0.0:
         sensor = replace(sensor, nominal_range_m=5.8e7)
     model = SetModel(58e3, 0.5, KNOWN, sensor, initial_set=InitialSet.BOX, model=Model.GUARANTEED)
     minimum, maximum = model.label_limits_m
-    label, elapsed_m = minimum + label_share * (maximum - minimum), 0.999 * flown * minimum
+    label = minimum + label_share * (maximum - minimum)
+    elapsed_m = 0.999 * flown * minimum
     x = label - elapsed_m
     true = sight(x * (1.0 + speed * model.speed_error), angles)
     contain_and_are_convex(model, true, errors_of(error, extremal), label, elapsed_m)
@@ -102,14 +110,22 @@ def test_bands_of_a_camera_contain_the_truth_and_are_convex(
     far: float,
     near: float,
 ) -> None:
-    """At all ranges from ten centroid errors up, with the bounds of both axes reached, and a closing speed of 50 %."""
+    """At all ranges from ten centroid errors up, with the bounds of both axes reached, and a
+    closing speed of 50 %.
+    """
     sensor = Camera(0.5, 10.0**pixel, 10.0**centroid)
     threshold_m = 10.0 ** (centroid + 1.0 + threshold) * (1.0 + 1e-12)
     known = replace(KNOWN, vx_m_s=(-58e3 * (1.0 + speed_error), -58e3 * (1.0 - speed_error)))
     if threshold_m >= 5e6:
         return
     model = SetModel(
-        58e3, 0.5, known, sensor, range_threshold_m=threshold_m, initial_set=InitialSet.BOX, model=Model.GUARANTEED
+        58e3,
+        0.5,
+        known,
+        sensor,
+        range_threshold_m=threshold_m,
+        initial_set=InitialSet.BOX,
+        model=Model.GUARANTEED,
     )
     minimum, maximum = model.label_limits_m
     label = minimum + label_share * (maximum - minimum)
@@ -125,8 +141,12 @@ def errors_of(error: tuple[float, float], extremal: bool) -> Floats:
     return np.where(errors < 0.0, -1.0, 1.0) if extremal else errors
 
 
-def contain_and_are_convex(model: SetModel, true: Sight, errors: Floats, label: float, elapsed_m: float) -> None:
-    """Check the bands of a measurement: that of the label contains the truth, those of all labels are convex."""
+def contain_and_are_convex(
+    model: SetModel, true: Sight, errors: Floats, label: float, elapsed_m: float
+) -> None:
+    """Check the bands of a measurement: that of the label contains the truth, those of all labels
+    are convex.
+    """
     x, (minimum, maximum) = label - elapsed_m, model.label_limits_m
     band = bands(model, model.angle_sensor.measured(true, errors), elapsed_m)
     for (lower, upper), slope in zip(band(label), np.tan(true.alpha_rad[:, 0]), strict=True):

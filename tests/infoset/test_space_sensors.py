@@ -40,7 +40,9 @@ class Place:
         return np.array([np.hypot(self.x_m, np.hypot(self.y_m, self.z_m))])
 
 
-places = st.builds(lambda x, y, z: Place(x, x * np.tan(y), x * np.tan(z)), st.floats(1e3, 7e6), angles, angles)
+places = st.builds(
+    lambda x, y, z: Place(x, x * np.tan(y), x * np.tan(z)), st.floats(1e3, 7e6), angles, angles
+)
 
 
 @given(places, bounds, shares, shares, st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
@@ -49,11 +51,14 @@ def test_the_errors_of_a_measurement_and_the_nearest_one(
 ) -> None:
     sensor = AngleSensor(0.5, bound, bound, 1.0)
     rounding = 64.0 * EPS * (1.0 + 1.0 / bound)
-    error, wanted = np.array([[right], [up]]), np.array([[wanted_y], [wanted_z]])
+    error = np.array([[right], [up]])
+    wanted = np.array([[wanted_y], [wanted_z]])
     measured = sensor.measured(place, error)
     np.testing.assert_allclose(sensor.error(place, measured), error, atol=rounding)
     nearest = sensor.nearest(place, place.alpha_rad + bound * wanted)
-    np.testing.assert_allclose(sensor.error(place, nearest), np.clip(wanted, -1.0, 1.0), atol=rounding)
+    np.testing.assert_allclose(
+        sensor.error(place, nearest), np.clip(wanted, -1.0, 1.0), atol=rounding
+    )
     assume(np.abs(measured).max() + bound < 1.5)
     slopes = np.array([[place.y_m], [place.z_m]]) / place.x_m
     slack = 64.0 * EPS * (1.0 + slopes**2)
@@ -67,7 +72,9 @@ def test_bounds_that_differ_by_axis() -> None:
     expected = [0.0003 * place.range_m / 5801.3e3, SENSOR.error_bound(place.range_m)]
     np.testing.assert_allclose(one.bound(place), expected, rtol=1e-12)
     by_axis = np.array([[1e6, 2e6], [3e6, 4e6]])
-    np.testing.assert_allclose(one.error_bounds(by_axis)[0], 0.0003 * by_axis[0] / 5801.3e3, rtol=1e-12)
+    np.testing.assert_allclose(
+        one.error_bounds(by_axis)[0], 0.0003 * by_axis[0] / 5801.3e3, rtol=1e-12
+    )
     assert np.array_equal(one.error_bounds(by_axis)[1], SENSOR.error_bound(by_axis[1]))
     assert np.array_equal(SENSOR.error_bounds(by_axis), SENSOR.error_bound(by_axis))
     measured = one.measured(place, np.ones((2, 1)))

@@ -1,4 +1,6 @@
-"""Minimum energy with a bound on the control, against closed forms, cone programs and an integrator."""
+"""Minimum energy with a bound on the control, against closed forms, cone programs and an
+integrator.
+"""
 
 from __future__ import annotations
 
@@ -23,27 +25,37 @@ from infoset.rendezvous.bounded_control import (
     solve_bounded,
 )
 from infoset.rendezvous.piecewise import max_control
-from infoset.rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
+from infoset.rendezvous.relative_motion import (
+    ClohessyWiltshire,
+    EllipticOrbit,
+    LinearMotion,
+    TschaunerHempel,
+)
 
 Check = Callable[[int], None]
 
 STRAIGHT = ClohessyWiltshire(1e-9)
 """So slow an orbit that the motion is a straight line."""
 DISTANCE_M, DURATION_S = 10.0, 100.0
-TO_REST = Arc(STRAIGHT, 0.0, DURATION_S, np.array([DISTANCE_M, 0.0, 0.0, 0.0, 0.0, 0.0]), np.zeros((6, 0)))
+TO_REST = Arc(
+    STRAIGHT, 0.0, DURATION_S, np.array([DISTANCE_M, 0.0, 0.0, 0.0, 0.0, 0.0]), np.zeros((6, 0))
+)
 TO_PASS = Arc(STRAIGHT, 0.0, DURATION_S, np.array([DISTANCE_M, 0.0, 0.0]), np.zeros((3, 0)))
 
 
 @pytest.mark.parametrize("bound", [0.0059, 0.005, 0.00401])
 def test_rest_to_rest_on_a_line_is_the_line_cut_to_the_bound(bound: float) -> None:
-    # u = a (T / 2 - t) cut to the bound, which it leaves at T / 2 +- h: d = bound (T^2 / 4 - h^2 / 3).
+    # u = a (T / 2 - t) cut to the bound, which it leaves at T / 2 +- h: d = bound (T^2 / 4 - h^2 /
+    # 3).
     h = np.sqrt(3.0 * (DURATION_S**2 / 4.0 - DISTANCE_M / bound))
     energy = bound**2 * (DURATION_S - 4.0 * h / 3.0)
 
     optimum = solve_bounded([TO_REST], bound)
 
     assert optimum.energies[0] == pytest.approx(energy, rel=1e-9)
-    flight = BoundedFlight(STRAIGHT, 0.0, DURATION_S, np.zeros(6), optimum.costates[0], bound, optimum.edges_s[0])
+    flight = BoundedFlight(
+        STRAIGHT, 0.0, DURATION_S, np.zeros(6), optimum.costates[0], bound, optimum.edges_s[0]
+    )
     for time_s in (DURATION_S / 2.0 - h, DURATION_S / 2.0 + h):
         assert np.abs(flight.breaks() - time_s).min() < 1e-5 * DURATION_S
     x_m_s2 = flight.control(np.array([0.0, 50.0, 100.0]))[:, 0]
@@ -68,15 +80,25 @@ def test_smallest_bound_of_nothing_is_zero() -> None:
 
 
 def some_arcs(seed: int) -> list[Arc]:
-    """One to three arcs that share up to three free values, with weights, on a circle or an ellipse."""
+    """One to three arcs that share up to three free values, with weights, on a circle or an
+    ellipse.
+    """
     random = np.random.default_rng(seed)
     rate = 1.1e-3
-    elliptic = EllipticOrbit(rate, float(random.uniform(0.05, 0.6)), float(random.uniform(0.0, 6.0)))
-    motion: LinearMotion = ClohessyWiltshire(rate) if random.random() < 0.7 else TschaunerHempel(elliptic)
+    elliptic = EllipticOrbit(
+        rate, float(random.uniform(0.05, 0.6)), float(random.uniform(0.0, 6.0))
+    )
+    motion: LinearMotion = (
+        ClohessyWiltshire(rate) if random.random() < 0.7 else TschaunerHempel(elliptic)
+    )
     duration_s = 10.0 ** random.uniform(-1.5, 0.9) / rate
     count = 6 if random.random() < 0.7 else 3
     scale = np.array([duration_s] * 3 + [1.0] * 3)[:count]
-    slope = np.eye(count)[:, : int(random.integers(0, 4))] if count == 6 else np.eye(3)[:, : int(random.integers(0, 3))]
+    slope = (
+        np.eye(count)[:, : int(random.integers(0, 4))]
+        if count == 6
+        else np.eye(3)[:, : int(random.integers(0, 3))]
+    )
     return [
         Arc(
             motion,
@@ -102,8 +124,13 @@ def peak_of(arc: Arc, costate: Floats, bound: float, edges_s: Floats) -> float:
 
 
 def held_program(arcs: list[Arc], bound: float, intervals: int) -> float:
-    """Minimum weighted energy of controls that are constant in each of so many intervals of an arc, by Clarabel."""
-    quadratic, responses, slopes, goals = [], [], [], []
+    """Minimum weighted energy of controls that are constant in each of so many intervals of an arc,
+    by Clarabel.
+    """
+    quadratic = []
+    responses = []
+    slopes = []
+    goals = []
     for arc in arcs:
         grid = np.linspace(arc.start_s, arc.end_s, intervals + 1)
         nodes, weights = np.polynomial.legendre.leggauss(6)
@@ -111,7 +138,9 @@ def held_program(arcs: list[Arc], bound: float, intervals: int) -> float:
         times = (grid[:-1] + half)[:, None] + half[:, None] * nodes
         effects = arc.effects(times.ravel()).reshape(intervals, len(nodes), len(arc.missing), 3)
         held = np.einsum("kn,knai->aki", half[:, None] * weights, effects)
-        scale = np.array([arc.end_s - arc.start_s] * 3 + [1.0] * 3)[: len(arc.missing)] * (arc.end_s - arc.start_s)
+        scale = np.array([arc.end_s - arc.start_s] * 3 + [1.0] * 3)[: len(arc.missing)] * (
+            arc.end_s - arc.start_s
+        )
         # Controls in units of the bound.
         responses.append(held.reshape(len(arc.missing), -1) * bound / scale[:, None])
         goals.append(arc.missing / scale)
@@ -139,36 +168,48 @@ def held_program(arcs: list[Arc], bound: float, intervals: int) -> float:
     kinds = [clarabel.ZeroConeT(len(levels)), *[clarabel.SecondOrderConeT(4)] * count]
     matrix = csc_matrix(np.diag(2.0 * diagonal))
     constraints = csc_matrix(np.vstack([rows, cones]))
-    solution = clarabel.DefaultSolver(matrix, np.zeros(len(diagonal)), constraints, ends, kinds, settings).solve()
+    solution = clarabel.DefaultSolver(
+        matrix, np.zeros(len(diagonal)), constraints, ends, kinds, settings
+    ).solve()
     assert str(solution.status) in ("Solved", "AlmostSolved")
     return float(solution.obj_val) * unit
 
 
 def check_one(seed: int) -> None:
-    """A bound between the smallest one and the peak: integration, bound, and a cone program over held controls."""
+    """A bound between the smallest one and the peak: integration, bound, and a cone program over
+    held controls.
+    """
     random = np.random.default_rng(seed)
     arcs = some_arcs(seed)
-    peak, least = peak_without(arcs), least_bound(arcs).value_m_s2
+    peak = peak_without(arcs)
+    least = least_bound(arcs).value_m_s2
     assert least <= peak * (1.0 + 1e-9)
     if least > 0.99 * peak:
         return
     bound = float(least + random.uniform(0.05, 0.95) * (peak - least))
     optimum = solve_bounded(arcs, bound)
 
-    for arc, costate, edges_s, energy in zip(arcs, optimum.costates, optimum.edges_s, optimum.energies, strict=True):
+    for arc, costate, edges_s, energy in zip(
+        arcs, optimum.costates, optimum.edges_s, optimum.energies, strict=True
+    ):
         flown_energy, miss = flown(arc, costate, bound, edges_s, optimum.free)
         assert miss < 1e-7
         assert flown_energy == pytest.approx(energy, rel=1e-7)
         assert peak_of(arc, costate, bound, edges_s) <= bound * (1.0 + 1e-8)
     cost = float(np.array([arc.weight for arc in arcs]) @ optimum.energies)
     held = held_program(arcs, bound, 150)
-    # Held controls are some of all controls, so none costs less; and the best of them are near the best of all.
+    # Held controls are some of all controls, so none costs less; and the best of them are near the
+    # best of all.
     assert cost * (1.0 - 1e-6) <= held
     assert held <= cost * 1.01
 
 
-def flown(arc: Arc, costate: Floats, bound: float, edges_s: Floats, free: Floats) -> tuple[float, float]:
-    """The energy and the miss, in units of the goal, of an integration (DOP853) under the control."""
+def flown(
+    arc: Arc, costate: Floats, bound: float, edges_s: Floats, free: Floats
+) -> tuple[float, float]:
+    """The energy and the miss, in units of the goal, of an integration (DOP853) under the
+    control.
+    """
 
     def rates(time_s: float, state: Floats) -> Floats:
         to_end = arc.motion.transition(np.array([time_s]), np.array([arc.end_s]))[0]
@@ -182,7 +223,9 @@ def flown(arc: Arc, costate: Floats, bound: float, edges_s: Floats, free: Floats
     speed = bound * (arc.end_s - arc.start_s)
     atol = np.concatenate([1e-12 * unit * speed, [1e-12 * bound * speed]])
     for start, end in pairwise(edges_s):
-        state = solve_ivp(rates, (start, end), state, method="DOP853", rtol=1e-11, atol=atol).y[:, -1]
+        state = solve_ivp(rates, (start, end), state, method="DOP853", rtol=1e-11, atol=atol).y[
+            :, -1
+        ]
     count = len(arc.missing)
     miss = (state[:count] - arc.missing - arc.slope @ free) / (unit[:count] * speed)
     return float(state[6]), float(np.abs(miss).max())
@@ -211,16 +254,19 @@ def test_bound_just_above_the_smallest_one_is_solved_and_one_below_is_not(seed: 
 
 
 def test_smallest_bound_over_a_hundred_and_forty_revolutions() -> None:
-    motion, duration_s, n = ClohessyWiltshire(0.0011), 818181.8, 0.0011
+    motion = ClohessyWiltshire(0.0011)
+    duration_s = 818181.8
+    n = 0.0011
     state = np.array([1042.875, -544.668, -206.956, 0.348, 0.814, 0.248])
     missing = -motion.transition(0.0, duration_s) @ state
     arc = Arc(motion, 0.0, duration_s, missing, np.zeros((6, 0)))
-    # A control is found by hand: held over 5000 intervals, in the direction of the multipliers, corrected by least
-    # squares.
+    # A control is found by hand: held over 5000 intervals, in the direction of the multipliers,
+    # corrected by least squares.
     count = 5000
     grid = np.linspace(0.0, duration_s, count + 1)
     scale = np.array([duration_s] * 3 + [1.0] * 3)
-    # Hill's equations, x radially outward; the exponential of the system with its input as further states.
+    # Hill's equations, x radially outward; the exponential of the system with its input as further
+    # states.
     rates = np.zeros((9, 9))
     rates[:3, 3:6] = rates[3:6, 6:] = np.eye(3)
     rates[3, [0, 4]], rates[4, 3], rates[5, 2] = [3.0 * n**2, 2.0 * n], -2.0 * n, -(n**2)

@@ -8,16 +8,26 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from infoset.arrays import Floats
-from infoset.rendezvous.two_body import OrbitalElements, closest_approach_m, coast, flight_fault, perigee_m
+from infoset.rendezvous.two_body import (
+    OrbitalElements,
+    closest_approach_m,
+    coast,
+    flight_fault,
+    perigee_m,
+)
 
 EPSILON = 2.0**-53
 
 
 def exactly_coasted(state: Floats, duration: float) -> Floats:
-    """Universal variables, mu = 1, by bisection in 40 digits; the functions are differences of the closed forms."""
+    """Universal variables, mu = 1, by bisection in 40 digits; the functions are differences of the
+    closed forms.
+    """
     r, v = ([mp.mpf(float(each)) for each in part] for part in np.split(state, 2))
-    time, sign = abs(mp.mpf(duration)), 1 if duration >= 0.0 else -1
-    radius, along = mp.sqrt(mp.fdot(r, r)), sign * mp.fdot(r, v)
+    time = abs(mp.mpf(duration))
+    sign = 1 if duration >= 0.0 else -1
+    radius = mp.sqrt(mp.fdot(r, r))
+    along = sign * mp.fdot(r, v)
     inverse_axis = 2 / radius - mp.fdot(v, v)
 
     def functions(anomaly: mp.mpf) -> tuple[mp.mpf, mp.mpf, mp.mpf]:
@@ -38,7 +48,8 @@ def exactly_coasted(state: Floats, duration: float) -> Floats:
     def time_of(anomaly: mp.mpf) -> mp.mpf:
         return mp.fdot((radius, along, 1), functions(anomaly))
 
-    low, high = mp.mpf(0), mp.mpf(1)
+    low = mp.mpf(0)
+    high = mp.mpf(1)
     while time_of(high) < time:
         high *= 2
     for _ in range(150):
@@ -46,24 +57,35 @@ def exactly_coasted(state: Floats, duration: float) -> Floats:
         low, high = (middle, high) if time_of(middle) < time else (low, middle)
     first, second, _ = functions(high)
     later = radius + along * first + (1 - radius * inverse_axis) * second
-    f, g = 1 - second / radius, sign * (radius * first + along * second)
-    f_rate, g_rate = -sign * first / (later * radius), 1 - second / later
+    f = 1 - second / radius
+    g = sign * (radius * first + along * second)
+    f_rate = -sign * first / (later * radius)
+    g_rate = 1 - second / later
     position = [f * x + g * y for x, y in zip(r, v, strict=True)]
-    return np.array(position + [f_rate * x + g_rate * y for x, y in zip(r, v, strict=True)], dtype=float)
+    return np.array(
+        position + [f_rate * x + g_rate * y for x, y in zip(r, v, strict=True)], dtype=float
+    )
 
 
 def random_state(seed: int, share: float) -> Floats:
     """A state at a share of the escape velocity, not straight down."""
     random = np.random.default_rng(seed)
     axes = np.linalg.qr(random.normal(size=(3, 3)))[0]
-    radius, angle = float(random.uniform(0.5, 2.0)), float(random.uniform(0.2, np.pi - 0.2))
+    radius = float(random.uniform(0.5, 2.0))
+    angle = float(random.uniform(0.2, np.pi - 0.2))
     speed = share * np.sqrt(2.0 / radius)
-    return np.concatenate([radius * axes[0], speed * (np.cos(angle) * axes[0] + np.sin(angle) * axes[1])])
+    return np.concatenate(
+        [radius * axes[0], speed * (np.cos(angle) * axes[0] + np.sin(angle) * axes[1])]
+    )
 
 
 def allowed_error(state: Floats, duration: float) -> float:
-    """Rounding of the state changes the period and the perigee, the rounding of the time shifts the state."""
-    return float(200.0 * EPSILON * (1.0 + abs(duration)) / perigee_m(state[:3], state[3:], 1.0) ** 1.5)
+    """Rounding of the state changes the period and the perigee, the rounding of the time shifts the
+    state.
+    """
+    return float(
+        200.0 * EPSILON * (1.0 + abs(duration)) / perigee_m(state[:3], state[3:], 1.0) ** 1.5
+    )
 
 
 @pytest.mark.parametrize("duration", [-30.0, -0.8, 1e-3, 2.0, 40.0])
@@ -82,7 +104,9 @@ def allowed_error(state: Floats, duration: float) -> float:
     ],
 )
 @pytest.mark.parametrize("seeds", [(0,), pytest.param((1, 2), marks=pytest.mark.thorough)])
-def test_states_on_any_conic_are_coasted(share: float, duration: float, seeds: tuple[int, ...]) -> None:
+def test_states_on_any_conic_are_coasted(
+    share: float, duration: float, seeds: tuple[int, ...]
+) -> None:
     for seed in seeds:
         state = random_state(seed, share)
         with mp.workdps(40):
@@ -91,7 +115,9 @@ def test_states_on_any_conic_are_coasted(share: float, duration: float, seeds: t
         found = coast(state, duration, 1.0)
 
         size = np.repeat([np.linalg.norm(exact[:3]), np.linalg.norm(exact[3:])], 3)
-        np.testing.assert_allclose(found / size, exact / size, rtol=0.0, atol=allowed_error(state, duration))
+        np.testing.assert_allclose(
+            found / size, exact / size, rtol=0.0, atol=allowed_error(state, duration)
+        )
 
 
 def test_many_states_of_all_kinds_are_coasted_at_once() -> None:
@@ -123,8 +149,12 @@ def test_a_fall_through_the_centre_is_refused(velocity: float, duration: float) 
         coast(np.array([1.0, 0.0, 0.0, velocity, 0.0, 0.0]), duration, 1.0)
 
 
-@pytest.mark.parametrize(("velocity", "duration"), [(2.0, 5.0), (0.5, 1.0), (-2.0, 0.1), (-2.0, -50.0)])
-def test_straight_motion_that_avoids_the_centre_is_coasted(velocity: float, duration: float) -> None:
+@pytest.mark.parametrize(
+    ("velocity", "duration"), [(2.0, 5.0), (0.5, 1.0), (-2.0, 0.1), (-2.0, -50.0)]
+)
+def test_straight_motion_that_avoids_the_centre_is_coasted(
+    velocity: float, duration: float
+) -> None:
     state = np.array([1.0, 0.0, 0.0, velocity, 0.0, 0.0])
     with mp.workdps(40):
         exact = exactly_coasted(state, duration)
@@ -140,7 +170,9 @@ def test_a_state_at_the_centre_is_refused() -> None:
 @pytest.mark.parametrize("seed", range(40))
 def test_the_closest_approach_is_that_of_the_coasted_states(seed: int) -> None:
     random = np.random.default_rng(seed)
-    state = random_state(seed, float(random.choice([random.uniform(0.3, 0.99), 1.0, random.uniform(1.01, 3.0)])))
+    state = random_state(
+        seed, float(random.choice([random.uniform(0.3, 0.99), 1.0, random.uniform(1.01, 3.0)]))
+    )
     duration = float(10.0 ** random.uniform(-1.0, 1.5))
 
     found = closest_approach_m(state[:3], state[3:], 1.0, duration)
@@ -148,7 +180,8 @@ def test_the_closest_approach_is_that_of_the_coasted_states(seed: int) -> None:
     steps = 2000
     times = np.linspace(0.0, duration, steps + 1)
     sampled = float(np.linalg.norm(coast(state, times, 1.0)[:, :3], axis=1).min())
-    # Half a step from a perigee q the distance is above it by r'' dt^2 / 2 at most, with r'' <= h^2 / q^3.
+    # Half a step from a perigee q the distance is above it by r'' dt^2 / 2 at most, with r'' <= h^2
+    # / q^3.
     momentum = np.cross(state[:3], state[3:])
     beyond = 0.5 * (0.5 * duration / steps) ** 2 * float(momentum @ momentum) / found**3
     assert found - 1e-12 <= sampled <= found + beyond + 1e-12
@@ -170,7 +203,9 @@ def test_the_closest_approach_is_that_of_the_coasted_states(seed: int) -> None:
         ([-1.0, 0.0, 0.0], 2.0, True),
     ],
 )
-def test_a_flight_that_meets_the_planet_is_refused(velocity: list[float], duration: float, is_met: bool) -> None:
+def test_a_flight_that_meets_the_planet_is_refused(
+    velocity: list[float], duration: float, is_met: bool
+) -> None:
     fault = flight_fault(np.array([1.0, 0.0, 0.0]), np.array(velocity), 1.0, 0.5, duration)
     assert (fault is not None and "the orbit meets the planet during the flight" in fault) == is_met
 
@@ -183,10 +218,21 @@ def test_elements_of_a_hyperbola_are_its_state() -> None:
         return np.concatenate([y[3:], -y[:3] / np.linalg.norm(y[:3]) ** 3])
 
     # Energy 1 / (2 |a|), perigee |a| (e - 1), which DOP853 finds as well.
-    assert 0.5 * velocity @ velocity - 1.0 / np.linalg.norm(position) == pytest.approx(0.25, rel=1e-14)
+    assert 0.5 * velocity @ velocity - 1.0 / np.linalg.norm(position) == pytest.approx(
+        0.25, rel=1e-14
+    )
     assert perigee_m(position, velocity, 1.0) == pytest.approx(1.0, rel=1e-14)
-    flown = solve_ivp(rates, (0.0, 4.0), np.concatenate([position, velocity]), method="DOP853", rtol=1e-12, atol=1e-12)
-    np.testing.assert_allclose(coast(np.concatenate([position, velocity]), 4.0, 1.0), flown.y[:, -1], atol=1e-9)
+    flown = solve_ivp(
+        rates,
+        (0.0, 4.0),
+        np.concatenate([position, velocity]),
+        method="DOP853",
+        rtol=1e-12,
+        atol=1e-12,
+    )
+    np.testing.assert_allclose(
+        coast(np.concatenate([position, velocity]), 4.0, 1.0), flown.y[:, -1], atol=1e-9
+    )
 
 
 @pytest.mark.parametrize(
@@ -198,6 +244,8 @@ def test_elements_of_a_hyperbola_are_its_state() -> None:
         (-1.0, 2.0, 2.2, "a hyperbola of eccentricity 2 has true anomalies up to 120 deg"),
     ],
 )
-def test_elements_of_no_conic_are_refused(axis: float, eccentricity: float, anomaly: float, message: str) -> None:
+def test_elements_of_no_conic_are_refused(
+    axis: float, eccentricity: float, anomaly: float, message: str
+) -> None:
     with pytest.raises(ValueError, match=message):
         OrbitalElements(axis, eccentricity, 0.0, 0.0, 0.0, anomaly)

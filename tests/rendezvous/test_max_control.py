@@ -23,6 +23,8 @@ def test_a_control_that_is_zero_has_no_size() -> None:
 
 def test_a_jump_at_a_break_belongs_to_both_sides() -> None:
     def control(time_s: Floats) -> Floats:
-        return np.where(time_s[:, None] < 3.0, [[1.0, 0.0, 0.0]] * time_s[:, None], [[0.0, 2.0, 0.0]])
+        return np.where(
+            time_s[:, None] < 3.0, [[1.0, 0.0, 0.0]] * time_s[:, None], [[0.0, 2.0, 0.0]]
+        )
 
     assert max_control(control, np.array([0.0, 3.0, 4.0])) == pytest.approx(3.0, rel=1e-12)

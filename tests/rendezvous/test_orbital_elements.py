@@ -15,18 +15,29 @@ ANGLES = st.floats(0.0, 2.0 * math.pi)
 
 @given(st.floats(6.6e6, 1e9), st.floats(0.0, 0.95), st.floats(0.0, math.pi), ANGLES, ANGLES, ANGLES)
 def test_a_state_has_the_orbit_it_was_made_from(
-    axis: float, eccentricity: float, inclination: float, raan: float, perigee: float, anomaly: float
+    axis: float,
+    eccentricity: float,
+    inclination: float,
+    raan: float,
+    perigee: float,
+    anomaly: float,
 ) -> None:
-    position, velocity = OrbitalElements(axis, eccentricity, inclination, raan, perigee, anomaly).state(MU)
+    position, velocity = OrbitalElements(
+        axis, eccentricity, inclination, raan, perigee, anomaly
+    ).state(MU)
     assert semi_major_axis_m(position, velocity, MU) == pytest.approx(axis, rel=1e-9)
     assert perigee_m(position, velocity, MU) == pytest.approx(axis * (1.0 - eccentricity), rel=1e-6)
     momentum = np.cross(position, velocity)
     assert momentum[2] / np.linalg.norm(momentum) == pytest.approx(math.cos(inclination), abs=1e-12)
-    assert float(np.linalg.norm(momentum)) == pytest.approx(math.sqrt(MU * axis * (1.0 - eccentricity**2)), rel=1e-9)
+    assert float(np.linalg.norm(momentum)) == pytest.approx(
+        math.sqrt(MU * axis * (1.0 - eccentricity**2)), rel=1e-9
+    )
 
 
 def test_the_node_and_the_perigee_are_where_they_are_said_to_be() -> None:
-    orbit = OrbitalElements(10e6, 0.2, math.radians(30.0), math.radians(40.0), math.radians(-50.0), math.radians(50.0))
+    orbit = OrbitalElements(
+        10e6, 0.2, math.radians(30.0), math.radians(40.0), math.radians(-50.0), math.radians(50.0)
+    )
     position, velocity = orbit.state(MU)  # at the ascending node
     assert position[2] == pytest.approx(0.0, abs=1e-6)
     assert velocity[2] > 0.0

@@ -67,8 +67,12 @@ def comet() -> Scenario:
 
 @pytest.fixture(scope="session")
 def brief(asteroid: Scenario) -> Scenario:
-    """The last ten seconds of an approach whose range is known, in few sections: thousands of them take a second."""
+    """The last ten seconds of an approach whose range is known, in few sections: thousands of them
+    take a second.
+    """
     box = StateBox((-100.0, 100.0), (590e3, 600e3), (-10.0, 10.0), (-58e3, -57.5e3))
     sensor = replace(linear(asteroid.angle_sensor), nominal_range_m=595e3)
-    model = replace(asteroid.set_model, bounds=box, sections=5, fewest_sections=3, angle_sensor=sensor)
+    model = replace(
+        asteroid.set_model, bounds=box, sections=5, fewest_sections=3, angle_sensor=sensor
+    )
     return replace(asteroid, name="brief", **of_model(model), dispersion=box, nominal_range_m=595e3)

@@ -1,4 +1,6 @@
-"""The search for the worst engagement: what it finds is real, flies again bit by bit, and is far from the average."""
+"""The search for the worst engagement: what it finds is real, flies again bit by bit, and is far
+from the average.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +38,9 @@ def assert_flies_again(found: WorstEngagement) -> None:
     """Alone with everything kept, and in other company, to the last bit."""
     assert float(found.record().result.miss_m[0]) == found.miss_m
     company = 3
-    noise = ScriptedNoise({name: np.repeat(each, company, axis=-2) for name, each in found.noise.errors.items()})
+    noise = ScriptedNoise(
+        {name: np.repeat(each, company, axis=-2) for name, each in found.noise.errors.items()}
+    )
     given = found.accelerations_m_s2
     target = None if given is None else np.repeat(given, company, axis=1)
     draws = draw(found.scenario, [0] * company, found.seed)
@@ -54,7 +58,10 @@ def assert_possible(found: WorstEngagement, scenario: Scenario) -> None:
     start = np.array([*found.start().values()])
     assert (lower <= start).all()
     assert (start <= upper).all()
-    assert corners(found.scenario.dispersion)[0].tolist() == corners(found.scenario.dispersion)[1].tolist()
+    assert (
+        corners(found.scenario.dispersion)[0].tolist()
+        == corners(found.scenario.dispersion)[1].tolist()
+    )
     assert corners(found.scenario.dispersion)[0].tolist() == start.tolist()
     for errors in found.noise.errors.values():
         assert np.abs(errors).max() <= 1.0
@@ -62,12 +69,16 @@ def assert_possible(found: WorstEngagement, scenario: Scenario) -> None:
         assert not found.max_acceleration_m_s2
         assert not scenario.set_model.is_guaranteed
     else:
-        maximum = [scenario.set_model.axis(axis).disturbance_m_s2 for axis in scenario.set_model.axes]
+        maximum = [
+            scenario.set_model.axis(axis).disturbance_m_s2 for axis in scenario.set_model.axes
+        ]
         assert [*found.max_acceleration_m_s2.values()] == maximum
         assert (np.abs(found.accelerations_m_s2) == np.array(maximum)[:, None, None]).all()
 
 
-def test_what_is_found_is_possible_and_flies_again(worst: WorstEngagement, coarse: Scenario) -> None:
+def test_what_is_found_is_possible_and_flies_again(
+    worst: WorstEngagement, coarse: Scenario
+) -> None:
     assert_possible(worst, coarse)
     assert_flies_again(worst)
     assert np.abs(worst.noise.errors["angle"]).max() == 1.0
@@ -75,16 +86,23 @@ def test_what_is_found_is_possible_and_flies_again(worst: WorstEngagement, coars
     assert worst.record().noise_name == "worst-found"
 
 
-def test_measurements_of_the_worst_lie_within_the_bounds_of_the_truth(worst: WorstEngagement) -> None:
-    record, sensor = worst.record(), worst.scenario.set_model.angle_sensor
+def test_measurements_of_the_worst_lie_within_the_bounds_of_the_truth(
+    worst: WorstEngagement,
+) -> None:
+    record = worst.record()
+    sensor = worst.scenario.set_model.angle_sensor
     assert record.steps > 150
     errors = np.abs(record.measured["angle"] - record.true_angle_rad)[record.measures("angle"), 0]
-    assert (errors <= sensor.error_bound(record.true_range_m[record.measures("angle")]) * (1.0 + 1e-12)).all()
+    assert (
+        errors <= sensor.error_bound(record.true_range_m[record.measures("angle")]) * (1.0 + 1e-12)
+    ).all()
 
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", ["ranging", "comet"])
-def test_with_all_sensors_in_the_guaranteed_model(name: str, request: pytest.FixtureRequest) -> None:
+def test_with_all_sensors_in_the_guaranteed_model(
+    name: str, request: pytest.FixtureRequest
+) -> None:
     given = guaranteed(request.getfixturevalue(name))
     scenario = replace(
         given,
@@ -113,7 +131,9 @@ def test_the_search_keeps_its_account(worst: WorstEngagement) -> None:
 
 
 @pytest.mark.thorough
-def test_the_same_seed_finds_the_same_whatever_the_threads(worst: WorstEngagement, coarse: Scenario) -> None:
+def test_the_same_seed_finds_the_same_whatever_the_threads(
+    worst: WorstEngagement, coarse: Scenario
+) -> None:
     again = find_worst(coarse, budget=BUDGET, seed=1, threads=2)
     assert (again.miss_m, again.history) == (worst.miss_m, worst.history)
     assert np.array_equal(again.noise.errors["angle"], worst.noise.errors["angle"])
@@ -128,7 +148,9 @@ def test_engagements_that_lose_their_set_can_be_left_out(coarse: Scenario) -> No
     wrong = replace(coarse, **of_model(replace(coarse.set_model, bounds=fast)))
     found = find_worst(wrong, budget=10)
     assert (found.result.outcomes[0], found.sets_emptied) == (Outcome.SET_EMPTY, 10)
-    with pytest.raises(NothingCountsError, match="in every simulated engagement the set became empty"):
+    with pytest.raises(
+        NothingCountsError, match="in every simulated engagement the set became empty"
+    ):
         find_worst(wrong, budget=10, keep_set=True)
 
 
@@ -150,7 +172,9 @@ def test_a_strategy_of_ones_own(coarse: Scenario) -> None:
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("seed", [0])
-def test_symmetric_miss_in_the_guaranteed_model_misses_by_50_m(asteroid: Scenario, seed: int) -> None:
+def test_symmetric_miss_in_the_guaranteed_model_misses_by_50_m(
+    asteroid: Scenario, seed: int
+) -> None:
     scenario = guaranteed(asteroid)
     found = find_worst(scenario, budget=2500, seed=seed, threads=2)
     assert found.result.outcomes[0] is Outcome.ARRIVED
@@ -173,7 +197,9 @@ def test_with_a_cut_off_the_search_begins_with_game_noise_and_its_shift(coarse: 
     assert (first.accelerations_m_s2 == 0.005 * side.item()).all()
 
     def miss_m(noise: GameNoise) -> float:
-        flight = Engagements(game, draw(game, [0], 0), noise=noise, target_m_s2=first.accelerations_m_s2)
+        flight = Engagements(
+            game, draw(game, [0], 0), noise=noise, target_m_s2=first.accelerations_m_s2
+        )
         while flight.flying:
             flight.advance()
         return float(flight.results(np.arange(1)).miss_m[0])

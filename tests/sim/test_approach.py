@@ -15,7 +15,8 @@ from infoset.sim.results import b_plane
 SUN, AU, DAY = 1.32712440018e20, 1.495978707e11, 86400.0
 ECLIPTIC = np.array([0.0, 0.0, 1.0])
 MEETING = np.array(
-    [[1.04 * AU, 0.1 * AU, 0.0], [-2e3, 29e3, 2.5e3], [1.1e3, -0.7e3, 1.2e3], [2.6e3, 5e3, -1.5e3]], dtype=np.float64
+    [[1.04 * AU, 0.1 * AU, 0.0], [-2e3, 29e3, 2.5e3], [1.1e3, -0.7e3, 1.2e3], [2.6e3, 5e3, -1.5e3]],
+    dtype=np.float64,
 )
 """A pair of states at a close approach to the object, from the Sun."""
 
@@ -24,7 +25,9 @@ def kepler(position: Floats, velocity: Floats, time_s: float) -> list[mp.mpf]:
     """Position after a time, by universal variables with 40 digits."""
     with mp.workdps(40):
         place, speed = ([mp.mpf(float(x)) for x in vector] for vector in (position, velocity))
-        distance, parameter, time = mp.norm(place), mp.mpf(SUN), mp.mpf(time_s)
+        distance = mp.norm(place)
+        parameter = mp.mpf(SUN)
+        time = mp.mpf(time_s)
         inverse_axis = 2 / distance - mp.fdot(speed, speed) / parameter
         radial = mp.fdot(place, speed) / mp.sqrt(parameter)
 
@@ -39,7 +42,8 @@ def kepler(position: Floats, velocity: Floats, time_s: float) -> list[mp.mpf]:
 
         chi = mp.findroot(of_time, mp.sqrt(parameter) * time * inverse_axis)
         c, s = stumpff(chi)
-        f, g = 1 - chi**2 * c / distance, time - chi**3 * s / mp.sqrt(parameter)
+        f = 1 - chi**2 * c / distance
+        g = time - chi**3 * s / mp.sqrt(parameter)
         return [f * x + g * v for x, v in zip(place, speed, strict=True)]
 
 
@@ -52,7 +56,9 @@ def test_a_pair_moves_as_two_orbits_of_kepler(days: float) -> None:
     )
     np.testing.assert_allclose(moved[0], np.array(craft, float), rtol=1e-11)
     relative = [float(one - other) for one, other in zip(body, craft, strict=True)]
-    np.testing.assert_allclose(moved[2], relative, rtol=0.0, atol=1e-3)  # of some million kilometres
+    np.testing.assert_allclose(
+        moved[2], relative, rtol=0.0, atol=1e-3
+    )  # of some million kilometres
 
 
 def test_the_transition_is_that_of_differences_and_symplectic() -> None:
@@ -63,7 +69,8 @@ def test_the_transition_is_that_of_differences_and_symplectic() -> None:
             changed = MEETING.copy()
             changed[2:].flat[component] += side * step
             ends.append(propagate(changed, SUN, 20.0 * DAY)[0][2:].ravel())
-        difference, scale = (ends[1] - ends[0]) / step, np.abs(transition).max(axis=1)
+        difference = (ends[1] - ends[0]) / step
+        scale = np.abs(transition).max(axis=1)
         np.testing.assert_allclose(difference / scale, transition[:, component] / scale, atol=1e-7)
     form = np.kron([[0.0, 1.0], [-1.0, 0.0]], np.eye(3))
     np.testing.assert_allclose(transition.T @ form @ transition, form, atol=1e-9)
@@ -81,7 +88,9 @@ def test_the_closest_approach_is_nearer_than_its_neighbours() -> None:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_the_axes_are_those_of_published_definitions(seed: int) -> None:
-    """T in the reference plane, as in GMAT: (S_y, -S_x, 0); R completes S, T, R, toward the south."""
+    """T in the reference plane, as in GMAT: (S_y, -S_x, 0); R completes S, T, R, toward the
+    south.
+    """
     velocity = np.random.default_rng(seed).normal(size=3)
     t, r, s = approach_axes(velocity, ECLIPTIC)
     np.testing.assert_allclose(s, -velocity / np.linalg.norm(velocity))
@@ -114,10 +123,13 @@ def test_without_gravity_b_is_the_part_of_the_position_across_the_velocity() -> 
         offset = -(position - position @ velocity / (velocity @ velocity) * velocity)
         axes = approach_axes(velocity, turn[0])
         np.testing.assert_allclose(found.miss_m, axes[:2] @ offset, rtol=1e-8)
-        # x and its rate have no correlation at the epoch; that at the start follows from the time between.
+        # x and its rate have no correlation at the epoch; that at the start follows from the time
+        # between.
         late = found.start_s
         assert found.covariance.matrix[2, 5] == pytest.approx(1e-4 * late, rel=1e-9)
-        np.testing.assert_allclose(found.covariance.matrix[:3, :3], (1e6 + 1e-4 * late**2) * np.eye(3), atol=1e-3)
+        np.testing.assert_allclose(
+            found.covariance.matrix[:3, :3], (1e6 + 1e-4 * late**2) * np.eye(3), atol=1e-3
+        )
 
 
 def test_the_simulated_motion_has_the_miss_of_the_states() -> None:
@@ -125,7 +137,8 @@ def test_the_simulated_motion_has_the_miss_of_the_states() -> None:
     before, _ = propagate(MEETING, SUN, -10.0 * DAY)
     exact = np.zeros((6, 6))
     found = find_approach(before, SUN, exact, ECLIPTIC, 5.0 * DAY)
-    motion, passed = KeplerMotion(found.state[None, :3], found.state[None, 3:], found.sun), False
+    motion = KeplerMotion(found.state[None, :3], found.state[None, 3:], found.sun)
+    passed = False
     while not passed:
         passage = motion.advance(600.0)
         passed = bool(passage.passed[0])

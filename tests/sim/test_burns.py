@@ -1,4 +1,6 @@
-"""Impulses at scheduled times, before a cut-off and after a delay, in engagements computed by hand and in flight."""
+"""Impulses at scheduled times, before a cut-off and after a delay, in engagements computed by hand
+and in flight.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +10,26 @@ from typing import Any
 import numpy as np
 import pytest
 
-from infoset import AngleSensor, ExtremePoints, InformationSet, InitialSet, Model, PredictedMiss, SetModel, StateBox
+from infoset import (
+    AngleSensor,
+    ExtremePoints,
+    InformationSet,
+    InitialSet,
+    Model,
+    PredictedMiss,
+    SetModel,
+    StateBox,
+)
 from infoset.arrays import Floats
-from infoset.guidance import NoiseKind, Patient, Situation, Strategy, SymmetricMiss, Thruster, TieRule
+from infoset.guidance import (
+    NoiseKind,
+    Patient,
+    Situation,
+    Strategy,
+    SymmetricMiss,
+    Thruster,
+    TieRule,
+)
 from infoset.sim import Results, Scenario, fly_one, simulate
 from infoset.sim.draws import draw
 from infoset.sim.engagement import Engagements, Step
@@ -32,7 +51,15 @@ def known(asteroid: Scenario) -> Scenario:
         sun=None,
         nominal_range_m=RANGE,
         dispersion=box,
-        **of_model(replace(model, initial_set=InitialSet.BOX, range_threshold_m=1e3, sections=1, fewest_sections=1)),
+        **of_model(
+            replace(
+                model,
+                initial_set=InitialSet.BOX,
+                range_threshold_m=1e3,
+                sections=1,
+                fewest_sections=1,
+            )
+        ),
         thruster=Thruster(1000.0, 0.0, 500.0),
     )
 
@@ -41,7 +68,9 @@ def with_thruster(scenario: Scenario, **fields: Any) -> Scenario:
     return replace(scenario, thruster=replace(scenario.thruster, **fields))
 
 
-def impulses(scenario: Scenario, seed: int = 0, strategy: Strategy | None = None) -> dict[float, float]:
+def impulses(
+    scenario: Scenario, seed: int = 0, strategy: Strategy | None = None
+) -> dict[float, float]:
     """Return the impulses of one planar flight by time."""
     given: dict[float, float] = {}
     flight = Engagements(scenario, draw(scenario, [0], seed), strategy, guarantee=False)
@@ -55,9 +84,15 @@ STRATEGIES = ["symmetric-miss", "zero-effort-miss", "patient"]
 
 @pytest.mark.parametrize("strategy", STRATEGIES)
 @pytest.mark.parametrize("delay_steps", [0, 1, 7])
-def test_a_single_impulse_without_noise_hits(known: Scenario, strategy: str, delay_steps: int) -> None:
-    """The impulse corrects 900 m in the 40 s that are left when it is given, whenever it was decided."""
-    scenario = replace(with_thruster(known, impulses_s=(40.0,), delay_steps=delay_steps), strategy=strategy)
+def test_a_single_impulse_without_noise_hits(
+    known: Scenario, strategy: str, delay_steps: int
+) -> None:
+    """The impulse corrects 900 m in the 40 s that are left when it is given, whenever it was
+    decided.
+    """
+    scenario = replace(
+        with_thruster(known, impulses_s=(40.0,), delay_steps=delay_steps), strategy=strategy
+    )
     given = impulses(scenario)
     assert list(given) == [60.0]
     assert given[60.0] == pytest.approx(900.0 / 40.0, rel=1e-6)
@@ -68,9 +103,12 @@ def test_a_single_impulse_without_noise_hits(known: Scenario, strategy: str, del
 
 @pytest.mark.parametrize("strategy", STRATEGIES)
 def test_a_later_impulse_corrects_the_rest(known: Scenario, strategy: str) -> None:
-    """An engine of 10 m/s corrects 500 m of 900 m with 50 s left; 400 m need 20 m/s with 20 s left and get 10."""
+    """An engine of 10 m/s corrects 500 m of 900 m with 50 s left; 400 m need 20 m/s with 20 s left
+    and get 10.
+    """
     scenario = replace(
-        with_thruster(known, impulses_s=(50.0, 20.0), max_impulse_m_s=10.0, delay_steps=3), strategy=strategy
+        with_thruster(known, impulses_s=(50.0, 20.0), max_impulse_m_s=10.0, delay_steps=3),
+        strategy=strategy,
     )
     assert impulses(scenario) == pytest.approx({50.0: 10.0, 80.0: 10.0}, rel=1e-6)
     assert simulate(scenario, 1).miss_m[0] == pytest.approx(900.0 - 500.0 - 200.0, rel=1e-6)
@@ -79,7 +117,9 @@ def test_a_later_impulse_corrects_the_rest(known: Scenario, strategy: str) -> No
 @pytest.mark.parametrize("delay_steps", [0, 3])
 @pytest.mark.parametrize("strategy", [*STRATEGIES, "kalman"])
 def test_no_impulse_after_the_cut_off(asteroid: Scenario, strategy: str, delay_steps: int) -> None:
-    scenario = replace(with_thruster(asteroid, last_impulse_s=30.0, delay_steps=delay_steps), strategy=strategy)
+    scenario = replace(
+        with_thruster(asteroid, last_impulse_s=30.0, delay_steps=delay_steps), strategy=strategy
+    )
     given = impulses(scenario, seed=1)
     assert min(given) >= 0.5 * delay_steps
     assert max(given) <= scenario.nominal_arrival_s - 30.0
@@ -97,7 +137,9 @@ class Wasteful(SymmetricMiss):
 
 @pytest.mark.parametrize("strategy", [SymmetricMiss(), Wasteful()], ids=["symmetric", "wasteful"])
 @pytest.mark.parametrize("budget", [0.0, 7.5, 31.0])
-def test_pending_impulses_count_in_the_budget(asteroid: Scenario, budget: float, strategy: Strategy) -> None:
+def test_pending_impulses_count_in_the_budget(
+    asteroid: Scenario, budget: float, strategy: Strategy
+) -> None:
     scenario = with_thruster(asteroid, budget_m_s=budget, delay_steps=9)
     record = fly_one(replace(scenario, noise=NoiseKind.GAME), strategy=strategy)
     given = np.abs(record.impulse_m_s[:, 0]).tolist()
@@ -109,17 +151,29 @@ def test_pending_impulses_count_in_the_budget(asteroid: Scenario, budget: float,
 
 
 def situation(lower: float, upper: float, **fields: Any) -> Situation:
-    """One planar engagement, 50 s before the arrival, with a predicted-miss interval and a strong engine."""
+    """One planar engagement, 50 s before the arrival, with a predicted-miss interval and a strong
+    engine.
+    """
     point = ExtremePoints(np.zeros((1, 1)), np.zeros((1, 1)), np.array([[E * 50.0]]))
     box = StateBox((-1e3, 1e3), (RANGE, RANGE), (-10.0, 10.0), (-E, -E))
     information = InformationSet(
-        SetModel(E, 0.5, box, AngleSensor(0.5, 1e-4, 1e-4, RANGE), sections=1, fewest_sections=1, model=Model.PAPER)
+        SetModel(
+            E,
+            0.5,
+            box,
+            AngleSensor(0.5, 1e-4, 1e-4, RANGE),
+            sections=1,
+            fewest_sections=1,
+            model=Model.PAPER,
+        )
     )
     values: dict[str, Any] = {
         "time_s": 50.0,
         "step": 100,
         "step_s": 0.5,
-        "predicted_miss": PredictedMiss(np.array([True]), np.array([[lower]]), np.array([[upper]]), point, point),
+        "predicted_miss": PredictedMiss(
+            np.array([True]), np.array([[lower]]), np.array([[upper]]), point, point
+        ),
         "budget_left_m_s": np.array([1000.0]),
         "thruster": Thruster(1000.0, 0.0, 10.0),
         "closing_speed_m_s": E,
@@ -145,7 +199,9 @@ def situation(lower: float, upper: float, **fields: Any) -> Situation:
 def test_patient_relies_on_the_later_impulses_of_the_schedule(
     later: list[float], budget: float, expected: float
 ) -> None:
-    """The excess over what later impulses can correct is corrected with 50 s left; the last impulse acts as U_s."""
+    """The excess over what later impulses can correct is corrected with 50 s left; the last impulse
+    acts as U_s.
+    """
     now = situation(
         0.0,
         1000.0,
@@ -178,9 +234,14 @@ def test_a_strategy_sees_the_schedule(known: Scenario) -> None:
     ((time_s, impulse),) = seen[38].pending
     assert time_s == 1.0
     assert impulse.item() == pytest.approx(given, rel=1e-6)
-    assert seen[38].pending_m(np.array([[81.0, 0.5]])) == pytest.approx(np.array([[[80.0 * given, 0.0]]]), rel=1e-6)
+    assert seen[38].pending_m(np.array([[81.0, 0.5]])) == pytest.approx(
+        np.array([[[80.0 * given, 0.0]]]), rel=1e-6
+    )
     # The predicted miss counts the pending impulse, the set does not until it is given.
-    middle = [0.5 * (now.predicted_miss.lower_m.item() + now.predicted_miss.upper_m.item()) for now in seen[36:43]]
+    middle = [
+        0.5 * (now.predicted_miss.lower_m.item() + now.predicted_miss.upper_m.item())
+        for now in seen[36:43]
+    ]
     assert middle == pytest.approx([900.0, *[0.0] * 6], abs=1e-3)
 
 
@@ -188,7 +249,9 @@ def test_a_strategy_sees_the_schedule(known: Scenario) -> None:
 def test_the_predicted_miss_after_pending_impulses_is_that_of_the_shifted_set(
     asteroid: Scenario, spatial: bool
 ) -> None:
-    """Without measurements and disturbances, the interval is the same before and after the impulses are given."""
+    """Without measurements and disturbances, the interval is the same before and after the impulses
+    are given.
+    """
     scenario = in_space(guaranteed(asteroid)) if spatial else guaranteed(asteroid)
     model = replace(scenario.set_model, disturbance_m_s2=0.0, execution_error_relative=0.02)
     model = replace(model, pointing_error_rad=0.01 if spatial else 0.0)
@@ -208,11 +271,17 @@ def test_the_predicted_miss_after_pending_impulses_is_that_of_the_shifted_set(
         np.testing.assert_allclose(getattr(early, name), getattr(late, name), rtol=1e-9)
     now = InformationSet(model, 2)
     now.measure_angle(np.full(shape, 1e-4))
-    np.testing.assert_array_equal(now.predicted_miss([(1e6, first)]).upper_m, now.predicted_miss().upper_m)
+    np.testing.assert_array_equal(
+        now.predicted_miss([(1e6, first)]).upper_m, now.predicted_miss().upper_m
+    )
 
 
 def sound(results: Results) -> bool:
-    return bool(results.truth_kept.all() and results.phi_held.filled(False).all() and not results.set_emptied.any())
+    return bool(
+        results.truth_kept.all()
+        and results.phi_held.filled(False).all()
+        and not results.set_emptied.any()
+    )
 
 
 SCHEDULES: list[dict[str, Any]] = [
@@ -225,15 +294,20 @@ SCHEDULES: list[dict[str, Any]] = [
 
 @pytest.mark.parametrize("fields", SCHEDULES, ids=["one-step", "twelve-steps", "cut-off", "times"])
 @pytest.mark.parametrize(
-    "strategy", [STRATEGIES[0], *(pytest.param(each, marks=pytest.mark.thorough) for each in STRATEGIES[1:])]
+    "strategy",
+    [STRATEGIES[0], *(pytest.param(each, marks=pytest.mark.thorough) for each in STRATEGIES[1:])],
 )
 @pytest.mark.parametrize("spatial", [False, True], ids=["plane", "space"])
 def test_the_guarantee_holds_with_errors_of_the_engine_and_a_delay(
     asteroid: Scenario, fields: dict[str, Any], strategy: str, spatial: bool
 ) -> None:
-    """Measurements between decision and impulse keep the truth in the set, and the miss is at most Phi."""
+    """Measurements between decision and impulse keep the truth in the set, and the miss is at most
+    Phi.
+    """
     scenario = replace(guaranteed(asteroid), strategy=strategy)
-    scenario = with_thruster(in_space(scenario) if spatial else scenario, execution_error_relative=0.05, **fields)
+    scenario = with_thruster(
+        in_space(scenario) if spatial else scenario, execution_error_relative=0.05, **fields
+    )
     if spatial:
         scenario = with_thruster(scenario, pointing_error_rad=0.02)
     for noise in (NoiseKind.RANDOM, NoiseKind.GAME):

@@ -1,4 +1,6 @@
-"""A camera: misses that its images leave possible, constant bias, first and last image, lost images."""
+"""A camera: misses that its images leave possible, constant bias, first and last image, lost
+images.
+"""
 
 from __future__ import annotations
 
@@ -29,11 +31,17 @@ FIRST_S, LAST_S, EVERY_S = 3600.0, 300.0, 30.0
 
 
 def camera_scenario(**fields: Any) -> Scenario:
-    """Return an engagement of one hour in a plane, with a camera; `fields` are those of the angle sensor."""
+    """Return an engagement of one hour in a plane, with a camera; `fields` are those of the angle
+    sensor.
+    """
     law = {"centroid_error_m": CENTROID_M, **fields}
     camera = Camera(EVERY_S, PIXEL_RAD, **law)
-    box = StateBox((-1e4, 1e4), (3590.0 * SPEED_M_S, 3610.0 * SPEED_M_S), (-2.0, 2.0), (-6141.0, -6139.0))
-    model = SetModel(SPEED_M_S, EVERY_S / 2, box, camera, range_threshold_m=1e3, sections=5, fewest_sections=3)
+    box = StateBox(
+        (-1e4, 1e4), (3590.0 * SPEED_M_S, 3610.0 * SPEED_M_S), (-2.0, 2.0), (-6141.0, -6139.0)
+    )
+    model = SetModel(
+        SPEED_M_S, EVERY_S / 2, box, camera, range_threshold_m=1e3, sections=5, fewest_sections=3
+    )
     return Scenario(
         name="camera",
         nominal_range_m=3600.0 * SPEED_M_S,
@@ -45,21 +53,27 @@ def camera_scenario(**fields: Any) -> Scenario:
 
 def in_space(scenario: Scenario, **fields: Any) -> Scenario:
     """Return the scenario in space, with fields of the angle sensor."""
-    model, box = scenario.set_model, replace(scenario.dispersion, y_m=(-8e3, 9e3), vy_m_s=(-1.0, 2.0))
+    model = scenario.set_model
+    box = replace(scenario.dispersion, y_m=(-8e3, 9e3), vy_m_s=(-1.0, 2.0))
     model = replace(model, bounds=box, angle_sensor=replace(model.angle_sensor, **fields))
     return replace(scenario, dispersion=box, **of_model(model))
 
 
-def widest_m(measured: Floats, times_s: Floats, pixel: float, centroid_m: float, constant: bool) -> float:
-    """Return half the width of the interval of misses m that agree with measured z/x, by two linear programs.
+def widest_m(
+    measured: Floats, times_s: Floats, pixel: float, centroid_m: float, constant: bool
+) -> float:
+    """Return half the width of the interval of misses m that agree with measured z/x, by two linear
+    programs.
 
-    z = m + s t at the time t before the arrival; with a constant bias, its share of the centroid error is a variable.
+    z = m + s t at the time t before the arrival; with a constant bias, its share of the centroid
+    error is a variable.
     """
     x = SPEED_M_S * times_s
     bound = pixel * x + (0.0 if constant else centroid_m)
     # Variables: m, s FIRST_S and the bias, m.
     rows = np.stack([np.ones_like(x), times_s / FIRST_S, np.full_like(x, float(constant))], axis=1)
-    matrix, most = np.concatenate([rows, -rows]), np.concatenate([measured * x + bound, bound - measured * x])
+    matrix = np.concatenate([rows, -rows])
+    most = np.concatenate([measured * x + bound, bound - measured * x])
     scale = 1.0 / np.abs(np.concatenate([x, x]))
     ends = []
     for sign in (1.0, -1.0):
@@ -76,13 +90,18 @@ def widest_m(measured: Floats, times_s: Floats, pixel: float, centroid_m: float,
 
 @pytest.mark.parametrize("constant", [False, True])
 @pytest.mark.parametrize(
-    "last_s", [30.0, 1200.0, *(pytest.param(each, marks=pytest.mark.thorough) for each in (300.0, 3000.0))]
+    "last_s",
+    [30.0, 1200.0, *(pytest.param(each, marks=pytest.mark.thorough) for each in (300.0, 3000.0))],
 )
 @pytest.mark.parametrize("centroid_m", [0.0, 3.0, 50.0])
-def test_possible_miss_is_that_of_linear_programs(last_s: float, centroid_m: float, constant: bool) -> None:
+def test_possible_miss_is_that_of_linear_programs(
+    last_s: float, centroid_m: float, constant: bool
+) -> None:
     """Exact measurements reach the closed form, and no admissible ones exceed it."""
     times_s = np.linspace(FIRST_S, last_s, 40)
-    expected = possible_miss_m(SPEED_M_S, PIXEL_RAD, centroid_m, FIRST_S, last_s, constant_bias=constant)
+    expected = possible_miss_m(
+        SPEED_M_S, PIXEL_RAD, centroid_m, FIRST_S, last_s, constant_bias=constant
+    )
     exact = widest_m(np.zeros(40), times_s, PIXEL_RAD, centroid_m, constant)
     assert exact == pytest.approx(expected, rel=1e-6)
     random = np.random.default_rng(7)
@@ -96,21 +115,30 @@ def test_possible_miss_is_that_of_linear_programs(last_s: float, centroid_m: flo
 def widest_with_disturbance_m(
     times_s: Floats, pixel: float, centroid_m: float, disturbance_m_s2: float, constant: bool
 ) -> float:
-    """Return the maximum miss that agrees with images of zero at these times before the arrival, by a linear program.
+    """Return the maximum miss that agrees with images of zero at these times before the arrival, by
+    a linear program.
 
-    Variables: z and V_z at the first image, the bias, and the acceleration between neighbouring images and up to the
-    arrival, each in a unit that makes the coefficients about 1.
+    Variables: z and V_z at the first image, the bias, and the acceleration between neighbouring
+    images and up to the arrival, each in a unit that makes the coefficients about 1.
     """
     events_s = np.append(times_s, 0.0)
-    since_s, lasting_s = events_s[0] - events_s, -np.diff(events_s)
+    since_s = events_s[0] - events_s
+    lasting_s = -np.diff(events_s)
     middle_s = since_s[:-1] + 0.5 * lasting_s
-    ahead_s = np.maximum(since_s[:, None] - middle_s, 0.0)  # constant over a step: the impulse acts from its middle
+    ahead_s = np.maximum(
+        since_s[:, None] - middle_s, 0.0
+    )  # constant over a step: the impulse acts from its middle
     steps = np.tril(ahead_s * lasting_s, -1) / since_s[-1] ** 2
     of_bias = np.append(np.full(times_s.size, float(constant)), 0.0)
     z = np.column_stack([np.ones_like(since_s), since_s / since_s[-1], of_bias, steps])
     bound = pixel * SPEED_M_S * times_s + (0.0 if constant else centroid_m)
     most = disturbance_m_s2 * since_s[-1] ** 2
-    limits = [(None, None), (None, None), (-centroid_m, centroid_m), *[(-most, most)] * lasting_s.size]
+    limits = [
+        (None, None),
+        (None, None),
+        (-centroid_m, centroid_m),
+        *[(-most, most)] * lasting_s.size,
+    ]
     images = np.concatenate([z[:-1], -z[:-1]])
     solved = linprog(-z[-1], A_ub=images, b_ub=np.concatenate([bound, bound]), bounds=limits)
     assert solved.status == 0, solved.message
@@ -145,8 +173,12 @@ def test_possible_miss_with_a_disturbance_is_that_of_a_linear_program(
     assert expected * (1.0 - 3e-3) <= found <= expected * (1.0 + 3e-3)
 
 
-@pytest.mark.parametrize(("cut_off_s", "changing_m", "constant_m"), [(150, 37.2, 33.6), (900, 197.5, 186.3)])
-def test_possible_misses_of_dart_are_those_of_pairs(cut_off_s: float, changing_m: float, constant_m: float) -> None:
+@pytest.mark.parametrize(
+    ("cut_off_s", "changing_m", "constant_m"), [(150, 37.2, 33.6), (900, 197.5, 186.3)]
+)
+def test_possible_misses_of_dart_are_those_of_pairs(
+    cut_off_s: float, changing_m: float, constant_m: float
+) -> None:
     """The program of the pair at the nominal range is another way to the same number."""
     scenario = load_scenario("dart-2022", [f"thruster.last_impulse_s={cut_off_s}"])
     assert possible_miss_of(scenario) == pytest.approx(changing_m, abs=0.05)
@@ -156,12 +188,22 @@ def test_possible_misses_of_dart_are_those_of_pairs(cut_off_s: float, changing_m
 
 
 def measured_set(centroid_m: float, alpha_rad: Callable[[float], float]) -> InformationSet:
-    """Return the set after images from `FIRST_S` to `LAST_S`, with known range and speed and no disturbance."""
+    """Return the set after images from `FIRST_S` to `LAST_S`, with known range and speed and no
+    disturbance.
+    """
     camera = Camera(EVERY_S, PIXEL_RAD, centroid_m)
     at_start = (FIRST_S * SPEED_M_S, FIRST_S * SPEED_M_S)
     box = StateBox((-1e6, 1e6), at_start, (-1e3, 1e3), (-SPEED_M_S, -SPEED_M_S))
     threshold_m = max(1e3, 10.0 * centroid_m)
-    model = SetModel(SPEED_M_S, EVERY_S, box, camera, range_threshold_m=threshold_m, sections=1, fewest_sections=1)
+    model = SetModel(
+        SPEED_M_S,
+        EVERY_S,
+        box,
+        camera,
+        range_threshold_m=threshold_m,
+        sections=1,
+        fewest_sections=1,
+    )
     information = InformationSet(model)
     while True:
         before_s = FIRST_S - information.time_s
@@ -183,16 +225,21 @@ def test_the_set_has_the_possible_misses(centroid_m: float) -> None:
     lower, upper = interval(lambda before_s: 0.0)
     assert upper == pytest.approx(-lower)
     assert expected * (1.0 - 1e-9) <= upper <= (1.0 + 1e-5) * expected
-    bound, random = Camera(EVERY_S, PIXEL_RAD, centroid_m).error_bound, np.random.default_rng(3)
+    bound = Camera(EVERY_S, PIXEL_RAD, centroid_m).error_bound
+    random = np.random.default_rng(3)
     for _ in range(5):
-        lower, upper = interval(lambda before_s: random.choice([-1.0, 1.0]) * bound(before_s * SPEED_M_S))
+        lower, upper = interval(
+            lambda before_s: random.choice([-1.0, 1.0]) * bound(before_s * SPEED_M_S)
+        )
         assert 0.5 * (upper - lower) <= (1.0 + 1e-5) * expected
         assert lower <= 0.0 <= upper
 
 
 def test_closed_form_of_a_scenario_knows_schedule_delay_and_images() -> None:
     scenario = camera_scenario(first_image_s=2400.0, last_image_s=60.0)
-    late = replace(scenario, thruster=replace(scenario.thruster, last_impulse_s=300.0, delay_steps=3))
+    late = replace(
+        scenario, thruster=replace(scenario.thruster, last_impulse_s=300.0, delay_steps=3)
+    )
     for each, last_s in ((scenario, 60.0), (late, 360.0)):
         first, *_, last = image_times_s(each)
         assert (first, last) == pytest.approx((2400.0, last_s))
@@ -207,7 +254,9 @@ def test_closed_form_of_a_scenario_knows_schedule_delay_and_images() -> None:
 
 
 def sound(results: Results) -> bool:
-    return bool(results.truth_kept.all() and results.phi_held.all() and not results.phi_held.mask.any())
+    return bool(
+        results.truth_kept.all() and results.phi_held.all() and not results.phi_held.mask.any()
+    )
 
 
 @pytest.mark.parametrize("noise", NoiseKind)
@@ -220,7 +269,9 @@ def sound(results: Results) -> bool:
         {"bias": Bias.CONSTANT, "miss_probability": 0.2},
     ],
 )
-def test_engagements_with_a_camera_keep_the_truth_and_the_bound(noise: NoiseKind, fields: dict[str, Any]) -> None:
+def test_engagements_with_a_camera_keep_the_truth_and_the_bound(
+    noise: NoiseKind, fields: dict[str, Any]
+) -> None:
     plane = replace(camera_scenario(), noise=noise, tie=TieRule.RANDOM)
     model = replace(plane.set_model, angle_sensor=replace(plane.set_model.angle_sensor, **fields))
     assert sound(simulate(replace(plane, **of_model(model)), 16))
@@ -229,8 +280,12 @@ def test_engagements_with_a_camera_keep_the_truth_and_the_bound(noise: NoiseKind
 
 @pytest.mark.parametrize("last_s", [300.0, 900.0])
 @pytest.mark.parametrize("spatial", [False, True])
-def test_phi_with_the_last_impulse_at_the_last_image_is_the_possible_miss(last_s: float, spatial: bool) -> None:
-    """Images reach from the start to the cut-off, so Phi is at most the closed form, up to the range's uncertainty."""
+def test_phi_with_the_last_impulse_at_the_last_image_is_the_possible_miss(
+    last_s: float, spatial: bool
+) -> None:
+    """Images reach from the start to the cut-off, so Phi is at most the closed form, up to the
+    range's uncertainty.
+    """
     scenario = camera_scenario(last_image_s=last_s)
     thruster = Thruster(20.0, 0.0, 5.0, last_impulse_s=last_s)
     scenario = replace(scenario, thruster=thruster, noise=NoiseKind.GAME)
@@ -238,7 +293,8 @@ def test_phi_with_the_last_impulse_at_the_last_image_is_the_possible_miss(last_s
     results = simulate(scenario, 8)
     assert sound(results)
     phi = results.guaranteed_miss_m.compressed()
-    # A label may arrive 10 s later than the nominal one, and the bands are up to 1 % wider at the threshold.
+    # A label may arrive 10 s later than the nominal one, and the bands are up to 1 % wider at the
+    # threshold.
     assert phi.max() <= 1.08 * possible_miss_of(scenario)
     assert phi.max() >= 0.5 * possible_miss_of(scenario)
 
@@ -251,7 +307,12 @@ def test_a_camera_without_centroid_error_is_the_line_with_equal_errors(asteroid:
         line = AngleSensor(0.5, 2e-4, 2e-4, 5801.3e3)
         camera = Camera(0.5, 2e-4)
         first, second = (
-            simulate(replace(asteroid, noise=NoiseKind.GAME, **of_model(replace(model, angle_sensor=sensor))), 5)
+            simulate(
+                replace(
+                    asteroid, noise=NoiseKind.GAME, **of_model(replace(model, angle_sensor=sensor))
+                ),
+                5,
+            )
             for sensor in (line, camera)
         )
         assert first.miss_m.tolist() == second.miss_m.tolist()
@@ -260,7 +321,8 @@ def test_a_camera_without_centroid_error_is_the_line_with_equal_errors(asteroid:
 
 def steps_of(scenario: Scenario, runs: int = 6, seed: int = 2) -> list[Step]:
     draws = draw(scenario, range(runs), seed)
-    flight, steps = Engagements(scenario, draws), list[Step]()
+    flight = Engagements(scenario, draws)
+    steps = list[Step]()
     while flight.flying:
         flight.advance(steps.append)
     return steps
@@ -268,7 +330,9 @@ def steps_of(scenario: Scenario, runs: int = 6, seed: int = 2) -> list[Step]:
 
 @pytest.mark.parametrize("spatial", [False, True])
 def test_a_constant_bias_is_a_constant_length(spatial: bool) -> None:
-    """The error at the distance d is pixel times a draw of the image plus centroid/d times the draw of the run."""
+    """The error at the distance d is pixel times a draw of the image plus centroid/d times the draw
+    of the run.
+    """
     scenario = camera_scenario(bias=Bias.CONSTANT)
     scenario = in_space(scenario) if spatial else scenario
     steps = steps_of(scenario)
@@ -280,7 +344,9 @@ def test_a_constant_bias_is_a_constant_length(spatial: bool) -> None:
         if "angle" in step.measured:
             error = step.measured["angle"] - step.sight.alpha_rad
             pixel = PIXEL_RAD * draws.errors["angle"][..., step.step]
-            assert error == pytest.approx(pixel + CENTROID_M / step.sight.range_m * draws.bias, rel=1e-6, abs=1e-15)
+            assert error == pytest.approx(
+                pixel + CENTROID_M / step.sight.range_m * draws.bias, rel=1e-6, abs=1e-15
+            )
 
 
 def test_images_are_taken_from_the_first_to_the_last_and_measured_from_then_on() -> None:
@@ -302,12 +368,16 @@ def test_a_lost_image_is_no_value_of_the_record_and_no_cut() -> None:
     images = draw(scenario, [3], 0).images
     assert images is not None
     taken_s = record.time_s[:230][record.measures("angle")[:230]]
-    assert taken_s.tolist() == [step * EVERY_S / 2 for step in range(0, 230, 2) if images[0, step] >= 0.4]
+    assert taken_s.tolist() == [
+        step * EVERY_S / 2 for step in range(0, 230, 2) if images[0, step] >= 0.4
+    ]
 
 
 @pytest.mark.parametrize("centroid_m", [CENTROID_M, 60.0])
 def test_pairs_of_the_lower_bound_stay_within_the_bounds_of_a_camera(centroid_m: float) -> None:
-    """The two motions have the same images until the cut-off of the images, and at least one misses by the bound."""
+    """The two motions have the same images until the cut-off of the images, and at least one misses
+    by the bound.
+    """
     scenario = camera_scenario(centroid_error_m=centroid_m, last_image_s=300.0)
     bound = lower_bound(scenario)
     assert bound.bound_m > 0.0
@@ -321,8 +391,12 @@ def test_pairs_of_the_lower_bound_stay_within_the_bounds_of_a_camera(centroid_m:
 
 @pytest.mark.parametrize("centroid_m", [0.0, CENTROID_M, 60.0])
 @pytest.mark.parametrize("delay_steps", [0, 2])
-def test_extremal_errors_reach_the_possible_miss_with_any_strategy(centroid_m: float, delay_steps: int) -> None:
-    """With a cut-off, two motions with the same images until the last decision miss by the closed form and by Phi."""
+def test_extremal_errors_reach_the_possible_miss_with_any_strategy(
+    centroid_m: float, delay_steps: int
+) -> None:
+    """With a cut-off, two motions with the same images until the last decision miss by the closed
+    form and by Phi.
+    """
     scenario = camera_scenario(centroid_error_m=centroid_m)
     at_start = (3600.0 * SPEED_M_S,) * 2
     box = replace(scenario.dispersion, x_m=at_start, vx_m_s=(-SPEED_M_S, -SPEED_M_S))

@@ -19,7 +19,16 @@ import pyarrow.parquet as pq
 import pytest
 
 from infoset.guidance import NoiseKind, TieRule
-from infoset.sim import Body, Campaign, CampaignNoise, QuantileName, Scenario, StoppingRule, fly_one, simulate
+from infoset.sim import (
+    Body,
+    Campaign,
+    CampaignNoise,
+    QuantileName,
+    Scenario,
+    StoppingRule,
+    fly_one,
+    simulate,
+)
 from infoset.sim.parallel import Task, simulate_task, worker_processes
 from infoset.sim.scenario import of_model
 from infoset.sim.simulate import ENGAGEMENTS_AT_ONCE
@@ -37,7 +46,11 @@ def mixed(brief: Scenario, folder: Path, runs: int = 96, chunk: int | None = 16)
 @pytest.fixture(scope="module")
 def reference(brief: Scenario, tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
     """96 runs of mixed noise, simulated by one thread."""
-    return mixed(brief, tmp_path_factory.mktemp("reference") / "campaign", chunk=None).run(workers=1).runs()
+    return (
+        mixed(brief, tmp_path_factory.mktemp("reference") / "campaign", chunk=None)
+        .run(workers=1)
+        .runs()
+    )
 
 
 def same(found: pd.DataFrame, expected: pd.DataFrame) -> bool:
@@ -62,7 +75,9 @@ def stop_after(chunks: int) -> Callable[[float], None]:
     return progress
 
 
-def test_rows_are_those_of_simulate_and_of_one_engagement(brief: Scenario, reference: pd.DataFrame) -> None:
+def test_rows_are_those_of_simulate_and_of_one_engagement(
+    brief: Scenario, reference: pd.DataFrame
+) -> None:
     assert reference["run"].tolist() == list(range(96))
     assert reference["noise"].tolist() == ["random", "game"] * 48
     for kind, first in ((NoiseKind.RANDOM, 0), (NoiseKind.GAME, 1)):
@@ -84,8 +99,13 @@ def test_workers_and_chunks_change_no_bit(
     assert same(folder.runs(), reference)
     assert folder.complete
     # Every reader of Parquet can open the files, and finds the units.
-    assert same(pd.read_parquet(tmp_path / "shards")[["run", "miss_m"]], reference[["run", "miss_m"]])
-    units = {field.name: field.metadata[b"unit"].decode() for field in pq.read_schema(shards(tmp_path)[0])}
+    assert same(
+        pd.read_parquet(tmp_path / "shards")[["run", "miss_m"]], reference[["run", "miss_m"]]
+    )
+    units = {
+        field.name: field.metadata[b"unit"].decode()
+        for field in pq.read_schema(shards(tmp_path)[0])
+    }
     assert (units["miss_m"], units["start_vx_m_s"], units["outcome"]) == ("m", "m/s", "")
 
 
@@ -100,7 +120,9 @@ def test_any_executor_will_do(brief: Scenario, reference: pd.DataFrame, tmp_path
         assert same(mixed(brief, tmp_path / "processes").run(pool).runs(), reference)
 
 
-def test_guaranteed_misses_are_unknown_where_they_are_not_computed(brief: Scenario, tmp_path: Path) -> None:
+def test_guaranteed_misses_are_unknown_where_they_are_not_computed(
+    brief: Scenario, tmp_path: Path
+) -> None:
     without = Campaign(guaranteed(brief), 8, tmp_path / "without", guarantee=False).run().runs()
     computed = Campaign(guaranteed(brief), 8, tmp_path / "with").run().runs()
     assert without["guaranteed_miss_m"].isna().all()
@@ -108,8 +130,11 @@ def test_guaranteed_misses_are_unknown_where_they_are_not_computed(brief: Scenar
     assert (computed["miss_m"] <= computed["guaranteed_miss_m"]).all()
 
 
-def test_a_campaign_that_is_broken_off_is_continued(brief: Scenario, reference: pd.DataFrame, tmp_path: Path) -> None:
-    campaign, shares = mixed(brief, tmp_path), list[float]()
+def test_a_campaign_that_is_broken_off_is_continued(
+    brief: Scenario, reference: pd.DataFrame, tmp_path: Path
+) -> None:
+    campaign = mixed(brief, tmp_path)
+    shares = list[float]()
     (tmp_path / ".infoset-1-abc.tmp").write_bytes(b"half")
     for stored in (16, 32):
         with pytest.raises(Stop):
@@ -124,7 +149,9 @@ def test_a_campaign_that_is_broken_off_is_continued(brief: Scenario, reference: 
     assert same(campaign.run(resume=True, progress=stop_after(1)).runs(), reference)
 
 
-def test_more_runs_extend_a_campaign(brief: Scenario, reference: pd.DataFrame, tmp_path: Path) -> None:
+def test_more_runs_extend_a_campaign(
+    brief: Scenario, reference: pd.DataFrame, tmp_path: Path
+) -> None:
     mixed(brief, tmp_path, 40).run()
     folder = mixed(brief, tmp_path, 96, None).run(resume=True)
     assert same(folder.runs(), reference)
@@ -146,7 +173,9 @@ def with_folder(file: Path) -> None:
 
 def without_a_column(file: Path) -> None:
     table = pq.read_table(file)
-    pq.write_table(table.drop_columns(["miss_m"]).replace_schema_metadata(table.schema.metadata), file)
+    pq.write_table(
+        table.drop_columns(["miss_m"]).replace_schema_metadata(table.schema.metadata), file
+    )
 
 
 def with_text(file: Path) -> None:
@@ -161,7 +190,9 @@ BROKEN: dict[str, Callable[[Path], object]] = {
     "a bit": lambda file: file.write_bytes(flipped(file.read_bytes())),
     "garbage": lambda file: file.write_bytes(b"PAR1" + b"x" * 50 + b"PAR1"),
     "another chunk": lambda file: file.write_bytes(shards(file.parents[1])[0].read_bytes()),
-    "another campaign": lambda file: file.write_bytes(shards(file.parents[2] / "other")[2].read_bytes()),
+    "another campaign": lambda file: file.write_bytes(
+        shards(file.parents[2] / "other")[2].read_bytes()
+    ),
     "a folder": with_folder,
     "a column less": without_a_column,
     "a text for a number": with_text,
@@ -201,29 +232,46 @@ def test_a_broken_file_is_named_and_simulated_again_when_it_is_deleted(
         lambda text: text.replace(b'"seed": 5', b'"seed": true'),
         lambda text: text.replace(b'"noise": "mixed"', b'"noise": "loud"'),
         lambda text: text.replace(b'"strategy": "', b'"strategy": "\\u001b[31m'),
-        lambda text: text.replace(b'"axes": []', b'"axes": [{"key": "a", "scale": "log", "values": [1]}]'),
+        lambda text: text.replace(
+            b'"axes": []', b'"axes": [{"key": "a", "scale": "log", "values": [1]}]'
+        ),
         lambda text: text.replace(b'"cell_runs": []', b'"cell_runs": [1, 2]'),
         lambda text: text.replace(b'"sections": 5', b'"sectiones": 5'),
         lambda text: text.replace(b'"nominal_range_m": 595000.0', b'"nominal_range_m": 1e999'),
     ],
 )
-def test_a_broken_manifest_is_refused(change: Callable[[bytes], bytes], brief: Scenario, tmp_path: Path) -> None:
+def test_a_broken_manifest_is_refused(
+    change: Callable[[bytes], bytes], brief: Scenario, tmp_path: Path
+) -> None:
     file = tmp_path / "manifest.json"
     mixed(brief, tmp_path, 16).manifest().write(tmp_path)
     text = file.read_bytes()
     assert change(text) != text
     file.write_bytes(change(text))
-    for read in (lambda: read_manifest(tmp_path), lambda: mixed(brief, tmp_path, 16).run(resume=True)):
-        with pytest.raises(StorageError, match=r"manifest\.json: is not a readable manifest: .*restore it"):
+    for read in (
+        lambda: read_manifest(tmp_path),
+        lambda: mixed(brief, tmp_path, 16).run(resume=True),
+    ):
+        with pytest.raises(
+            StorageError, match=r"manifest\.json: is not a readable manifest: .*restore it"
+        ):
             read()
     assert file.read_bytes() == change(text)
 
 
-@pytest.mark.parametrize(("moment", "error"), [(1, errno.ENOSPC), (5, errno.ENOSPC), (11, errno.EIO)])
+@pytest.mark.parametrize(
+    ("moment", "error"), [(1, errno.ENOSPC), (5, errno.ENOSPC), (11, errno.EIO)]
+)
 def test_a_full_disk_leaves_a_valid_folder(
-    moment: int, error: int, brief: Scenario, reference: pd.DataFrame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    moment: int,
+    error: int,
+    brief: Scenario,
+    reference: pd.DataFrame,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    real, calls = os.fsync, itertools.count(1)
+    real = os.fsync
+    calls = itertools.count(1)
 
     def fsync(descriptor: int) -> None:
         if next(calls) >= moment:
@@ -238,17 +286,27 @@ def test_a_full_disk_leaves_a_valid_folder(
     assert same(mixed(brief, tmp_path).run(resume=True).runs(), reference)
 
 
-def test_another_campaign_is_refused_and_every_difference_shown(brief: Scenario, tmp_path: Path) -> None:
+def test_another_campaign_is_refused_and_every_difference_shown(
+    brief: Scenario, tmp_path: Path
+) -> None:
     campaign = mixed(brief, tmp_path, 32)
     campaign.run()
     before = {each: each.read_bytes() for each in tmp_path.rglob("*") if each.is_file()}
     sensor = replace(linear(brief.angle_sensor), error_at_zero_range_rad=0.0003)
-    other = replace(brief, **of_model(replace(brief.set_model, angle_sensor=sensor)), tie=TieRule.LOWER)
+    other = replace(
+        brief, **of_model(replace(brief.set_model, angle_sensor=sensor)), tie=TieRule.LOWER
+    )
     for changed, lines in (
-        (replace(campaign, seed=6, chunk=8), ["seed: 5 in the folder, 6 now", "chunk: 16 in the folder, 8 now"]),
+        (
+            replace(campaign, seed=6, chunk=8),
+            ["seed: 5 in the folder, 6 now", "chunk: 16 in the folder, 8 now"],
+        ),
         (
             replace(campaign, noise=CampaignNoise.GAME),
-            ['scenario.noise: "random" in the folder, "game" now', 'noise: "mixed" in the folder, "game" now'],
+            [
+                'scenario.noise: "random" in the folder, "game" now',
+                'noise: "mixed" in the folder, "game" now',
+            ],
         ),
         (
             replace(campaign, scenario=replace(brief, body=Body(80.0))),
@@ -279,7 +337,9 @@ def test_versions_of_packages_must_be_the_same(brief: Scenario, tmp_path: Path) 
     with pytest.raises(StorageError, match=r'versions\.numpy: "1.0" in the folder'):
         campaign.run(resume=True)
     task = Task(brief, range(4), 0, versions={**versions(), "numpy": "1.0"})
-    with pytest.raises(VersionError, match=rf"numpy 1.0 in the campaign, {versions()['numpy']} on the worker"):
+    with pytest.raises(
+        VersionError, match=rf"numpy 1.0 in the campaign, {versions()['numpy']} on the worker"
+    ):
         simulate_task(task)
 
 
@@ -300,11 +360,16 @@ def test_a_scenario_comes_back_whole(brief: Scenario, ranging: Scenario, comet: 
 
 
 @pytest.mark.parametrize("number", [2, np.float64(2.0), np.int64(2)])
-def test_numbers_of_other_types_are_the_same_campaign(number: Any, brief: Scenario, tmp_path: Path) -> None:
+def test_numbers_of_other_types_are_the_same_campaign(
+    number: Any, brief: Scenario, tmp_path: Path
+) -> None:
     plain = replace(brief, thruster=replace(brief.thruster, max_impulse_m_s=2.0))
     other = replace(brief, thruster=replace(brief.thruster, max_impulse_m_s=number))
     assert fingerprint(other) == fingerprint(plain)
-    assert mixed(other, tmp_path, 8).manifest().identity == mixed(plain, tmp_path, 8).manifest().identity
+    assert (
+        mixed(other, tmp_path, 8).manifest().identity
+        == mixed(plain, tmp_path, 8).manifest().identity
+    )
 
 
 def test_a_folder_with_other_content_is_left_alone(brief: Scenario, tmp_path: Path) -> None:
@@ -330,10 +395,14 @@ def test_two_campaigns_in_one_folder_at_once(brief: Scenario, tmp_path: Path) ->
     assert mixed(brief, tmp_path).run(progress=meddle).complete
     script = (
         "import sys; from pathlib import Path; from infoset.sim.storage.files import locked\n"
-        "lock = locked(Path(sys.argv[1])); lock.__enter__(); print('held', flush=True); sys.stdin.read()"
+        "lock = locked(Path(sys.argv[1])); lock.__enter__(); print('held', flush=True); "
+        "sys.stdin.read()"
     )
     with subprocess.Popen(
-        [sys.executable, "-c", script, str(tmp_path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        [sys.executable, "-c", script, str(tmp_path)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
     ) as other:
         assert other.stdout is not None
         assert other.stdout.readline() == "held\n"
@@ -351,7 +420,8 @@ def until(brief: Scenario, tmp_path: Path) -> Campaign:
 
 def test_a_rule_stops_at_the_same_run_with_any_workers(until: Campaign, tmp_path: Path) -> None:
     folder = until.run(workers=1)
-    stopped, runs = folder.runs(), folder.finished_runs
+    stopped = folder.runs()
+    runs = folder.finished_runs
     assert 16 < runs < 200
     assert runs % 16 == 0
     assert folder.complete
@@ -392,18 +462,33 @@ def test_results_that_are_not_finite_are_not_stored(
 
 
 def test_numbers_that_make_no_campaign(brief: Scenario, tmp_path: Path) -> None:
-    with pytest.raises(TypeError, match="noise must be None, a CampaignNoise, or have the method measure"):
+    with pytest.raises(
+        TypeError, match="noise must be None, a CampaignNoise, or have the method measure"
+    ):
         Campaign(brief, 4, tmp_path, noise="foo")  # type: ignore[arg-type]
     batch = ENGAGEMENTS_AT_ONCE
-    sizes = [mixed(brief, tmp_path, runs, None).manifest().chunk for runs in (1, 256 * batch, 256 * batch + 1, 10**9)]
+    sizes = [
+        mixed(brief, tmp_path, runs, None).manifest().chunk
+        for runs in (1, 256 * batch, 256 * batch + 1, 10**9)
+    ]
     assert sizes == [batch, batch, 2 * batch, 4096 // batch * batch]
 
 
 def test_cells_of_a_sweep_are_campaigns_of_their_scenarios(brief: Scenario, tmp_path: Path) -> None:
-    cells = tuple(replace(brief, thruster=replace(brief.thruster, max_impulse_m_s=each)) for each in (2.0, 5.0, 9.0))
+    cells = tuple(
+        replace(brief, thruster=replace(brief.thruster, max_impulse_m_s=each))
+        for each in (2.0, 5.0, 9.0)
+    )
     axis = Axis("thruster.max_impulse_m_s", (2.0, 5.0, 9.0))
     sweep = Campaign(
-        brief, 40, tmp_path / "sweep", seed=3, noise=CampaignNoise.MIXED, chunk=16, axes=(axis,), cells=cells
+        brief,
+        40,
+        tmp_path / "sweep",
+        seed=3,
+        noise=CampaignNoise.MIXED,
+        chunk=16,
+        axes=(axis,),
+        cells=cells,
     )
     with pytest.raises(Stop):
         sweep.run(progress=stop_after(3))
@@ -413,9 +498,15 @@ def test_cells_of_a_sweep_are_campaigns_of_their_scenarios(brief: Scenario, tmp_
     whole = folder.runs()
     assert whole["cell"].tolist() == [0] * 40 + [1] * 40 + [2] * 40
     for number, cell in enumerate(cells):
-        alone = Campaign(cell, 40, tmp_path / f"cell{number}", seed=3, noise=CampaignNoise.MIXED).run().runs()
+        alone = (
+            Campaign(cell, 40, tmp_path / f"cell{number}", seed=3, noise=CampaignNoise.MIXED)
+            .run()
+            .runs()
+        )
         assert same(folder.runs(cell=number).drop(columns="cell"), alone.drop(columns="cell"))
-        assert folder.manifest.values_of(number) == {"thruster.max_impulse_m_s": axis.values[number]}
+        assert folder.manifest.values_of(number) == {
+            "thruster.max_impulse_m_s": axis.values[number]
+        }
     with pytest.raises(StorageError, match="cells_hash"):
         replace(sweep, cells=cells[::-1]).run(resume=True)
     with pytest.raises(ValueError, match="a scenario for each combination"):

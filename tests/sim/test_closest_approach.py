@@ -1,4 +1,6 @@
-"""The minimum distance of motions that approach, recede, graze, or turn around within a step, against DOP853."""
+"""The minimum distance of motions that approach, recede, graze, or turn around within a step,
+against DOP853.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,9 @@ from infoset.sim.kepler import KeplerMotion, sun_and_orbit
 
 SUN = Sun(1.3e20, 1.5e11, 2.0)
 TOLERANCE_M = 1e-3
-"""Error that the class allows; DOP853 with a relative tolerance of 1e-13 is far below it at these ranges."""
+"""Error that the class allows; DOP853 with a relative tolerance of 1e-13 is far below it at these
+ranges.
+"""
 
 
 def rates(sun: Sun | None, manoeuvre_m_s2: Floats) -> Callable[[float, Floats], Floats]:
@@ -37,11 +41,19 @@ def rates(sun: Sun | None, manoeuvre_m_s2: Floats) -> Callable[[float, Floats], 
 
 
 def nearest_by_dop853(
-    position_m: Floats, velocity_m_s: Floats, sun: Sun | None, manoeuvres_m_s2: Floats, step_s: float, steps: int
+    position_m: Floats,
+    velocity_m_s: Floats,
+    sun: Sun | None,
+    manoeuvres_m_s2: Floats,
+    step_s: float,
+    steps: int,
 ) -> float:
-    """Minimum distance over some steps, each with a constant acceleration: at the start, or where r . v has a zero."""
+    """Minimum distance over some steps, each with a constant acceleration: at the start, or where r
+    . v has a zero.
+    """
     axes = len(position_m)
-    own, own_speed = np.zeros(axes), np.zeros(axes)
+    own = np.zeros(axes)
+    own_speed = np.zeros(axes)
     if sun is not None:
         toward, along = (direction[-axes:] for direction in sun_and_orbit(sun))
         own = -sun.distance_m * toward
@@ -71,7 +83,9 @@ def nearest_by_dop853(
 
 
 def drawn(number: int) -> tuple[Floats, Floats, Floats, float]:
-    """Position, velocity, manoeuvres of 40 steps, and the step of a random start; the kind changes with the number."""
+    """Position, velocity, manoeuvres of 40 steps, and the step of a random start; the kind changes
+    with the number.
+    """
     generator = np.random.default_rng([54, number])
     axes = int(generator.integers(2, 4))
     range_m = 10.0 ** generator.uniform(3.0, 6.0)
@@ -102,7 +116,9 @@ def drawn(number: int) -> tuple[Floats, Floats, Floats, float]:
 
 
 @pytest.mark.parametrize("sun", [None, SUN], ids=["free space", "gravity"])
-@pytest.mark.parametrize("number", [*range(8), *(pytest.param(n, marks=pytest.mark.thorough) for n in range(8, 400))])
+@pytest.mark.parametrize(
+    "number", [*range(8), *(pytest.param(n, marks=pytest.mark.thorough) for n in range(8, 400))]
+)
 def test_minimum_distance_of_random_motions(number: int, sun: Sun | None) -> None:
     position, velocity, manoeuvres, step_s = drawn(number)
     motion = KeplerMotion(position[None], velocity[None], sun)
@@ -122,10 +138,15 @@ def test_minimum_distance_of_random_motions(number: int, sun: Sun | None) -> Non
 
 @pytest.mark.parametrize("acceleration_m_s2", [0.0, -4e5, 2e5])
 @pytest.mark.parametrize("step_s", [0.0234, 0.1])
-def test_object_that_recedes_from_the_start_is_nearest_there(step_s: float, acceleration_m_s2: float) -> None:
+def test_object_that_recedes_from_the_start_is_nearest_there(
+    step_s: float, acceleration_m_s2: float
+) -> None:
     """r . v is 5.2e9 m^2/s at the start, and no acceleration makes it negative within a step."""
-    position, velocity = np.array([[72968.0, -13250.0, 22768.0]]), np.array([[87146.0, -24880.0, -65607.0]])
-    passage = KeplerMotion(position, velocity, None).advance(step_s, np.array([[acceleration_m_s2], [0.0]]))
+    position = np.array([[72968.0, -13250.0, 22768.0]])
+    velocity = np.array([[87146.0, -24880.0, -65607.0]])
+    passage = KeplerMotion(position, velocity, None).advance(
+        step_s, np.array([[acceleration_m_s2], [0.0]])
+    )
 
     assert passage.passed[0]
     assert passage.min_distance_m[0] == np.hypot.reduce(position[0])
@@ -133,7 +154,9 @@ def test_object_that_recedes_from_the_start_is_nearest_there(step_s: float, acce
 
 
 def test_target_that_returns_before_the_arrival_is_nearest_at_its_return() -> None:
-    """z = 1000 + 1000 t - 750 t^2 and x = 500 - 250 t are both zero at t = 2; the object recedes until t = 0.8."""
+    """z = 1000 + 1000 t - 750 t^2 and x = 500 - 250 t are both zero at t = 2; the object recedes
+    until t = 0.8.
+    """
     exact = StateBox((1000.0, 1000.0), (500.0, 500.0), (1000.0, 1000.0), (-250.0, -250.0))
     scenario = Scenario(
         name="return",

@@ -15,7 +15,14 @@ from infoset.sim.covariance import Covariance
 from infoset.sim.draws import draw
 from infoset.sim.scenario import Scenario, corners
 
-ROWS = ((1.0,), (0.3, 1.0), (0.0, -0.2, 1.0), (0.6, 0.0, 0.1, 1.0), (0.0, -0.5, 0.0, 0.2, 1.0), (0, 0, 0.4, 0, 0, 1.0))
+ROWS = (
+    (1.0,),
+    (0.3, 1.0),
+    (0.0, -0.2, 1.0),
+    (0.6, 0.0, 0.1, 1.0),
+    (0.0, -0.5, 0.0, 0.2, 1.0),
+    (0, 0, 0.4, 0, 0, 1.0),
+)
 SIGMA = np.array([800.0, 1200.0, 4000.0, 0.05, 0.08, 0.03])
 GIVEN = Covariance((800.0, 1200.0, 4000.0), (0.05, 0.08, 0.03), ROWS)
 
@@ -24,7 +31,9 @@ def normal(sigmas: float, step_s: float = 7200.0) -> Scenario:
     dart = load_scenario("dart-2022", [f"step_s={step_s}", f"camera.period_s={step_s}"])
     middle = np.array([100.0, -200.0, 88_416_000.0, 0.0, 0.01, -6140.0])
     ends = zip(middle - sigmas * GIVEN.sigma, middle + sigmas * GIVEN.sigma, strict=True)
-    box = StateBox(**dict(zip(("y_m", "z_m", "x_m", "vy_m_s", "vz_m_s", "vx_m_s"), ends, strict=True)))
+    box = StateBox(
+        **dict(zip(("y_m", "z_m", "x_m", "vy_m_s", "vz_m_s", "vx_m_s"), ends, strict=True))
+    )
     return replace(dart, dispersion=box, covariance=GIVEN)
 
 
@@ -33,7 +42,9 @@ def test_all_forms_are_one_covariance() -> None:
     full += np.tril(full, -1).T
     matrix = np.outer(SIGMA, SIGMA) * full
     whole = Covariance(matrix_m2=tuple(map(tuple, matrix.tolist())))
-    lower = Covariance(matrix_m2=tuple(tuple(row[: index + 1]) for index, row in enumerate(matrix.tolist())))
+    lower = Covariance(
+        matrix_m2=tuple(tuple(row[: index + 1]) for index, row in enumerate(matrix.tolist()))
+    )
     for each in (GIVEN, whole, lower):
         np.testing.assert_allclose(each.matrix, matrix, rtol=1e-14)
         scaled = each.root / SIGMA[:, None]
@@ -56,17 +67,33 @@ def test_an_exact_component_and_one_that_follows_from_another_are_kept() -> None
             {"position_sigma_m": (1.0, 1.0), "velocity_sigma_m_s": (1.0,)},
             "position_sigma_m and velocity_sigma_m_s must have as many values: got 2 and 1",
         ),
-        ({"position_sigma_m": (-1.0,), "velocity_sigma_m_s": (1.0,)}, "position_sigma_m must be at least 0"),
+        (
+            {"position_sigma_m": (-1.0,), "velocity_sigma_m_s": (1.0,)},
+            "position_sigma_m must be at least 0",
+        ),
         ({"matrix_m2": ((1.0, 0.5), (0.4, 1.0))}, "must be symmetric"),
-        ({"matrix_m2": ((1.0, 2.0), (2.0, 1.0))}, "correlation of components 1 and 2 is 2, and must be from -1 to 1"),
+        (
+            {"matrix_m2": ((1.0, 2.0), (2.0, 1.0))},
+            "correlation of components 1 and 2 is 2, and must be from -1 to 1",
+        ),
         (
             {"matrix_m2": ((1.0, 0.9, -0.9), (0.9, 1.0, 0.9), (-0.9, 0.9, 1.0))},
             "have a negative eigenvalue, -0.8: check",
         ),
         ({"matrix_m2": ((1.0,), (0.0, -1.0))}, "variances must not be negative"),
         ({"matrix_m2": ((1.0, 0.0), (0.0,))}, "square matrix or its lower triangle"),
-        ({"position_sigma_m": (1.0,), "velocity_sigma_m_s": (1.0,), "correlations": ((1,),)}, "must have 2 rows"),
-        ({"position_sigma_m": (1.0,), "velocity_sigma_m_s": (1.0,), "correlations": ((2,), (0, 1))}, "diagonal"),
+        (
+            {"position_sigma_m": (1.0,), "velocity_sigma_m_s": (1.0,), "correlations": ((1,),)},
+            "must have 2 rows",
+        ),
+        (
+            {
+                "position_sigma_m": (1.0,),
+                "velocity_sigma_m_s": (1.0,),
+                "correlations": ((2,), (0, 1)),
+            },
+            "diagonal",
+        ),
     ],
 )
 def test_what_is_no_covariance_is_refused(values: dict[str, object], problem: str) -> None:
@@ -75,7 +102,8 @@ def test_what_is_no_covariance_is_refused(values: dict[str, object], problem: st
 
 
 def test_starts_have_the_covariance_and_are_those_of_each_run_alone() -> None:
-    wide, runs = normal(5.0), 4000
+    wide = normal(5.0)
+    runs = 4000
     drawn = draw(wide, range(runs), seed=4)
     starts = np.concatenate([drawn.position_m, drawn.velocity_m_s], axis=1)
     lower, upper = corners(wide.dispersion)
@@ -85,11 +113,14 @@ def test_starts_have_the_covariance_and_are_those_of_each_run_alone() -> None:
     error = np.sqrt((1.0 + correlation**2) / runs)
     assert (np.abs(scaled.T @ scaled / runs - correlation) < 4.0 * error).all()
     alone = draw(wide, [17], seed=4)
-    np.testing.assert_array_equal(np.concatenate([alone.position_m, alone.velocity_m_s], axis=1)[0], starts[17])
+    np.testing.assert_array_equal(
+        np.concatenate([alone.position_m, alone.velocity_m_s], axis=1)[0], starts[17]
+    )
 
 
 def test_the_redrawn_share_is_that_of_the_distribution_beyond_the_box() -> None:
-    narrow, runs = normal(1.5), 3000
+    narrow = normal(1.5)
+    runs = 3000
     drawn = draw(narrow, range(runs), seed=0)
     lower, upper = corners(narrow.dispersion)
     starts = np.concatenate([drawn.position_m, drawn.velocity_m_s], axis=1)
@@ -119,7 +150,9 @@ def test_a_covariance_far_wider_than_the_dispersion_is_refused() -> None:
 
 
 def test_a_plane_has_four_components() -> None:
-    plane = replace(load_scenario("asteroid-1997"), covariance=Covariance((300.0, 0.0), (0.0, 30.0)))
+    plane = replace(
+        load_scenario("asteroid-1997"), covariance=Covariance((300.0, 0.0), (0.0, 30.0))
+    )
     drawn = draw(plane, range(3), seed=0)
     assert drawn.position_m[:, 1].tolist() == [5_801_300.0] * 3
     assert drawn.velocity_m_s[:, 0].tolist() == [0.0] * 3

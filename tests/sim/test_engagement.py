@@ -46,7 +46,9 @@ def mirror(scenario: Scenario, draws: Draws) -> tuple[Scenario, Draws]:
 
 
 # Of the comet the range is measured too.
-@pytest.mark.parametrize("name", ["asteroid", pytest.param("ranging", marks=pytest.mark.thorough), "comet"])
+@pytest.mark.parametrize(
+    "name", ["asteroid", pytest.param("ranging", marks=pytest.mark.thorough), "comet"]
+)
 @pytest.mark.parametrize(
     ("noise", "tie"),
     [
@@ -67,7 +69,8 @@ def test_a_mirrored_engagement_is_mirrored(
         box = replace(scenario.set_model, model=model, initial_set=InitialSet.BOX)
         scenario = replace(scenario, **of_model(box))
     draws = draw(scenario, range(8), 3)
-    there, back = fly(scenario, draws), fly(*mirror(scenario, draws))
+    there = fly(scenario, draws)
+    back = fly(*mirror(scenario, draws))
     np.testing.assert_allclose(back.miss_m, there.miss_m, rtol=1e-9)
     np.testing.assert_allclose(back.impulse_m_s, there.impulse_m_s, rtol=1e-9)
     np.testing.assert_allclose(back.guaranteed_miss_m, there.guaranteed_miss_m, rtol=1e-9)
@@ -80,14 +83,17 @@ class ModelMotion:
     def __init__(self, scenario: Scenario, draws: Draws, seed: int) -> None:
         self._e = scenario.set_model.closing_speed_m_s
         self._nu = scenario.set_model.disturbance_m_s2
-        self._z, self._v = draws.position_m.T[:1].copy(), draws.velocity_m_s.T[:1].copy()
-        self._start, self._steps = draws.position_m[:, 1].copy(), 0
+        self._z = draws.position_m.T[:1].copy()
+        self._v = draws.velocity_m_s.T[:1].copy()
+        self._start = draws.position_m[:, 1].copy()
+        self._steps = 0
         self._x = self._start.copy()
         self._random = np.random.default_rng(seed)
 
     def sight(self) -> Sight:
         alpha = self._z / self._x
-        omega, slope = (self._v + self._e * alpha) / self._x, np.tan(alpha)
+        omega = (self._v + self._e * alpha) / self._x
+        slope = np.tan(alpha)
         return Sight(alpha, omega, self._x, slope, omega * (1.0 + slope * slope))
 
     def fire(self, impulse_m_s: Floats) -> None:
@@ -106,7 +112,8 @@ class ModelMotion:
         self._z = self._z + self._v * step_s + 0.5 * push * step_s**2
         self._v = self._v + push * step_s
         self._steps += 1
-        before, self._x = self._x, self._start - self._e * step_s * self._steps
+        before = self._x
+        self._x = self._start - self._e * step_s * self._steps
         return Passage(self._x <= 0.0, np.abs(self._z[0]), before / self._e, self._z)
 
 
@@ -118,7 +125,9 @@ def fly_in_the_model(scenario: Scenario, engagements: int, seed: int) -> Results
 
 
 @pytest.mark.parametrize("noise", [NoiseKind.RANDOM, NoiseKind.GAME])
-def test_the_truth_stays_in_its_section_in_the_models_own_dynamics(asteroid: Scenario, noise: NoiseKind) -> None:
+def test_the_truth_stays_in_its_section_in_the_models_own_dynamics(
+    asteroid: Scenario, noise: NoiseKind
+) -> None:
     results = fly_in_the_model(replace(asteroid, noise=noise), 160, 5)
     assert results.truth_margin_m.min() >= 0.0
     assert Outcome.SET_EMPTY not in results.outcomes
@@ -145,7 +154,9 @@ def test_without_control_the_miss_is_that_of_the_free_motion(asteroid: Scenario)
     results = simulate(replace(asteroid, sun=None), 10, strategy=Silent())
     z, x = results.position_m.T
     vz, vx = results.velocity_m_s.T
-    np.testing.assert_allclose(results.miss_m, np.abs(z * vx - x * vz) / np.hypot(vz, vx), rtol=1e-9)
+    np.testing.assert_allclose(
+        results.miss_m, np.abs(z * vx - x * vz) / np.hypot(vz, vx), rtol=1e-9
+    )
     assert not results.impulse_m_s.any()
 
 
@@ -157,7 +168,9 @@ class Broken:
 
 
 def test_a_strategy_that_returns_nonsense_is_named(asteroid: Scenario) -> None:
-    with pytest.raises(ValueError, match=r"Broken must return finite impulses \(m/s\) of the shape \(1, 2\)"):
+    with pytest.raises(
+        ValueError, match=r"Broken must return finite impulses \(m/s\) of the shape \(1, 2\)"
+    ):
         simulate(asteroid, 2, strategy=Broken())
 
 
@@ -169,7 +182,9 @@ def test_a_miss_beyond_the_nominal_range_is_divergence(asteroid: Scenario) -> No
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("noise", [NoiseKind.RANDOM, NoiseKind.GAME])
-def test_the_truth_stays_in_its_section_in_ten_thousand_engagements(asteroid: Scenario, noise: NoiseKind) -> None:
+def test_the_truth_stays_in_its_section_in_ten_thousand_engagements(
+    asteroid: Scenario, noise: NoiseKind
+) -> None:
     rules = list(TieRule)
     for part in range(50):
         scenario = replace(asteroid, noise=noise, tie=rules[part % len(rules)])

@@ -1,4 +1,6 @@
-"""What a scenario allows, against the causes of misses of simulated runs and against the closed form."""
+"""What a scenario allows, against the causes of misses of simulated runs and against the closed
+form.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,11 @@ CASES = Path(__file__).parent / "cases"
 
 @pytest.mark.parametrize(
     "thruster",
-    [Thruster(1000.0, 0.0, 0.5), Thruster(1000.0, 0.0, 1.0, last_impulse_s=4.0), Thruster(2.0, 0.0, 1.0)],
+    [
+        Thruster(1000.0, 0.0, 0.5),
+        Thruster(1000.0, 0.0, 1.0, last_impulse_s=4.0),
+        Thruster(2.0, 0.0, 1.0),
+    ],
     ids=["engine", "cut-off", "budget"],
 )
 def test_the_starts_beyond_the_engine_and_the_budget_are_those_of_simulated_runs(
@@ -42,7 +48,9 @@ def test_the_starts_beyond_the_engine_and_the_budget_are_those_of_simulated_runs
     assert found.unguided_miss_m == pytest.approx(flown.unguided_miss_m.max(), rel=1e-3)
 
 
-@pytest.mark.parametrize(("name", "setting"), [("dart-2022", "150"), ("dart-2022", "900"), ("haiv-2013", None)])
+@pytest.mark.parametrize(
+    ("name", "setting"), [("dart-2022", "150"), ("dart-2022", "900"), ("haiv-2013", None)]
+)
 def test_the_possible_miss_is_the_closed_form_of_a_camera(name: str, setting: str | None) -> None:
     settings = [] if setting is None else [f"thruster.last_impulse_s={setting}"]
     scenario = load_scenario(name, settings)
@@ -51,7 +59,8 @@ def test_the_possible_miss_is_the_closed_form_of_a_camera(name: str, setting: st
     possible = found.possible_miss
     assert possible is not None
     assert possible.images_m == possible_miss_of(scenario)
-    # The closed form has images at all times, and the flight every ten seconds. The speeds at the start add nothing.
+    # The closed form has images at all times, and the flight every ten seconds. The speeds at the
+    # start add nothing.
     assert possible.images_and_speeds_m == pytest.approx(possible_miss_of(scenario), rel=0.01)
 
 
@@ -67,8 +76,12 @@ def test_the_speeds_at_the_start_and_the_images_leave_the_miss_of_a_pair() -> No
 
 
 @pytest.mark.parametrize("setting", ["camera.miss_probability=0.1", None])
-def test_images_alone_have_no_closed_form_without_a_camera_that_loses_none(setting: str | None) -> None:
-    scenario = load_scenario("asteroid-1997") if setting is None else load_scenario("dart-2022", [setting])
+def test_images_alone_have_no_closed_form_without_a_camera_that_loses_none(
+    setting: str | None,
+) -> None:
+    scenario = (
+        load_scenario("asteroid-1997") if setting is None else load_scenario("dart-2022", [setting])
+    )
     found = possible_miss(scenario)
     assert found is not None
     assert found.images_m is None

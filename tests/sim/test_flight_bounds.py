@@ -20,14 +20,20 @@ from infoset.sim.scenario import of_model
 EARTH_M3_S2 = 3.986004418e14
 
 
-def flown(start: Floats, impulse_m_s: Floats, at_s: float, push_m_s2: Floats, sun: Sun, times_s: Floats) -> Floats:
-    """Position and velocity of spacecraft and object, shape (4, axes, N): one impulse, and a constant acceleration."""
+def flown(
+    start: Floats, impulse_m_s: Floats, at_s: float, push_m_s2: Floats, sun: Sun, times_s: Floats
+) -> Floats:
+    """Position and velocity of spacecraft and object, shape (4, axes, N): one impulse, and a
+    constant acceleration.
+    """
     axes = start.shape[1]
     toward, along = (direction[-axes:] for direction in sun_and_orbit(sun))
 
     def rates(_: float, state: Floats) -> Floats:
         own, own_speed, there, speed = state.reshape(4, axes)
-        pulls = [-sun.gravitational_parameter_m3_s2 * at / np.linalg.norm(at) ** 3 for at in (own, there)]
+        pulls = [
+            -sun.gravitational_parameter_m3_s2 * at / np.linalg.norm(at) ** 3 for at in (own, there)
+        ]
         return np.concatenate([own_speed, pulls[0], speed, pulls[1] + push_m_s2])
 
     own = -sun.distance_m * toward
@@ -38,14 +44,17 @@ def flown(start: Floats, impulse_m_s: Floats, at_s: float, push_m_s2: Floats, su
         span = (0.0 if not parts else at_s, max(float(times.max(initial=0.0)), at_s))
         solution = solve_ivp(rates, span, state, "DOP853", dense_output=True, rtol=1e-13, atol=1e-6)
         parts.append(solution.sol(times))
-        state = solution.y[:, -1] + np.concatenate([np.zeros(axes), impulse_m_s, np.zeros(2 * axes)])
+        state = solution.y[:, -1] + np.concatenate(
+            [np.zeros(axes), impulse_m_s, np.zeros(2 * axes)]
+        )
     return np.concatenate(parts, axis=1).reshape(4, axes, -1)
 
 
 def shares(states: Floats, flight: FlightBounds) -> Floats:
     """The maximum shares of the bounds that a motion reaches, before its arrival."""
     own, own_speed, there, speed = states[:, :, (states[2] - states[0])[-1] >= 0.0]
-    place, velocity = there - own, speed - own_speed
+    place = there - own
+    velocity = speed - own_speed
     n = place.shape[1]
     part = np.linspace(0.0, 1.0, 201)[:, None, None]
     nearest = np.linalg.norm(own + part * place, axis=1).min(axis=0)
@@ -72,8 +81,12 @@ def shares(states: Floats, flight: FlightBounds) -> Floats:
         (Sun(1.327e20, 1.5e11, 1.0), 6e6, 6e4),
     ],
 )
-def test_no_motion_leaves_the_bounds_of_a_flight(sun: Sun, range_m: float, speed_m_s: float) -> None:
-    wide, fast, push_m_s2 = 2e-3 * range_m, 2e-3 * speed_m_s, 1e-6 * speed_m_s**2 / range_m
+def test_no_motion_leaves_the_bounds_of_a_flight(
+    sun: Sun, range_m: float, speed_m_s: float
+) -> None:
+    wide = 2e-3 * range_m
+    fast = 2e-3 * speed_m_s
+    push_m_s2 = 1e-6 * speed_m_s**2 / range_m
     box = StateBox(
         (-wide, 0.5 * wide),
         (range_m - wide, range_m + wide),
@@ -84,17 +97,25 @@ def test_no_motion_leaves_the_bounds_of_a_flight(sun: Sun, range_m: float, speed
     lateral = len(box.axes)
     flight = flight_bounds(box, (push_m_s2,) * lateral, sun, fast)
     boxes = [box.axis(name) for name in box.axes]
-    ends = [[*(each.z_m for each in boxes), box.x_m], [*(each.vz_m_s for each in boxes), box.vx_m_s]]
+    ends = [
+        [*(each.z_m for each in boxes), box.x_m],
+        [*(each.vz_m_s for each in boxes), box.vx_m_s],
+    ]
     minimum, maximum = np.moveaxis(np.array(ends), 2, 0)
-    random, most = np.random.default_rng(1), np.zeros(7)
+    random = np.random.default_rng(1)
+    most = np.zeros(7)
     for _ in range(40):
         share = random.uniform(size=minimum.shape)
-        start = minimum + (maximum - minimum) * np.where(random.uniform(size=minimum.shape) < 0.7, share.round(), share)
+        start = minimum + (maximum - minimum) * np.where(
+            random.uniform(size=minimum.shape) < 0.7, share.round(), share
+        )
         direction = random.normal(size=lateral)
         impulse = np.append(fast * direction / np.linalg.norm(direction), 0.0)
         push = np.append(random.choice([-1.0, 1.0], lateral) * push_m_s2, 0.0)
         at_s = float(random.uniform() * flight.times_s[-1])
-        most = np.maximum(most, shares(flown(start, impulse, at_s, push, sun, flight.times_s), flight))
+        most = np.maximum(
+            most, shares(flown(start, impulse, at_s, push, sun, flight.times_s), flight)
+        )
     assert (most <= 1.0 + 1e-9).all()
     assert (most > 0.9).all()  # the bounds are not far from what happens
 
@@ -131,7 +152,9 @@ def near_earth(base: Scenario) -> Scenario:
 
 def test_a_target_near_the_earth_is_refused_with_the_range(asteroid: Scenario) -> None:
     """Its gravity is 0.47 m/s^2 there."""
-    with pytest.raises(ValueError, match=r"may change the closing speed by .* at a range of 1e\+07 km"):
+    with pytest.raises(
+        ValueError, match=r"may change the closing speed by .* at a range of 1e\+07 km"
+    ):
         simulate(near_earth(asteroid), 2)
     far = replace(near_earth(asteroid), sun=Sun(EARTH_M3_S2, 1.3e10, np.radians(20.0)))
     results = simulate(far, 10)
@@ -139,8 +162,12 @@ def test_a_target_near_the_earth_is_refused_with_the_range(asteroid: Scenario) -
     assert results.phi_held.all()
 
 
-def test_gravity_reaches_its_bound_where_the_line_of_sight_has_the_worst_angle(asteroid: Scenario) -> None:
-    """The component across the line of sight of the difference of gravity is 1.5 G r at 45 degrees."""
+def test_gravity_reaches_its_bound_where_the_line_of_sight_has_the_worst_angle(
+    asteroid: Scenario,
+) -> None:
+    """The component across the line of sight of the difference of gravity is 1.5 G r at 45
+    degrees.
+    """
     box = StateBox((0.0, 0.0), (6e6, 6e6), (0.0, 0.0), (-58e3, -58e3))
     model = replace(asteroid.set_model, bounds=box, disturbance_m_s2=0.0)
     bound = with_gravity(model, Sun(1.324948e20, 150e9, 0.25 * np.pi), 0.0).gravity_m_s2

@@ -1,4 +1,6 @@
-"""The guaranteed model: no truth lost, no miss above Phi, whatever nature does within its bounds."""
+"""The guaranteed model: no truth lost, no miss above Phi, whatever nature does within its
+bounds.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +48,9 @@ def soundness() -> ModuleType:
 
 @pytest.mark.parametrize("budget", [24, pytest.param(600, marks=pytest.mark.thorough)])
 def test_phi_is_nearly_reached_by_an_exact_section(asteroid: Scenario, budget: int) -> None:
-    """In the flights with the greatest Phi of a search, up to 3 % above 200 sections of the labels of each step."""
+    """In the flights with the greatest Phi of a search, up to 3 % above 200 sections of the labels
+    of each step.
+    """
     great_phi = script("great_phi")
     scenario = great_phi.guaranteed(replace(asteroid, range_sensor=None), "least-effort")
     for phi_m, exact_m, miss_m in great_phi.great_flights(scenario, budget, seed=0, shown=1):
@@ -78,24 +82,43 @@ def sound(results: Results) -> bool:
 def test_nothing_breaks_the_guarantee(
     soundness: ModuleType, hostile: bool, batches: int, batch: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Every noise, from anywhere in B x D, every eighth batch of the comet; benchmarks/soundness.py flies 200 000."""
+    """Every noise, from anywhere in B x D, every eighth batch of the comet; benchmarks/soundness.py
+    flies 200 000.
+    """
     monkeypatch.setattr(soundness, "BATCH", batch)
-    total, engagements = soundness.Count(), batches * batch
+    total = soundness.Count()
+    engagements = batches * batch
     for number in range(batches):
         total += soundness.fly_batch(number, hostile, seed=2)
-    assert vars(total) == {"engagements": engagements, "outside": 0, "lost": 0, "above": 0, "unknown": 0, "refused": 0}
+    assert vars(total) == {
+        "engagements": engagements,
+        "outside": 0,
+        "lost": 0,
+        "above": 0,
+        "unknown": 0,
+        "refused": 0,
+    }
 
 
 @pytest.mark.parametrize("batches", [12, pytest.param(60, marks=pytest.mark.thorough)])
 def test_nothing_breaks_the_guarantee_of_a_camera(
     soundness: ModuleType, batches: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Random scenarios, two thirds in space, with every noise; benchmarks/soundness.py flies 24 000."""
+    """Random scenarios, two thirds in space, with every noise; benchmarks/soundness.py flies 24
+    000.
+    """
     monkeypatch.setattr(soundness, "BATCH", 16)
     total = soundness.Count()
     for number in range(batches):
         total += soundness.fly_camera_batch(number, seed=3)
-    assert vars(total) == {"engagements": 16 * batches, "outside": 0, "lost": 0, "above": 0, "unknown": 0, "refused": 0}
+    assert vars(total) == {
+        "engagements": 16 * batches,
+        "outside": 0,
+        "lost": 0,
+        "above": 0,
+        "unknown": 0,
+        "refused": 0,
+    }
 
 
 @pytest.mark.thorough
@@ -121,7 +144,9 @@ def hundred(two_hundred: Results) -> Results:
 
 
 def test_phi_is_tight(asteroid: Scenario, two_hundred: Results) -> None:
-    """Phi is a bound that says something: the medians of the theory, 13 m for random noise and 15 to 17.5 for game."""
+    """Phi is a bound that says something: the medians of the theory, 13 m for random noise and 15
+    to 17.5 for game.
+    """
     game = simulate(replace(guaranteed(asteroid), noise=NoiseKind.GAME), 200)
     for results, minimum, maximum in ((two_hundred, 12.0, 14.5), (game, 14.0, 17.5)):
         assert sound(results)
@@ -132,28 +157,42 @@ def test_gravity_is_bounded_by_what_the_theory_derives(asteroid: Scenario) -> No
     model = on_board_model(guaranteed(asteroid))
     plain = 1.5 * 1.324948e20 / 150e9**3 * 6301.3e3
     assert plain == pytest.approx(3.71e-7, rel=0.01)
-    # On top of that: the impulses' way across, and units that change as gravity changes V_x (docs/guarantee.md).
-    speed, closing = 100.0 + 1000.0, 57e3
+    # On top of that: the impulses' way across, and units that change as gravity changes V_x
+    # (docs/guarantee.md).
+    speed = 100.0 + 1000.0
+    closing = 57e3
     turned = (2.0 * speed + 10e3 * (2.0 / 3.0) * 59e3 / 6301.3e3) / closing / 1.5
     assert plain * (1.0 + turned) < model.gravity_m_s2 < plain * (1.0 + turned) * 1.01
     assert on_board_model(replace(asteroid, sun=None)).gravity_m_s2 == 0.0
 
 
 @pytest.mark.parametrize("speed_m_s", [150.0, 1e3, 5.8e4])
-def test_gravity_moves_the_model_motion_within_its_bounds(asteroid: Scenario, speed_m_s: float) -> None:
-    """The truth at its label's scale, e (T - t) z/x, flown without the set: its first V, and its acceleration."""
-    x_m, vz_m_s, e = 1e6, 0.003 * speed_m_s, speed_m_s
+def test_gravity_moves_the_model_motion_within_its_bounds(
+    asteroid: Scenario, speed_m_s: float
+) -> None:
+    """The truth at its label's scale, e (T - t) z/x, flown without the set: its first V, and its
+    acceleration.
+    """
+    x_m = 1e6
+    vz_m_s = 0.003 * speed_m_s
+    e = speed_m_s
     step_s = x_m / e / 100.0
     widths = (1e3, 3e5, 1e6)  # of the start's z, in m; what starts in any of them is flown at once
     plain = []
     for z_m in widths:
-        box = StateBox((-z_m, z_m), (x_m, 1.01 * x_m), (-vz_m_s, vz_m_s), (-1.000001 * e, -0.999999 * e))
+        box = StateBox(
+            (-z_m, z_m), (x_m, 1.01 * x_m), (-vz_m_s, vz_m_s), (-1.000001 * e, -0.999999 * e)
+        )
         model = guaranteed(asteroid).set_model
         sensor = replace(model.angle_sensor, period_s=step_s)
         slow = replace(model, closing_speed_m_s=e, step_s=step_s, angle_sensor=sensor, bounds=box)
         plain.append(replace(slow, disturbance_m_s2=0.0))
     start = np.array(
-        [[z, x_m, vz, -e] for z_m in widths for z, vz in itertools.product((-z_m, z_m), (-vz_m_s, vz_m_s))]
+        [
+            [z, x_m, vz, -e]
+            for z_m in widths
+            for z, vz in itertools.product((-z_m, z_m), (-vz_m_s, vz_m_s))
+        ]
     )
     maximum = np.zeros(len(widths))
     for direction in np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False):
@@ -181,7 +220,9 @@ def test_gravity_moves_the_model_motion_within_its_bounds(asteroid: Scenario, sp
 
 
 @pytest.mark.parametrize("runs", [4, pytest.param(100, marks=pytest.mark.thorough)])
-def test_a_rate_sensor_helps_and_stays_sound(asteroid: Scenario, hundred: Results, runs: int) -> None:
+def test_a_rate_sensor_helps_and_stays_sound(
+    asteroid: Scenario, hundred: Results, runs: int
+) -> None:
     sensor = RateSensor(period_s=1.0, error_rad_s=1e-6)
     scenario = replace(guaranteed(asteroid), rate_sensor=sensor)
     for noise in NoiseKind.RANDOM, NoiseKind.GAME:
@@ -197,17 +238,27 @@ def test_targets_manoeuvre_within_their_bound() -> None:
     draws = np.random.default_rng(0).uniform(-1.0, 1.0, size=(1, 400, 400))
     miss = np.where(np.arange(400) % 2, 3.0, -3.0)
     flown = {
-        kind: np.stack([acceleration_m_s2(Target(kind, 0.02, 10.0), draws, step, 0.5, miss) for step in range(400)])
+        kind: np.stack(
+            [
+                acceleration_m_s2(Target(kind, 0.02, 10.0), draws, step, 0.5, miss)
+                for step in range(400)
+            ]
+        )
         for kind in Manoeuvre
     }
     assert (flown[Manoeuvre.NONE] == 0.0).all()
     for kind, accelerations in flown.items():
         assert kind is Manoeuvre.NONE or (np.abs(accelerations) == 0.02).all()
-    switches = {kind: (np.diff(np.sign(each), axis=0) != 0).sum(axis=0) for kind, each in flown.items()}
+    switches = {
+        kind: (np.diff(np.sign(each), axis=0) != 0).sum(axis=0) for kind, each in flown.items()
+    }
     assert (switches[Manoeuvre.CONSTANT] == 0).all()
     assert (switches[Manoeuvre.BANG_BANG] == 19).all()
-    # A Poisson process of one switch in 10 s, seen each half second over 199.5 s: (1 - exp(-0.1))/2 an interval.
-    assert switches[Manoeuvre.RANDOM_TELEGRAPH].mean() == pytest.approx(399 * 0.5 * (1 - np.exp(-0.1)), rel=0.03)
+    # A Poisson process of one switch in 10 s, seen each half second over 199.5 s: (1 - exp(-0.1))/2
+    # an interval.
+    assert switches[Manoeuvre.RANDOM_TELEGRAPH].mean() == pytest.approx(
+        399 * 0.5 * (1 - np.exp(-0.1)), rel=0.03
+    )
     assert (np.sign(flown[Manoeuvre.WORST_CASE]) == np.sign(miss)).all()
 
 
@@ -215,12 +266,14 @@ class Faulty:
     """Random noise through a sensor that breaks its bound."""
 
     def __init__(self, inner: RandomNoise, fault: str) -> None:
-        self._inner, self._fault = inner, fault
+        self._inner = inner
+        self._fault = fault
         self._stuck: Floats | None = None
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> dict[str, Floats]:
         measured = dict(self._inner.measure(sight, predicted))
-        bound, honest = sight.sensors["angle"].bound(sight), measured["angle"]
+        bound = sight.sensors["angle"].bound(sight)
+        honest = measured["angle"]
         if self._fault == "outlier" and sight.step == 100:
             measured["angle"] = sight.alpha_rad + 5.0 * bound
         elif self._fault == "bias":
@@ -256,7 +309,8 @@ def test_faulty_sensors_are_told_and_survived(
         assert (step == 100).all()
         assert ((label > 5e6) & (label < 6.5e6)).all()
         assert results.phi_held.count() == 0
-        # One measurement lost, and one measurement's error of width: hardly worse than without the fault.
+        # One measurement lost, and one measurement's error of width: hardly worse than without the
+        # fault.
         assert np.median(results.miss_m) < 2.5
     if fault in ("none", "dropout") and model is Model.GUARANTEED:
         assert not lost.any()
@@ -270,14 +324,18 @@ def test_faulty_sensors_are_told_and_survived(
 
 
 def test_phi_follows_impulses_fired_after_labels_have_left(asteroid: Scenario) -> None:
-    """A threshold far out: labels leave eighty steps before they arrive, and what is fired meanwhile still counts."""
+    """A threshold far out: labels leave eighty steps before they arrive, and what is fired
+    meanwhile still counts.
+    """
     early = guaranteed(replace(asteroid, noise=NoiseKind.GAME))
     early = replace(early, **of_model(replace(early.set_model, range_threshold_m=2.4e6)))
     assert sound(simulate(early, 100))
 
 
 def test_rectangle_is_refused_because_it_does_not_contain_the_starts(asteroid: Scenario) -> None:
-    """At range x the rectangle ends at x arctan(z/x), below z: the start with the maximum z is outside."""
+    """At range x the rectangle ends at x arctan(z/x), below z: the start with the maximum z is
+    outside.
+    """
     settings = guaranteed(asteroid).information_set
     with pytest.raises(ValueError, match=r'^initial_set = "rectangle" belongs to model = "paper"'):
         replace(settings, initial_set=InitialSet.RECTANGLE)

@@ -12,7 +12,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from infoset import AngleSensor, InformationSet, InformationSetView, InitialSet, Model, SetModel, StateBox
+from infoset import (
+    AngleSensor,
+    InformationSet,
+    InformationSetView,
+    InitialSet,
+    Model,
+    SetModel,
+    StateBox,
+)
 from infoset.arrays import Floats
 from infoset.engine import section_window as windows
 from infoset.engine.history import LastSight
@@ -40,7 +48,8 @@ def sound(results: Results) -> bool:
 @pytest.mark.parametrize(
     ("case", "seed", "noise", "tie", "runs"),
     [
-        # Phi between labels took the supports to be concave in the label, which a rate's bands do not leave them.
+        # Phi between labels took the supports to be concave in the label, which a rate's bands do
+        # not leave them.
         pytest.param(
             *("rate-between-labels", 13014, NoiseKind.GAME, TieRule.UPPER, [6, 13, 21, 40, 86]),
             marks=pytest.mark.thorough,
@@ -48,7 +57,8 @@ def sound(results: Results) -> bool:
         ("rate-free-space", 4006, NoiseKind.GAME, TieRule.UPPER, [84]),
         # Living labels beyond those found were taken to be refuted.
         pytest.param(
-            *("rate-between-labels", 13014, NoiseKind.GAME, TieRule.UPPER, [1, 22, 36, 47]), marks=pytest.mark.thorough
+            *("rate-between-labels", 13014, NoiseKind.GAME, TieRule.UPPER, [1, 22, 36, 47]),
+            marks=pytest.mark.thorough,
         ),
         ("rate-between-labels", 13014, NoiseKind.RANDOM, TieRule.UPPER, [47]),
         ("rate-wide-speeds", 13017, NoiseKind.RANDOM, TieRule.UPPER, [70]),
@@ -57,7 +67,9 @@ def sound(results: Results) -> bool:
         ("late-arrival-no-rate", 4029, NoiseKind.GAME, TieRule.UPPER, [99]),
     ],
 )
-def test_what_broke_the_guarantee_once(case: str, seed: int, noise: NoiseKind, tie: TieRule, runs: list[int]) -> None:
+def test_what_broke_the_guarantee_once(
+    case: str, seed: int, noise: NoiseKind, tie: TieRule, runs: list[int]
+) -> None:
     scenario = replace(load_scenario(CASES / f"{case}.toml"), noise=noise, tie=tie)
     results = simulate(scenario, runs, seed=seed)
     assert sound(results)
@@ -67,12 +79,15 @@ def test_what_broke_the_guarantee_once(case: str, seed: int, noise: NoiseKind, t
 @pytest.mark.skipif(not HAS_BENCHMARKS, reason="benchmarks are in a checkout only")
 @pytest.mark.parametrize("rate_sensor", [False, True])
 @pytest.mark.parametrize(
-    ("first", "scenarios", "batch"), [(0, 12, 16), pytest.param(10_000, 150, 80, marks=pytest.mark.thorough)]
+    ("first", "scenarios", "batch"),
+    [(0, 12, 16), pytest.param(10_000, 150, 80, marks=pytest.mark.thorough)],
 )
 def test_random_scenarios_keep_the_guarantee(
     rate_sensor: bool, first: int, scenarios: int, batch: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Every sensor, noise and tie rule, with warnings as errors; `benchmarks/soundness.py` flies 300 000."""
+    """Every sensor, noise and tie rule, with warnings as errors; `benchmarks/soundness.py` flies
+    300 000.
+    """
     from benchmarks import soundness
 
     monkeypatch.setattr(soundness, "BATCH", batch)
@@ -82,14 +97,18 @@ def test_random_scenarios_keep_the_guarantee(
     assert total == soundness.Count(scenarios * batch)
 
 
-# Round numbers: truths and hypotheses come to a range of exactly zero at a step -----------------------------------
+# Round numbers: truths and hypotheses come to a range of exactly zero at a step
+# -----------------------------------
 
 
-# The band of a measured rate --------------------------------------------------------------------------------------
+# The band of a measured rate
+# --------------------------------------------------------------------------------------------------
 
 
 def flat_law(error_rad: float, rising: bool) -> tuple[SetModel, SectionLaw]:
-    """A model whose error bound at zero range is half (rising) or twice that at the nominal range."""
+    """A model whose error bound at zero range is half (rising) or twice that at the nominal
+    range.
+    """
     box = StateBox((-1e4, 1e4), (4e5, 6e5), (-300.0, 300.0), (-5e3, -5e3))
     model = SetModel(
         5e3,
@@ -126,24 +145,37 @@ def test_a_rate_band_holds_the_truth_and_is_convex_over_its_window(
     slope: float, v: float, ago: int, angle_draw: float, rate_draw: float,
     log_error: float, place: float, width: float, impulse: float, push: float, rising: bool, measured: bool,
 ) -> None:  # fmt: skip
-    """The measured rate of a motion in closed form admits its predicted miss, displaced by (13), for every window.
+    """The measured rate of a motion in closed form admits its predicted miss, displaced by (13),
+    for every window.
 
-    The last angle was measured `ago` steps before the rate, or never: then the initial box stands for it.
+    The last angle was measured `ago` steps before the rate, or never: then the initial box stands
+    for it.
     """
     error = 10.0**log_error
     model, law = flat_law(error, rising)
-    e, step, elapsed = law.closing_speed, law.step, 60 if measured else ago
+    e = law.closing_speed
+    step = law.step
+    elapsed = 60 if measured else ago
     label = 4.2e5 + 1.5e5 * place
-    near, far = label - 8e4 * width * place, label + 8e4 * width * (1.0 - place)
-    # The last angle, `ago` steps before; an impulse in the middle, with an error; a push all the way.
-    x_then, executed = label - e * step * (elapsed - ago), impulse * (1.0 + 0.02 * angle_draw)
+    near = label - 8e4 * width * place
+    far = label + 8e4 * width * (1.0 - place)
+    # The last angle, `ago` steps before; an impulse in the middle, with an error; a push all the
+    # way.
+    x_then = label - e * step * (elapsed - ago)
+    executed = impulse * (1.0 + 0.02 * angle_draw)
     z_then = slope * x_then
     bound = model.angle_sensor.error_bound(x_then / math.cos(math.atan(slope)))
     alpha = math.atan(slope) + angle_draw * bound
     fired_after = (ago // 2) * step if ago else 0.0
-    time, acceleration = ago * step, push * law.disturbance
+    time = ago * step
+    acceleration = push * law.disturbance
     v_now = v + acceleration * time - (executed if ago else 0.0)
-    z = z_then + v * time + 0.5 * acceleration * time**2 - (executed * (time - fired_after) if ago else 0.0)
+    z = (
+        z_then
+        + v * time
+        + 0.5 * acceleration * time**2
+        - (executed * (time - fired_after) if ago else 0.0)
+    )
     x = label - e * step * elapsed
     omega_true = (v_now + e * z / x) / x / (1.0 + (z / x) ** 2)
     rate_error = 1e-9 * (1.0 + BOUND_SLACK)
@@ -162,7 +194,12 @@ def test_a_rate_band_holds_the_truth_and_is_convex_over_its_window(
         return lower, upper
 
     lower, upper = rate_band(label, window)
-    value = z + v_now * x / e + impulse * (label - 0.5 * (near + far)) / e + push * 0.5 * (far - near) / e
+    value = (
+        z
+        + v_now * x / e
+        + impulse * (label - 0.5 * (near + far)) / e
+        + push * 0.5 * (far - near) / e
+    )
     rounding = 1e-9 * (abs(value) + abs(lower) + abs(upper) + 1.0)
     assert lower - rounding <= value <= upper + rounding
     bounds = np.array([rate_band(each, window) for each in np.linspace(near, far, 9)])
@@ -170,28 +207,46 @@ def test_a_rate_band_holds_the_truth_and_is_convex_over_its_window(
     assert (bend[:, 0] >= -rounding).all()
     assert (bend[:, 1] <= rounding).all()
     if ago == 0:
-        # A window of one label has nothing but the rate itself: its band is as wide as the sensor's error.
+        # A window of one label has nothing but the rate itself: its band is as wide as the sensor's
+        # error.
         alone = rate_band(label, window._replace(near=label, far=label))
         assert alone[1] - alone[0] <= 1.01 * 2.0 * (abs(omega) * 0.01 + rate_error) * x**2 / e
 
 
-def test_a_truth_inside_a_section_that_is_thinner_than_rounding_is_not_outside(asteroid: Scenario) -> None:
-    """z and V are known exactly, and the bound of the acceleration makes the section 900 m wide and 1e-14 m high."""
+def test_a_truth_inside_a_section_that_is_thinner_than_rounding_is_not_outside(
+    asteroid: Scenario,
+) -> None:
+    """z and V are known exactly, and the bound of the acceleration makes the section 900 m wide and
+    1e-14 m high.
+    """
     step_s, range_m = 19.0, 2.5e6
     box = StateBox((0.0, 0.0), (range_m, 1.2 * range_m), (-0.1, -0.1), (-58.1e3, -57.9e3))
     model = SetModel(
-        58e3, step_s, box, AngleSensor(step_s, 0.00015, 0.00023, 5.8e6), disturbance_m_s2=1.0, range_threshold_m=5e3
+        58e3,
+        step_s,
+        box,
+        AngleSensor(step_s, 0.00015, 0.00023, 5.8e6),
+        disturbance_m_s2=1.0,
+        range_threshold_m=5e3,
     )
     scenario = replace(
-        asteroid, sun=None, nominal_range_m=range_m, dispersion=box, **of_model(model), range_sensor=None
+        asteroid,
+        sun=None,
+        nominal_range_m=range_m,
+        dispersion=box,
+        **of_model(model),
+        range_sensor=None,
     )
     assert sound(simulate(scenario, 50, seed=1))
 
 
-# Living labels that form two intervals ----------------------------------------------------------------------------
+# Living labels that form two intervals
+# --------------------------------------------------------------------------------------------------
 
 
-def test_phi_covers_a_truth_that_passes_its_closest_approach_before_its_label_leaves(asteroid: Scenario) -> None:
+def test_phi_covers_a_truth_that_passes_its_closest_approach_before_its_label_leaves(
+    asteroid: Scenario,
+) -> None:
     """An oblique, receding offset: the closest approach comes several steps before x = 0."""
     e, range_m = 1e4, 1e6
     box = StateBox((3e5, 5.5e5), (9e5, 1.1e6), (500.0, 1200.0), (-e, -e))
@@ -224,11 +279,15 @@ def test_phi_covers_a_truth_that_passes_its_closest_approach_before_its_label_le
 def test_phi_is_extrapolated_from_labels_with_sections_only(
     error_at_33_km_rad: float, measured_rad: float, impulse_m_s: float, max_z_m: float
 ) -> None:
-    """All labels leave at the first step: the misses after one angle and one impulse, at V_z = 0, by hand.
+    """All labels leave at the first step: the misses after one angle and one impulse, at V_z = 0,
+    by hand.
 
-    At the range x the angle leaves z within x tan(alpha_m -+ b) and the start, the impulse moves z by -k x/e.
+    At the range x the angle leaves z within x tan(alpha_m -+ b) and the start, the impulse moves z
+    by -k x/e.
     """
-    e, x_m, error_rad = 58e3, (5010.0, 33e3), 2.3e-4
+    e = 58e3
+    x_m = (5010.0, 33e3)
+    error_rad = 2.3e-4
     box = StateBox((-max_z_m, max_z_m), x_m, (0.0, 0.0), (-e, -e))
     sensor = AngleSensor(0.5, error_at_33_km_rad, error_rad, x_m[1])
     model = SetModel(e, 0.5, box, sensor, range_threshold_m=5e3)
@@ -247,7 +306,8 @@ def test_phi_is_extrapolated_from_labels_with_sections_only(
 
 @pytest.mark.parametrize("max_z_m", [0.0, 0.5, 10.0])
 def test_phi_of_an_exactly_known_range_and_speed(max_z_m: float) -> None:
-    """The only label leaves after the angle at 1100 m, which leaves z within 1100 tan(1e-3); V_z is zero.
+    """The only label leaves after the angle at 1100 m, which leaves z within 1100 tan(1e-3); V_z is
+    zero.
 
     Phi is greater by 4 ulp of the label, which is all of it if z is zero.
     """
@@ -263,11 +323,15 @@ def test_phi_of_an_exactly_known_range_and_speed(max_z_m: float) -> None:
     phi_m, exists = information.guaranteed_miss()
     assert exists.all()
     rounding_m = 4.0 * 2.0**-52 * 2e4
-    assert phi_m[0] == pytest.approx(min(max_z_m, 1100.0 * math.tan(1e-3)) + rounding_m, rel=1e-6, abs=0.0)
+    assert phi_m[0] == pytest.approx(
+        min(max_z_m, 1100.0 * math.tan(1e-3)) + rounding_m, rel=1e-6, abs=0.0
+    )
 
 
 def test_the_direction_of_an_impulse_is_uncertain_at_an_exactly_known_closing_speed() -> None:
-    """An impulse of 10 m/s along y, turned by 0.1 rad at most, changes V_z by up to 10 sin(0.1) m/s."""
+    """An impulse of 10 m/s along y, turned by 0.1 rad at most, changes V_z by up to 10 sin(0.1)
+    m/s.
+    """
     box = StateBox((-1.0, 1.0), (1e4, 2e4), (0.0, 0.0), (-1e3, -1e3), (-1.0, 1.0), (0.0, 0.0))
     sensor = AngleSensor(1.0, 1e-3, 1e-3, 1e4)
     model = SetModel(1e3, 1.0, box, sensor, pointing_error_rad=0.1)
@@ -280,14 +344,19 @@ def test_the_direction_of_an_impulse_is_uncertain_at_an_exactly_known_closing_sp
 
 
 def two_intervals(steps: int) -> tuple[SetModel, Floats, InformationSetView]:
-    """Model, measured angles and last set of a flight with a bound that rises with range and the rectangle."""
+    """Model, measured angles and last set of a flight with a bound that rises with range and the
+    rectangle.
+    """
     e, range_m = 20e3, 2.5e6
     generator = np.random.default_rng(170)
     step_s = float(generator.choice([1.0, 2.0, 5.0]))
-    z_m, vz_m_s = range_m * 10.0 ** generator.uniform(-3.0, -1.0), e * 10.0 ** generator.uniform(-4.0, -2.0)
+    z_m = range_m * 10.0 ** generator.uniform(-3.0, -1.0)
+    vz_m_s = e * 10.0 ** generator.uniform(-4.0, -2.0)
     error_rad = 10.0 ** generator.uniform(-4.0, -2.0)
     at_zero_rad = error_rad * generator.uniform(0.0, 0.3)
-    box = StateBox((-z_m, z_m), (0.95 * range_m, 1.05 * range_m), (-vz_m_s, vz_m_s), (-1.01 * e, -0.99 * e))
+    box = StateBox(
+        (-z_m, z_m), (0.95 * range_m, 1.05 * range_m), (-vz_m_s, vz_m_s), (-1.01 * e, -0.99 * e)
+    )
     model = SetModel(
         e,
         step_s,
@@ -299,7 +368,11 @@ def two_intervals(steps: int) -> tuple[SetModel, Floats, InformationSetView]:
         model=Model.PAPER,
     )
     scenario = Scenario(
-        name="", nominal_range_m=range_m, dispersion=box, **of_model(model), thruster=Thruster(0.0, 0.1, 1.0)
+        name="",
+        nominal_range_m=range_m,
+        dispersion=box,
+        **of_model(model),
+        thruster=Thruster(0.0, 0.1, 1.0),
     )
     draws = draw(scenario, range(6), 170)
     signs = np.where(draws.errors["angle"] >= 0.0, 1.0, -1.0)
@@ -317,15 +390,24 @@ def two_intervals(steps: int) -> tuple[SetModel, Floats, InformationSetView]:
 
 
 @pytest.mark.parametrize("y", [None, "mirror of z", "bound that falls with range"])
-def test_a_new_grid_takes_the_interval_of_its_stored_sections_and_keeps_the_limits(y: str | None) -> None:
-    """Two intervals of living labels, at 2400 km and above 2560 km; the measurement of step 16 empties the latter."""
+def test_a_new_grid_takes_the_interval_of_its_stored_sections_and_keeps_the_limits(
+    y: str | None,
+) -> None:
+    """Two intervals of living labels, at 2400 km and above 2560 km; the measurement of step 16
+    empties the latter.
+    """
     model, measured, _ = two_intervals(17)
     angles = measured[:, :, 2].T
     if y is not None:
-        box, sensor = model.bounds, model.angle_sensor
+        box = model.bounds
+        sensor = model.angle_sensor
         if y == "bound that falls with range":
-            sensor = replace(linear(sensor), error_at_nominal_range_y_rad=0.01, error_at_zero_range_y_rad=0.02)
-        model = replace(model, bounds=replace(box, y_m=box.z_m, vy_m_s=box.vz_m_s), angle_sensor=sensor)
+            sensor = replace(
+                linear(sensor), error_at_nominal_range_y_rad=0.01, error_at_zero_range_y_rad=0.02
+            )
+        model = replace(
+            model, bounds=replace(box, y_m=box.z_m, vy_m_s=box.vz_m_s), angle_sensor=sensor
+        )
         angles = np.concatenate([-angles if y == "mirror of z" else 0.0 * angles, angles])
 
     def after(steps: int, sections: int) -> InformationSet:
@@ -354,8 +436,9 @@ def test_a_new_grid_takes_the_interval_of_its_stored_sections_and_keeps_the_limi
     assert not many.inconsistent.any()
     assert len(stored(many)) == 7
     assert ((stored(many) > 2.39e6) & (stored(many) < 2.41e6)).all()
-    # Three sections: the new grid of step 12 takes the interval in which one is stored. The limits still contain the
-    # other one, in which no section is stored. The set is empty, to the search, when the first one is.
+    # Three sections: the new grid of step 12 takes the interval in which one is stored. The limits
+    # still contain the other one, in which no section is stored. The set is empty, to the search,
+    # when the first one is.
     few = after(16, 3)
     assert len(stored(few)) == 7
     assert stored(few).min() > 2.55e6

@@ -1,4 +1,6 @@
-"""What Python code learns of runs in which a guarantee fails: the text of results, and a warning."""
+"""What Python code learns of runs in which a guarantee fails: the text of results, and a
+warning.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ class Beyond:
     """A noise whose errors of angles are a multiple of their bounds."""
 
     def __init__(self, scenario: Scenario, multiple: float) -> None:
-        self._error_rad = multiple * float(scenario.bearing_sensor.error_bound(scenario.dispersion.x_m[1]))
+        self._error_rad = multiple * float(
+            scenario.bearing_sensor.error_bound(scenario.dispersion.x_m[1])
+        )
 
     def measure(self, sight: LineOfSight, _predicted: object) -> Mapping[str, Floats]:
         return {
@@ -49,11 +53,15 @@ def test_lost_truth_gives_one_warning_at_the_line_of_the_user(guaranteed: Scenar
 
     assert not results.truth_kept.any()
     (warning,) = caught
-    expected = f"{guaranteed.name}: in {RUNS} of {RUNS} runs the set lost the true state or became empty"
+    expected = (
+        f"{guaranteed.name}: in {RUNS} of {RUNS} runs the set lost the true state or became empty"
+    )
     assert str(warning.message).startswith(expected)
     assert "an assumption of the model does not hold" in str(warning.message)
     assert warning.filename == __file__
-    assert f"; in {RUNS} of {RUNS} runs the set lost the true state or became empty" in repr(results)
+    assert f"; in {RUNS} of {RUNS} runs the set lost the true state or became empty" in repr(
+        results
+    )
 
 
 def test_errors_within_their_bounds_give_no_warning(guaranteed: Scenario) -> None:
@@ -65,8 +73,12 @@ def test_errors_within_their_bounds_give_no_warning(guaranteed: Scenario) -> Non
 
 
 def test_the_warning_of_the_model_paper_names_the_other_model(guaranteed: Scenario) -> None:
-    paper = replace(guaranteed, information_set=replace(guaranteed.information_set, model=Model.PAPER))
-    with pytest.warns(GuaranteeWarning, match="model paper does not promise .*model = guaranteed does"):
+    paper = replace(
+        guaranteed, information_set=replace(guaranteed.information_set, model=Model.PAPER)
+    )
+    with pytest.warns(
+        GuaranteeWarning, match="model paper does not promise .*model = guaranteed does"
+    ):
         flown(paper, 3.0)
 
 

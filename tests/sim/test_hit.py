@@ -56,5 +56,8 @@ def test_a_diverged_run_with_an_empty_set_is_counted_as_both(published: Scenario
 
 
 def test_a_body_is_smaller_than_the_min_range(published: Scenario) -> None:
-    with pytest.raises(ValueError, match=r"body\.radius_m must be less than the minimum possible range, 5.3013e\+06 m"):
+    with pytest.raises(
+        ValueError,
+        match=r"body\.radius_m must be less than the minimum possible range, 5.3013e\+06 m",
+    ):
         replace(published, body=Body(6e6))

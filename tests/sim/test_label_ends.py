@@ -1,4 +1,6 @@
-"""The maximum miss of any state of the set when control ends: known cases, the truth below it and Phi above it."""
+"""The maximum miss of any state of the set when control ends: known cases, the truth below it and
+Phi above it.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,11 @@ EXACT = ScriptedNoise({})
 
 
 def fly(
-    scenario: Scenario, runs: int = RUNS, *, noise: MeasurementNoise | None = None, guarantee: bool = True
+    scenario: Scenario,
+    runs: int = RUNS,
+    *,
+    noise: MeasurementNoise | None = None,
+    guarantee: bool = True,
 ) -> tuple[Results, np.ndarray]:
     """Return the results of some runs, and the maximum misses of any state."""
     flight = Engagements(scenario, draw(scenario, range(runs), 0), noise=noise, guarantee=guarantee)
@@ -33,7 +39,9 @@ def fly(
 
 
 def without_control(asteroid: Scenario, kind: Model, x_m: tuple[float, float]) -> Scenario:
-    """A spacecraft without fuel in free space that measures nothing: angles err by more than the box allows."""
+    """A spacecraft without fuel in free space that measures nothing: angles err by more than the
+    box allows.
+    """
     box = StateBox(z_m=(-3e3, 2e3), x_m=x_m, vz_m_s=(-20.0, 10.0), vx_m_s=(-10e3, -10e3))
     return replace(
         asteroid,
@@ -66,7 +74,9 @@ def test_without_control_any_corner_of_the_box_may_be_true(kind: Model, asteroid
 
 
 def test_the_disturbance_adds_to_the_miss(asteroid: Scenario) -> None:
-    """0.02 m/s^2 over 100 s move by 100 m; the set adds half of a step's change of V, 5 mm/s, at the start: 0.5 m."""
+    """0.02 m/s^2 over 100 s move by 100 m; the set adds half of a step's change of V, 5 mm/s, at
+    the start: 0.5 m.
+    """
     scenario = without_control(asteroid, Model.GUARANTEED, (1e6, 1e6))
     scenario = replace(scenario, **of_model(replace(scenario.set_model, disturbance_m_s2=0.02)))
     assert fly(scenario, 1, noise=EXACT)[1] == pytest.approx([5.1005e3], rel=1e-6)
@@ -85,10 +95,16 @@ def test_in_space_the_misses_along_both_axes_are_combined(asteroid: Scenario) ->
 def test_the_truth_is_one_of_the_states_and_phi_bounds_them(
     name: str, noise: NoiseKind, request: pytest.FixtureRequest
 ) -> None:
-    """Without a cut-off and with budget left, control ends at the range threshold, where Phi bounds all states."""
+    """Without a cut-off and with budget left, control ends at the range threshold, where Phi bounds
+    all states.
+    """
     given = request.getfixturevalue(name if name in ("ranging", "comet") else "asteroid")
     scenario = guaranteed(in_space(given) if name == "space" else given, sections=9)
-    target = Target(Manoeuvre.WORST_CASE, scenario.set_model.disturbance_m_s2) if name == "target" else None
+    target = (
+        Target(Manoeuvre.WORST_CASE, scenario.set_model.disturbance_m_s2)
+        if name == "target"
+        else None
+    )
     scenario = replace(scenario, noise=noise, tie=TieRule.RANDOM, target=target)
     results, any_state_m = fly(scenario)
     assert results.truth_kept.all()
@@ -99,9 +115,13 @@ def test_the_truth_is_one_of_the_states_and_phi_bounds_them(
 
 
 def test_after_a_cut_off_measurements_do_not_narrow_the_choice(asteroid: Scenario) -> None:
-    """The truth may be any state of the set at the last impulse: many metres more than the sections that arrive."""
+    """The truth may be any state of the set at the last impulse: many metres more than the sections
+    that arrive.
+    """
     scenario = guaranteed(asteroid, sections=9)
-    late = replace(scenario, thruster=replace(scenario.thruster, last_impulse_s=20.0), noise=NoiseKind.GAME)
+    late = replace(
+        scenario, thruster=replace(scenario.thruster, last_impulse_s=20.0), noise=NoiseKind.GAME
+    )
     flight = Engagements(late, draw(late, range(RUNS), 0))
     last_step = late.impulse_steps[-1]  # type: ignore[index]
     after_impulse = []
@@ -130,7 +150,12 @@ def test_where_the_set_is_lost_the_truth_counts(asteroid: Scenario) -> None:
     wrong = replace(
         asteroid,
         dispersion=fast,
-        **of_model(replace(asteroid.set_model, bounds=replace(asteroid.set_model.bounds, vx_m_s=(-110.1e3, -110e3)))),
+        **of_model(
+            replace(
+                asteroid.set_model,
+                bounds=replace(asteroid.set_model.bounds, vx_m_s=(-110.1e3, -110e3)),
+            )
+        ),
     )
     results, any_state_m = fly(wrong, 3)
     assert set(results.outcomes) == {Outcome.SET_EMPTY}
@@ -139,12 +164,18 @@ def test_where_the_set_is_lost_the_truth_counts(asteroid: Scenario) -> None:
 
 def test_the_farthest_range_has_the_max_miss(asteroid: Scenario) -> None:
     """A range of 1200 km takes 120 s: -3 km - 2.4 km."""
-    _, any_state_m = fly(without_control(asteroid, Model.GUARANTEED, (0.8e6, 1.2e6)), 3, noise=EXACT)
+    _, any_state_m = fly(
+        without_control(asteroid, Model.GUARANTEED, (0.8e6, 1.2e6)), 3, noise=EXACT
+    )
     assert any_state_m == pytest.approx([5.4e3] * 3, rel=1e-6)
 
 
-def test_labels_of_a_run_that_arrives_before_the_cut_off_do_not_wait_for_it(asteroid: Scenario) -> None:
-    """The set of a run that has arrived does not go on: in a batch it counted 404 m instead of 19 m."""
+def test_labels_of_a_run_that_arrives_before_the_cut_off_do_not_wait_for_it(
+    asteroid: Scenario,
+) -> None:
+    """The set of a run that has arrived does not go on: in a batch it counted 404 m instead of 19
+    m.
+    """
     thruster = replace(asteroid.thruster, last_impulse_s=2.0, delay_steps=2)
     scenario = replace(guaranteed(asteroid), thruster=thruster, noise=NoiseKind.GAME)
     scenario = replace(scenario, dispersion=scenario.set_model.bounds)

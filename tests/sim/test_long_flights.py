@@ -27,11 +27,17 @@ def of_2000_steps(asteroid: Scenario) -> Scenario:
         initial_set=InitialSet.BOX,
         sections=5,
     )
-    return replace(asteroid, **of_model(model), thruster=replace(asteroid.thruster, impulses_s=(60.0, 20.0, 5.0)))
+    return replace(
+        asteroid,
+        **of_model(model),
+        thruster=replace(asteroid.thruster, impulses_s=(60.0, 20.0, 5.0)),
+    )
 
 
 def test_the_history_of_a_long_flight_has_two_events_a_step(asteroid: Scenario) -> None:
-    """An impulse is an event only where it is given; sections stay small, and the guarantee holds."""
+    """An impulse is an event only where it is given; sections stay small, and the guarantee
+    holds.
+    """
     scenario = of_2000_steps(asteroid)
     flight = Engagements(scenario, draw(scenario, range(2), 1))
     while flight.flying:
@@ -48,8 +54,12 @@ def test_the_history_of_a_long_flight_has_two_events_a_step(asteroid: Scenario) 
 
 
 @pytest.mark.thorough
-def test_labels_of_a_long_flight_leave_in_groups(asteroid: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The number of replays does not grow with the number of steps. Phi holds, and depends little on the groups."""
+def test_labels_of_a_long_flight_leave_in_groups(
+    asteroid: Scenario, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The number of replays does not grow with the number of steps. Phi holds, and depends little
+    on the groups.
+    """
     scenario = of_2000_steps(asteroid)
     windows: list[int] = []
     whole = guaranteed_miss.bound_all
@@ -73,7 +83,9 @@ def test_labels_of_a_long_flight_leave_in_groups(asteroid: Scenario, monkeypatch
 
 
 def test_a_measured_rate_reads_the_events_since_the_previous_one(asteroid: Scenario) -> None:
-    """A contradicting angle is retracted and does not count; stored sections equal replays of the whole history."""
+    """A contradicting angle is retracted and does not count; stored sections equal replays of the
+    whole history.
+    """
     information = InformationSet(asteroid.set_model, 2)
 
     def step(sets: InformationSet, alpha_rad: float) -> None:

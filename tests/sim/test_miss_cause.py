@@ -36,14 +36,19 @@ class Idle(Strategy):
 @pytest.mark.parametrize(
     ("cause", "settings", "strategy"),
     [
-        # Four impulses, 5400, 2100, 750 and 180 s before the impact, correct 6.7 km at 0.8 m/s. The radius is 50 m.
+        # Four impulses, 5400, 2100, 750 and 180 s before the impact, correct 6.7 km at 0.8 m/s. The
+        # radius is 50 m.
         (ENGINE, ["dispersion.z_km=7.2", "thruster.max_impulse_m_s=0.8"], None),
         # At 5400 s, 0.5 m/s corrects 2.7 km.
         (BUDGET, ["dispersion.z_km=4.9", "thruster.budget_m_s=0.5"], None),
         # The images until 750 s before the impact leave misses of 150 m possible.
         (KNOWLEDGE, ["noise=game", "thruster.impulses_s=[5400, 2100, 750]"], None),
         # From the first image on, two impulses correct 186 m; all four would correct 1.7 km.
-        (SATURATED, ["dispersion.z_km=0.5", "thruster.max_impulse_m_s=0.2", "camera.first_image_s=800"], None),
+        (
+            SATURATED,
+            ["dispersion.z_km=0.5", "thruster.max_impulse_m_s=0.2", "camera.first_image_s=800"],
+            None,
+        ),
         (GUIDANCE, ["dispersion.z_km=0.4"], Idle()),
     ],
 )
@@ -63,20 +68,27 @@ def test_hits_and_bodies_without_a_size_have_no_cause(brief: Scenario) -> None:
 
 @pytest.mark.parametrize("name", ["asteroid-1997", "asteroid-1997-space", "haiv-2013"])
 def test_the_miss_without_impulses_is_that_of_a_flight_without_them(name: str) -> None:
-    guided, idle = (simulate(load_scenario(name), 5, strategy=each, guarantee=False) for each in (None, Idle()))
+    guided, idle = (
+        simulate(load_scenario(name), 5, strategy=each, guarantee=False) for each in (None, Idle())
+    )
     np.testing.assert_allclose(guided.unguided_miss_m, idle.miss_m, rtol=1e-5)
     np.testing.assert_allclose(idle.unguided_miss_m, idle.miss_m, rtol=1e-5)
 
 
 def test_what_engine_and_budget_correct_is_the_sum_of_their_impulses(brief: Scenario) -> None:
-    thruster = Thruster(20.0, 0.25, 7.5, execution_error_relative=0.1, last_impulse_s=2.0, delay_steps=3)
+    thruster = Thruster(
+        20.0, 0.25, 7.5, execution_error_relative=0.1, last_impulse_s=2.0, delay_steps=3
+    )
     box = replace(brief.dispersion, x_m=(595e3, 595e3), vx_m_s=(-58e3, -58e3))
     results = simulate(replace(brief, sun=None, thruster=thruster, dispersion=box), 1)
     arrival_s = 595.0 / 58.0
-    # The last impulse is at step 17, 1.76 s before the arrival, which is nearer to 2 s than step 16.
+    # The last impulse is at step 17, 1.76 s before the arrival, which is nearer to 2 s than step
+    # 16.
     arms_s = [arrival_s - 0.5 * step for step in range(3, 18)]
     assert results.engine_corrects_m[0] == pytest.approx(1.1 * 7.5 * sum(arms_s))
-    assert results.budget_corrects_m[0] == pytest.approx(1.1 * (7.5 * arms_s[0] + 7.5 * arms_s[1] + 5.0 * arms_s[2]))
+    assert results.budget_corrects_m[0] == pytest.approx(
+        1.1 * (7.5 * arms_s[0] + 7.5 * arms_s[1] + 5.0 * arms_s[2])
+    )
 
 
 def random_scenario(brief: Scenario, rng: np.random.Generator) -> tuple[Scenario, Strategy]:
@@ -90,7 +102,9 @@ def random_scenario(brief: Scenario, rng: np.random.Generator) -> tuple[Scenario
         impulses_s=(8.0, 5.0, 3.5, 1.5) if rng.uniform() < 0.2 else (),
         delay_steps=int(rng.choice([0, 2])),
     )
-    settings = replace(brief.information_set, model=Model.GUARANTEED if rng.uniform() < 0.5 else Model.PAPER)
+    settings = replace(
+        brief.information_set, model=Model.GUARANTEED if rng.uniform() < 0.5 else Model.PAPER
+    )
     scenario = replace(
         brief,
         sun=None,
@@ -100,11 +114,17 @@ def random_scenario(brief: Scenario, rng: np.random.Generator) -> tuple[Scenario
         information_set=settings,
     )
     strategies = [make_strategy(name) for name in ("symmetric-miss", "patient", "least-effort")]
-    return in_space(scenario) if rng.uniform() < 0.5 else scenario, [*strategies, Idle()][int(rng.integers(4))]
+    return in_space(scenario) if rng.uniform() < 0.5 else scenario, [*strategies, Idle()][
+        int(rng.integers(4))
+    ]
 
 
-def expected_causes(scenario: Scenario, strategy: Strategy, runs: int, seed: int) -> tuple[Results, list[Any]]:
-    """Return results, and causes run by run: forward from the start in free space, with impulses spent one by one."""
+def expected_causes(
+    scenario: Scenario, strategy: Strategy, runs: int, seed: int
+) -> tuple[Results, list[Any]]:
+    """Return results, and causes run by run: forward from the start in free space, with impulses
+    spent one by one.
+    """
     steps: list[Step] = []
     budgets: list[Floats] = []
 
@@ -117,26 +137,42 @@ def expected_causes(scenario: Scenario, strategy: Strategy, runs: int, seed: int
             return strategy.decide(situation, state)
 
     results = simulate(
-        scenario, runs, seed=seed, strategy=Watched(), guarantee=False, observe=lambda _, step: steps.append(step)
+        scenario,
+        runs,
+        seed=seed,
+        strategy=Watched(),
+        guarantee=False,
+        observe=lambda _, step: steps.append(step),
     )
     errors = draw(scenario, range(runs), seed).execution
     found: list[Any] = []
     for run in range(runs):
         size = [1.0] * len(steps)
         if errors is not None:
-            size = [1.0 + scenario.thruster.execution_error_relative * errors[run, i] for i in range(len(steps))]
-        executed = [step.impulse_m_s[:, run] * factor for step, factor in zip(steps, size, strict=True)]
+            size = [
+                1.0 + scenario.thruster.execution_error_relative * errors[run, i]
+                for i in range(len(steps))
+            ]
+        executed = [
+            step.impulse_m_s[:, run] * factor for step, factor in zip(steps, size, strict=True)
+        ]
         *lateral_m, x_m = results.position_m[run]
         *lateral_m_s, vx_m_s = results.velocity_m_s[run]
         arrival_s = -x_m / vx_m_s
         start_m = np.array(lateral_m) + np.array(lateral_m_s) * arrival_s
         seen = [
-            (step.tracking[run], step.predicted_miss.lower_m[:, run], step.predicted_miss.upper_m[:, run])
+            (
+                step.tracking[run],
+                step.predicted_miss.lower_m[:, run],
+                step.predicted_miss.upper_m[:, run],
+            )
             for step in steps
         ]
         left = [float(budget[run]) for budget in budgets]
         hit = bool(results.hit[run])
-        found.append(None if hit else _expected(scenario, seen, left, executed, start_m, float(arrival_s)))
+        found.append(
+            None if hit else _expected(scenario, seen, left, executed, start_m, float(arrival_s))
+        )
     return results, found
 
 
@@ -148,8 +184,11 @@ def _expected(
     start_m: Floats,
     arrival_s: float,
 ) -> MissCause:
-    thruster, step_s, radius_m = scenario.thruster, scenario.step_s, scenario.radius_m or 0.0
-    delay, allowed = thruster.delay_steps, scenario.impulse_steps or range(thruster.delay_steps, 100)
+    thruster = scenario.thruster
+    step_s = scenario.step_s
+    radius_m = scenario.radius_m or 0.0
+    delay = thruster.delay_steps
+    allowed = scenario.impulse_steps or range(thruster.delay_steps, 100)
 
     def corrects_m(decision: int, budget_m_s: float) -> float:
         total = 0.0
@@ -161,13 +200,17 @@ def _expected(
                 and size > 0.0
                 and size >= thruster.min_impulse_m_s
             ):
-                total += size * (arrival_s - step * step_s) * (1.0 + thruster.execution_error_relative)
+                total += (
+                    size * (arrival_s - step * step_s) * (1.0 + thruster.execution_error_relative)
+                )
                 budget_m_s -= size
         return total
 
     def miss_m(decision: int) -> Floats:
         given = enumerate(executed[: decision + delay])
-        return np.asarray(start_m - sum(u * max(arrival_s - step * step_s, 0.0) for step, u in given))
+        return np.asarray(
+            start_m - sum(u * max(arrival_s - step * step_s, 0.0) for step, u in given)
+        )
 
     def possible_m(decision: int) -> float:
         _, lower, upper = seen[decision]
@@ -180,7 +223,11 @@ def _expected(
         return ENGINE
     if np.linalg.norm(start_m) - corrects_m(0, thruster.budget_m_s) > radius_m:
         return BUDGET
-    could = [each for each in tracked if np.linalg.norm(miss_m(each)) - corrects_m(each, left[each]) <= radius_m]
+    could = [
+        each
+        for each in tracked
+        if np.linalg.norm(miss_m(each)) - corrects_m(each, left[each]) <= radius_m
+    ]
     if not could:
         return KNOWLEDGE
     later = [decision for decision in tracked if decision > could[-1]]
@@ -196,7 +243,9 @@ def _expected(
 
 @pytest.mark.thorough
 def test_causes_are_those_of_an_independent_computation(brief: Scenario) -> None:
-    rng, counted, expected = np.random.default_rng(40), Counter[Any](), Counter[Any]()
+    rng = np.random.default_rng(40)
+    counted = Counter[Any]()
+    expected = Counter[Any]()
     differ = 0
     for seed in range(80):
         results, wanted = expected_causes(*random_scenario(brief, rng), runs=125, seed=seed)

@@ -22,7 +22,10 @@ class Uniform:
     """The random noise of the simulator, from the random numbers of each step."""
 
     def measure(self, sight: Any, predicted: Any) -> Any:
-        return {name: sensor.measured(sight, sight.uniform[name]) for name, sensor in sight.sensors.items()}
+        return {
+            name: sensor.measured(sight, sight.uniform[name])
+            for name, sensor in sight.sensors.items()
+        }
 
 
 class Drift:
@@ -54,19 +57,28 @@ def test_gaussian_errors_of_a_flight_are_quantiles_of_the_draws_of_its_run(brief
 def test_a_run_is_the_same_in_every_batch(noise: str, brief: Scenario) -> None:
     together = simulate(brief, [2, 7, 4], seed=3, noise=noise)
     alone = simulate(brief, [7], seed=3, noise=noise)
-    assert (alone.miss_m[0], alone.unguided_miss_m[0]) == (together.miss_m[1], together.unguided_miss_m[1])
+    assert (alone.miss_m[0], alone.unguided_miss_m[0]) == (
+        together.miss_m[1],
+        together.unguided_miss_m[1],
+    )
     assert fly_one(brief, 7, seed=3, noise=noise).result.miss_m[0] == together.miss_m[1]
     assert (together.miss_m != simulate(brief, [2, 7, 4], seed=3, noise="random").miss_m).all()
 
 
-def test_wide_gaussian_errors_are_uniform_and_briefly_correlated_ones_independent(brief: Scenario) -> None:
+def test_wide_gaussian_errors_are_uniform_and_briefly_correlated_ones_independent(
+    brief: Scenario,
+) -> None:
     wide = replace(brief, noise_sigma=10.0)
     for noise in OF_THE_BOUND:
         flown = replace(wide, noise=NoiseKind(noise), noise_correlation_s=1e-3)
-        np.testing.assert_allclose(simulate(flown, 20).miss_m, simulate(wide, 20).miss_m, rtol=0.02, atol=0.02)
+        np.testing.assert_allclose(
+            simulate(flown, 20).miss_m, simulate(wide, 20).miss_m, rtol=0.02, atol=0.02
+        )
 
 
-def test_a_noise_of_the_user_is_made_for_each_batch(brief: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_noise_of_the_user_is_made_for_each_batch(
+    brief: Scenario, monkeypatch: pytest.MonkeyPatch
+) -> None:
     expected = simulate(brief, 6, seed=1)
     monkeypatch.setattr(sys.modules["infoset.sim.simulate"], "ENGAGEMENTS_AT_ONCE", 2)
     for own in (Uniform, Uniform()):
@@ -78,7 +90,10 @@ def test_a_noise_of_the_user_is_made_for_each_batch(brief: Scenario, monkeypatch
 
 
 def test_what_is_no_noise_is_refused(brief: Scenario) -> None:
-    with pytest.raises(ValueError, match="no noise is called 'gauss'; there are: random, gaussian, correlated, game"):
+    with pytest.raises(
+        ValueError,
+        match="no noise is called 'gauss'; there are: random, gaussian, correlated, game",
+    ):
         simulate(brief, 1, noise="gauss")
     with pytest.raises(TypeError, match="must have the method measure"):
         simulate(brief, 1, noise=0.5)  # type: ignore[arg-type]
@@ -88,4 +103,7 @@ def test_what_is_no_noise_is_refused(brief: Scenario) -> None:
 
 
 def test_names_of_noises_are_those_of_campaigns() -> None:
-    assert {kind.value for kind in NoiseKind} == {kind.value for kind in CampaignNoise} - {"mixed", "own"}
+    assert {kind.value for kind in NoiseKind} == {kind.value for kind in CampaignNoise} - {
+        "mixed",
+        "own",
+    }

@@ -1,4 +1,6 @@
-"""Distributions of the 1997 experiment: bands set from an independent implementation, not from this one."""
+"""Distributions of the 1997 experiment: bands set from an independent implementation, not from this
+one.
+"""
 
 from __future__ import annotations
 
@@ -60,6 +62,8 @@ def test_the_number_of_sections_does_not_matter(asteroid: Scenario, noise: Noise
             ]
         )
 
-    few, usual, many = figures(9), figures(29), figures(101)
+    few = figures(9)
+    usual = figures(29)
+    many = figures(101)
     np.testing.assert_allclose(few, usual, rtol=0.08)
     np.testing.assert_allclose(many, usual, rtol=0.08)

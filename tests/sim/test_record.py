@@ -39,7 +39,9 @@ def test_a_record_in_space_has_both_axes(brief: Scenario) -> None:
     record = fly_one(in_space(brief), 2, seed=5)
     results = simulate(in_space(brief), 3, seed=5)
     assert record.result.miss_m[0] == results.miss_m[2]
-    assert np.hypot(*record.impulse_m_s.T).sum() == pytest.approx(float(results.impulse_m_s[2]), rel=1e-12)
+    assert np.hypot(*record.impulse_m_s.T).sum() == pytest.approx(
+        float(results.impulse_m_s[2]), rel=1e-12
+    )
     y, z, x = results.position_m[2]
     assert record.true_angle_rad[0].tolist() == [np.arctan2(y, x), np.arctan2(z, x)]
     bound = record.scenario.set_model.angle_sensor.error_bound(record.true_range_m[0])
@@ -49,7 +51,9 @@ def test_a_record_in_space_has_both_axes(brief: Scenario) -> None:
 
 @dataclass(frozen=True)
 class StreakSensor(Sensor):
-    """A kind of sensor that the library does not have: the rate of the line of sight from the length of streaks."""
+    """A kind of sensor that the library does not have: the rate of the line of sight from the
+    length of streaks.
+    """
 
     name: ClassVar[str] = "streak"
     quantity: ClassVar[str] = "streak_px"
@@ -69,8 +73,13 @@ class StreakSensor(Sensor):
         rate_of_a_pixel = self.pixel_rad / self.exposure_s
         sets.measure_rate(measured[self.name] * rate_of_a_pixel, 0.5 * rate_of_a_pixel, where)
 
-    def band(self, range_m: Floats, closing_speed_m_s: Floats | float, errors: float = 1.0) -> tuple[bool, Floats]:
-        return True, errors * 0.5 * self.pixel_rad / self.exposure_s * range_m**2 / closing_speed_m_s
+    def band(
+        self, range_m: Floats, closing_speed_m_s: Floats | float, errors: float = 1.0
+    ) -> tuple[bool, Floats]:
+        return (
+            True,
+            errors * 0.5 * self.pixel_rad / self.exposure_s * range_m**2 / closing_speed_m_s,
+        )
 
     def share(self, apart: Apart) -> Floats:
         return RateSensor(self.period_s, 0.5 * self.pixel_rad / self.exposure_s).share(apart)

@@ -35,7 +35,9 @@ P99 = Requirement(QuantileName("miss_m", 0.99), 10.0)
     seed=st.integers(0, 2**31),
 )
 @settings(deadline=None)
-def test_a_decision_compares_the_bound_with_the_interval(size: int, level: float, bound: float, seed: int) -> None:
+def test_a_decision_compares_the_bound_with_the_interval(
+    size: int, level: float, bound: float, seed: int
+) -> None:
     values = np.random.default_rng(seed).exponential(size=size)
     required = Requirement(QuantileName("miss_m", level), bound)
     verdict = judge(values, required, watched=False)
@@ -51,10 +53,16 @@ def test_a_decision_compares_the_bound_with_the_interval(size: int, level: float
 
 
 def exact_p_value(runs: int, count: int, share: Fraction) -> Fraction:
-    """Return the inverse of the mean likelihood ratio of the shares above a share, in rational arithmetic."""
-    # The integral of t^k (1 - t)^(n - k) from q to 1 is a sum over the binomial expansion of (1 - t)^(n - k).
+    """Return the inverse of the mean likelihood ratio of the shares above a share, in rational
+    arithmetic.
+    """
+    # The integral of t^k (1 - t)^(n - k) from q to 1 is a sum over the binomial expansion of (1 -
+    # t)^(n - k).
     integral = sum(
-        (Fraction((-1) ** power * comb(runs - count, power), count + power + 1) * (1 - share ** (count + power + 1)))
+        (
+            Fraction((-1) ** power * comb(runs - count, power), count + power + 1)
+            * (1 - share ** (count + power + 1))
+        )
         for power in range(runs - count + 1)
     )
     mean = integral / (1 - share)
@@ -72,12 +80,15 @@ def test_watched_p_values_are_inverse_likelihood_ratios(runs: int, count: int) -
 
 @pytest.mark.parametrize("share", [0.5, 0.95, 0.99])
 def test_looks_after_every_run_are_wrong_in_at_most_5_percent(share: float) -> None:
-    """The fixed-size interval, looked at after every run, is wrong in far more than 5 % of the samples."""
+    """The fixed-size interval, looked at after every run, is wrong in far more than 5 % of the
+    samples.
+    """
     size, repeats = 1500, 1000
     counts = np.cumsum(np.random.default_rng(3).random((repeats, size)) < share, axis=1)
     # Many samples have the same count after the same number of runs.
     number, same = np.unique(counts + np.arange(1, size + 1) * (size + 1), return_inverse=True)
-    runs, count = number // (size + 1), number % (size + 1)
+    runs = number // (size + 1)
+    count = number % (size + 1)
     fixed = np.minimum(binom.sf(count - 1, runs, share), binom.cdf(count, runs, share)) <= 0.025
 
     def wrong(rejected: Flags) -> float:
@@ -127,7 +138,9 @@ def test_hits_decide() -> None:
     assert judge(0.0 * hit[:20], required, watched=True).decision is Decision.NOT_MET
 
 
-@pytest.mark.parametrize("text", ["guaranteed_miss_m<25", " guaranteed_miss_m < 25 ", "guaranteed_miss_m p99<25"])
+@pytest.mark.parametrize(
+    "text", ["guaranteed_miss_m<25", " guaranteed_miss_m < 25 ", "guaranteed_miss_m p99<25"]
+)
 def test_a_requirement_without_a_quantile_is_that_of_p99(text: str) -> None:
     required = parse_requirement(text)
     assert required == Requirement(QuantileName("guaranteed_miss_m", 0.99), 25.0)
@@ -137,8 +150,28 @@ def test_a_requirement_without_a_quantile_is_that_of_p99(text: str) -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        *("hit", "hit<0.95", "hit>=1", "hit>=0", "hit>=95", "hit>=nan", "hit p50>=0.9", "hit=>0.9", "hit>=99%"),
-        *("", "miss_m", "miss_m 10", "miss_m>10", "miss_m<0", "miss_m<1e400", "miss_m<10 m", "miss<10", "p99<10"),
+        *(
+            "hit",
+            "hit<0.95",
+            "hit>=1",
+            "hit>=0",
+            "hit>=95",
+            "hit>=nan",
+            "hit p50>=0.9",
+            "hit=>0.9",
+            "hit>=99%",
+        ),
+        *(
+            "",
+            "miss_m",
+            "miss_m 10",
+            "miss_m>10",
+            "miss_m<0",
+            "miss_m<1e400",
+            "miss_m<10 m",
+            "miss<10",
+            "p99<10",
+        ),
         *("miss_m p0<10", "miss_m p100<10", "miss_m p٩٩<10"),
     ],
 )
@@ -157,7 +190,10 @@ def test_runs_without_a_value_do_not_satisfy_the_bound() -> None:
         most = judge(np.where(np.arange(80) % 13, 5.0, np.inf), median, watched=watched)
         assert (most.decision, most.known, most.value) == (Decision.MET, 73, 5.0)
     few = np.append(np.ones(19), np.inf)
-    assert judge(few, Requirement(QuantileName("guaranteed_miss_m", 0.9), 60.0), watched=False).upper is None
+    assert (
+        judge(few, Requirement(QuantileName("guaranteed_miss_m", 0.9), 60.0), watched=False).upper
+        is None
+    )
 
 
 @pytest.mark.parametrize("values", [[], [math.nan], [1.0, math.nan]])
@@ -178,7 +214,9 @@ def test_the_min_fixed_number_of_runs_that_decides() -> None:
 def test_runs_needed_by_hand() -> None:
     for exact, minimum in ((Fraction("0.99"), 535), (Fraction("0.95"), 105)):
         assert (
-            exact_p_value(minimum - 1, minimum - 1, exact) > Fraction("0.025") >= exact_p_value(minimum, minimum, exact)
+            exact_p_value(minimum - 1, minimum - 1, exact)
+            > Fraction("0.025")
+            >= exact_p_value(minimum, minimum, exact)
         )
         assert runs_needed(20, 20, float(exact)) == minimum
     assert runs_needed(19, 20, 0.95) is None
@@ -196,15 +234,23 @@ def test_runs_needed_by_hand() -> None:
 
 @pytest.mark.parametrize("watched", [False, True])
 def test_a_wrong_decision_in_a_monotone_row_is_one_in_its_first_wrong_cell(watched: bool) -> None:
-    """So a row is right with the confidence of one cell; independent runs give each cell an error of its own.
+    """So a row is right with the confidence of one cell; independent runs give each cell an error
+    of its own.
 
-    A run satisfies the bound in the cells whose share exceeds its number: its outcome is monotone along the row.
+    A run satisfies the bound in the cells whose share exceeds its number: its outcome is monotone
+    along the row.
     """
-    rows, runs, required, random = 2000, 120, 0.9, np.random.default_rng(4)
+    rows = 2000
+    runs = 120
+    required = 0.9
+    random = np.random.default_rng(4)
     shares = np.linspace(0.9, 0.88, 8)[:, None]  # no cell meets the requirement
-    number, count = np.arange(1, runs + 1)[:, None], np.arange(runs + 1)
+    number = np.arange(1, runs + 1)[:, None]
+    count = np.arange(runs + 1)
     p_value = (
-        p_values(number, np.minimum(number, count), required)[0] if watched else binom.sf(count - 1, runs, required)
+        p_values(number, np.minimum(number, count), required)[0]
+        if watched
+        else binom.sf(count - 1, runs, required)
     )
     met = np.broadcast_to(p_value <= 0.025, (runs, runs + 1))
 

@@ -1,4 +1,6 @@
-"""The images and impulses of a scenario: those that flights have, and where the file asks for other times."""
+"""The images and impulses of a scenario: those that flights have, and where the file asks for other
+times.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +41,9 @@ def test_the_last_impulse_and_image_are_nearest_to_their_times() -> None:
 
 
 def test_a_cut_off_is_that_of_its_nearest_step() -> None:
-    """A cut-off at 120 s is one at 119.98 s, the time of the step; that of the step before leaves a larger miss."""
+    """A cut-off at 120 s is one at 119.98 s, the time of the step; that of the step before leaves a
+    larger miss.
+    """
     misses_m = []
     for cut_off_s in (120, 119.97856, 179.97856):
         scenario = load_scenario(LATE, [f"thruster.last_impulse_s={cut_off_s}", "noise=game"])
@@ -60,14 +64,17 @@ def random_times(draw: random.Random) -> tuple[dict[str, Any], dict[str, Any]]:
         {"impulses_s": (8.1, round(draw.uniform(4.0, 7.0), 2), cut_off_s)},
         {"first_impulse_s": round(draw.uniform(4.0, 9.0), 2), "last_impulse_s": cut_off_s},
     )
-    return {"first_image_s": first_s, "last_image_s": last_s, "period_s": draw.choice((0.5, 1.0))}, draw.choice(
-        schedules
-    )
+    return {
+        "first_image_s": first_s,
+        "last_image_s": last_s,
+        "period_s": draw.choice((0.5, 1.0)),
+    }, draw.choice(schedules)
 
 
 def test_flights_have_the_images_and_impulses_of_the_schedule(brief: Scenario) -> None:
     """In random flights, images and impulses before the nominal arrival are at no other times."""
-    draw, given = random.Random(5), 0
+    draw = random.Random(5)
+    given = 0
     for run in range(40):
         scenario = changed(brief, *random_times(draw))
         found = schedule(scenario)
@@ -107,9 +114,15 @@ def test_times_that_differ_by_more_than_a_tenth_of_a_step_are_differences(brief:
     )
 
 
-def test_times_of_a_period_are_differences_if_it_is_no_whole_number_of_steps(brief: Scenario) -> None:
+def test_times_of_a_period_are_differences_if_it_is_no_whole_number_of_steps(
+    brief: Scenario,
+) -> None:
     arrival_s = brief.nominal_arrival_s
-    impulses = {"last_impulse_s": arrival_s - 9.0, "impulse_period_s": 3.2, "first_impulse_s": arrival_s - 2.0}
+    impulses = {
+        "last_impulse_s": arrival_s - 9.0,
+        "impulse_period_s": 3.2,
+        "first_impulse_s": arrival_s - 2.0,
+    }
     found = schedule(changed(brief, {}, impulses))
     assert found is not None
     assert [(each.key, round(arrival_s - each.scheduled_s, 9)) for each in found.differences] == [

@@ -32,7 +32,9 @@ def fly(scenario: Scenario, draws: Draws) -> tuple[Results, list[Step]]:
 
 def in_model(scenario: Scenario, model: Model) -> Scenario:
     shape = InitialSet.BOX if model is Model.GUARANTEED else InitialSet.RECTANGLE
-    return replace(scenario, **of_model(replace(scenario.set_model, model=model, initial_set=shape)))
+    return replace(
+        scenario, **of_model(replace(scenario.set_model, model=model, initial_set=shape))
+    )
 
 
 def equal(there: Results, back: Results) -> None:
@@ -56,12 +58,20 @@ def flat(box: StateBox) -> StateBox:
 @pytest.mark.parametrize("model", list(Model))
 @pytest.mark.parametrize(("noise", "tie"), NOISES)
 def test_the_plane_is_a_special_case(
-    name: str, strategy: str, model: Model, noise: NoiseKind, tie: TieRule, request: pytest.FixtureRequest
+    name: str,
+    strategy: str,
+    model: Model,
+    noise: NoiseKind,
+    tie: TieRule,
+    request: pytest.FixtureRequest,
 ) -> None:
-    # Theory, section 9, item 1: y = V_y = 0, known exactly and measured without error; one code, so equal bits.
+    # Theory, section 9, item 1: y = V_y = 0, known exactly and measured without error; one code, so
+    # equal bits.
     planar = in_model(with_long_steps(request.getfixturevalue(name)), model)
     planar = replace(planar, noise=noise, tie=tie, strategy=strategy)
-    sensor = replace(linear(planar.angle_sensor), error_at_nominal_range_y_rad=0.0, error_at_zero_range_y_rad=0.0)
+    sensor = replace(
+        linear(planar.angle_sensor), error_at_nominal_range_y_rad=0.0, error_at_zero_range_y_rad=0.0
+    )
     bounds = flat(planar.set_model.bounds)
     known = replace(planar.set_model, bounds=bounds, angle_sensor=sensor, disturbance_y_m_s2=0.0)
     spatial = replace(planar, **of_model(known), dispersion=flat(planar.dispersion))
@@ -72,14 +82,19 @@ def test_the_plane_is_a_special_case(
     assert back.outcomes == there.outcomes
     if model is Model.GUARANTEED:
         assert back.truth_kept.all()
-    # Gravity widens the set of the guaranteed model along y; that of the paper's is a point, and so is the impulse.
-    np.testing.assert_allclose(back.lateral_miss_m[:, 0], 0.0, atol=1e-50 if model is Model.PAPER else 1e-6)
+    # Gravity widens the set of the guaranteed model along y; that of the paper's is a point, and so
+    # is the impulse.
+    np.testing.assert_allclose(
+        back.lateral_miss_m[:, 0], 0.0, atol=1e-50 if model is Model.PAPER else 1e-6
+    )
     np.testing.assert_allclose(back.guaranteed_miss_m, there.guaranteed_miss_m, rtol=1e-14)
 
 
 def exchanged_draws(draws: Draws) -> Draws:
     order = [1, 0, 2]
-    errors = {name: values[::-1] if values.ndim == 3 else values for name, values in draws.errors.items()}
+    errors = {
+        name: values[::-1] if values.ndim == 3 else values for name, values in draws.errors.items()
+    }
     return replace(
         draws,
         position_m=draws.position_m[:, order],
@@ -96,20 +111,28 @@ def exchanged_box(box: StateBox) -> StateBox:
 
 
 def uneven(scenario: Scenario) -> Scenario:
-    """A scenario in space whose axes have different bounds, errors and disturbances, without the Sun."""
-    spatial = in_space(scenario, error_at_nominal_range_y_rad=0.0002, error_at_zero_range_y_rad=0.0003)
+    """A scenario in space whose axes have different bounds, errors and disturbances, without the
+    Sun.
+    """
+    spatial = in_space(
+        scenario, error_at_nominal_range_y_rad=0.0002, error_at_zero_range_y_rad=0.0003
+    )
     model = spatial.set_model
     box = replace(model.bounds, y_m=(-7e3, 9e3), vy_m_s=(-80.0, 110.0))
     start = replace(spatial.dispersion, y_m=(-800.0, 900.0), vy_m_s=(-50.0, 60.0))
     return replace(
-        spatial, dispersion=start, sun=None, **of_model(replace(model, bounds=box, disturbance_y_m_s2=0.007))
+        spatial,
+        dispersion=start,
+        sun=None,
+        **of_model(replace(model, bounds=box, disturbance_y_m_s2=0.007)),
     )
 
 
 def exchanged(scenario: Scenario) -> Scenario:
     model = scenario.set_model
     sensor = linear(model.angle_sensor)
-    y, z = sensor.axis("y"), sensor.axis("z")
+    y = sensor.axis("y")
+    z = sensor.axis("z")
     sensor = replace(
         sensor,
         error_at_nominal_range_rad=y.error_at_nominal_range_rad,
@@ -134,7 +157,11 @@ def exchanged(scenario: Scenario) -> Scenario:
 def test_an_exchange_of_the_axes_changes_nothing(
     name: str, model: Model, noise: NoiseKind, tie: TieRule, request: pytest.FixtureRequest
 ) -> None:
-    scenario = replace(uneven(in_model(with_long_steps(request.getfixturevalue(name)), model)), noise=noise, tie=tie)
+    scenario = replace(
+        uneven(in_model(with_long_steps(request.getfixturevalue(name)), model)),
+        noise=noise,
+        tie=tie,
+    )
     draws = draw(scenario, range(6), 3)
     there, steps = fly(scenario, draws)
     back, mirrored = fly(exchanged(scenario), exchanged_draws(draws))
@@ -149,8 +176,11 @@ def test_an_exchange_of_the_axes_changes_nothing(
 def test_a_mirrored_engagement_is_mirrored(
     axes: tuple[bool, bool], model: Model, noise: NoiseKind, asteroid: Scenario
 ) -> None:
-    # Mirror of both axes (theory, section 9, item 3), and of one axis, with random ties of opposite sign.
-    scenario = replace(uneven(in_model(with_long_steps(asteroid), model)), noise=noise, tie=TieRule.RANDOM)
+    # Mirror of both axes (theory, section 9, item 3), and of one axis, with random ties of opposite
+    # sign.
+    scenario = replace(
+        uneven(in_model(with_long_steps(asteroid), model)), noise=noise, tie=TieRule.RANDOM
+    )
     draws = draw(scenario, range(6), 3)
     flips = np.array([-1.0 if flip else 1.0 for flip in axes])
 
@@ -181,10 +211,14 @@ def test_a_mirrored_engagement_is_mirrored(
 
 
 @pytest.mark.parametrize("noise", [NoiseKind.RANDOM, NoiseKind.GAME])
-def test_the_diagonal_is_a_planar_engagement_times_root_two(noise: NoiseKind, asteroid: Scenario) -> None:
-    # Theory, section 9, item 5: relative errors up to 1.6e-5 of the miss and 2e-7 of the impulse were measured.
+def test_the_diagonal_is_a_planar_engagement_times_root_two(
+    noise: NoiseKind, asteroid: Scenario
+) -> None:
+    # Theory, section 9, item 5: relative errors up to 1.6e-5 of the miss and 2e-7 of the impulse
+    # were measured.
     planar = replace(asteroid, noise=noise, sun=None)
-    thruster, root = planar.thruster, np.sqrt(2.0)
+    thruster = planar.thruster
+    root = np.sqrt(2.0)
     stronger = replace(
         thruster,
         budget_m_s=thruster.budget_m_s * root,
@@ -209,10 +243,14 @@ def test_the_diagonal_is_a_planar_engagement_times_root_two(noise: NoiseKind, as
 
 
 @pytest.mark.parametrize(
-    ("model", "with_rates"), [(Model.PAPER, False), (Model.GUARANTEED, False), (Model.GUARANTEED, True)]
+    ("model", "with_rates"),
+    [(Model.PAPER, False), (Model.GUARANTEED, False), (Model.GUARANTEED, True)],
 )
-def test_sections_are_those_of_the_two_planar_sets(model: Model, with_rates: bool, asteroid: Scenario) -> None:
-    # Theory, section 9, item 6: a replay at any label is the product of the planar replays of (alpha_a, k_a).
+def test_sections_are_those_of_the_two_planar_sets(
+    model: Model, with_rates: bool, asteroid: Scenario
+) -> None:
+    # Theory, section 9, item 6: a replay at any label is the product of the planar replays of
+    # (alpha_a, k_a).
     scenario = uneven(in_model(asteroid, model))
     if with_rates:
         scenario = replace(scenario, rate_sensor=RateSensor(1.0, 3e-8))
@@ -262,11 +300,15 @@ def test_the_engine_is_limited_jointly(asteroid: Scenario) -> None:
 
 
 def extremal(scenario: Scenario, runs: int, seed: int) -> tuple[Draws, ScriptedNoise]:
-    """Starts anywhere in B x D, and errors at their bounds with random signs that keep for a while."""
+    """Starts anywhere in B x D, and errors at their bounds with random signs that keep for a
+    while.
+    """
     anywhere = replace(scenario, dispersion=scenario.set_model.bounds)
     draws = draw(anywhere, range(runs), seed)
     random = np.random.default_rng(seed)
-    switches = random.random((2, runs, draws.steps)) < 10.0 ** random.uniform(-2.5, -0.3, (2, runs, 1))
+    switches = random.random((2, runs, draws.steps)) < 10.0 ** random.uniform(
+        -2.5, -0.3, (2, runs, 1)
+    )
     signs = random.choice([-1.0, 1.0], (2, runs, 1)) * (-1.0) ** np.cumsum(switches, axis=2)
     return draws, ScriptedNoise({"angle": signs})
 

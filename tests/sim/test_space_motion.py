@@ -33,8 +33,12 @@ def starts(spatial: Scenario) -> Draws:
     return draw(spatial, range(BATCH), 5)
 
 
-def flown(position: Floats, velocity: Floats, sun: Sun | None, impulses: Floats, pushes: Floats) -> list[Floats]:
-    """Everything that a flight to its closest approach shows; impulses and pushes have shape (C, B)."""
+def flown(
+    position: Floats, velocity: Floats, sun: Sun | None, impulses: Floats, pushes: Floats
+) -> list[Floats]:
+    """Everything that a flight to its closest approach shows; impulses and pushes have shape (C,
+    B).
+    """
     motion = KeplerMotion(position, velocity, sun)
     shown = [motion.arrival_s()]
     for step in range(210):
@@ -53,14 +57,19 @@ def along(values: Floats, axes: list[int]) -> Floats:
     return values if values.ndim == 1 else values[axes[: len(values)]]
 
 
-@pytest.mark.parametrize("sun", [None, SUN, *(replace(SUN, direction_rad=angle) for angle in (0.0, -0.6, 2.5, np.pi))])
+@pytest.mark.parametrize(
+    "sun", [None, SUN, *(replace(SUN, direction_rad=angle) for angle in (0.0, -0.6, 2.5, np.pi))]
+)
 def test_the_plane_is_a_special_case_bit_for_bit(sun: Sun | None, starts: Draws) -> None:
     lateral = np.linspace(-3.0, 3.0, BATCH) * np.ones((2, 1))
     lateral[0] = 0.0
-    position, velocity = starts.position_m.copy(), starts.velocity_m_s.copy()
+    position = starts.position_m.copy()
+    velocity = starts.velocity_m_s.copy()
     position[:, 0] = velocity[:, 0] = 0.0
     in_plane = flown(position[:, 1:], velocity[:, 1:], sun, lateral[1:], lateral[1:])
-    for planar, spatial in zip(in_plane, flown(position, velocity, sun, lateral, lateral), strict=True):
+    for planar, spatial in zip(
+        in_plane, flown(position, velocity, sun, lateral, lateral), strict=True
+    ):
         if spatial.ndim == 1:
             np.testing.assert_array_equal(spatial, planar)
         else:
@@ -69,7 +78,9 @@ def test_the_plane_is_a_special_case_bit_for_bit(sun: Sun | None, starts: Draws)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_exchanging_the_lateral_axes_exchanges_the_motion_bit_for_bit(sign: float, starts: Draws) -> None:
+def test_exchanging_the_lateral_axes_exchanges_the_motion_bit_for_bit(
+    sign: float, starts: Draws
+) -> None:
     along_z = replace(SUN, direction_rad=sign * 0.5 * np.pi)
     along_y = replace(SUN, direction_rad=0.0, elevation_rad=sign * 0.5 * np.pi)
     lateral = np.random.default_rng(1).uniform(-5.0, 5.0, (2, BATCH))
@@ -93,14 +104,20 @@ def test_a_mirrored_sun_mirrors_the_motion_bit_for_bit(starts: Draws) -> None:
         push = flip[:2, None] * lateral
         other = flown(flip * starts.position_m, flip * starts.velocity_m_s, mirrored, push, push)
         for here, there in zip(one, other, strict=True):
-            np.testing.assert_array_equal(here, there if there.ndim == 1 else flip[: len(there), None] * there)
+            np.testing.assert_array_equal(
+                here, there if there.ndim == 1 else flip[: len(there), None] * there
+            )
 
 
 def test_the_orbit_is_across_the_sun_and_toward_x() -> None:
     for direction, elevation in np.random.default_rng(4).uniform(-1.5, 1.5, (100, 2)):
         toward, orbit = sun_and_orbit(Sun(1.0, 1.0, 2.0 * direction, elevation))
-        np.testing.assert_allclose([toward @ toward, orbit @ orbit, toward @ orbit], [1.0, 1.0, 0.0], atol=4e-16)
-        np.testing.assert_allclose(np.linalg.det(np.array([toward, orbit, [0.0, 0.0, 1.0]])), 0.0, atol=2e-16)
+        np.testing.assert_allclose(
+            [toward @ toward, orbit @ orbit, toward @ orbit], [1.0, 1.0, 0.0], atol=4e-16
+        )
+        np.testing.assert_allclose(
+            np.linalg.det(np.array([toward, orbit, [0.0, 0.0, 1.0]])), 0.0, atol=2e-16
+        )
         assert orbit[2] > 0.0
 
 
@@ -108,7 +125,8 @@ def test_gravity_is_never_greater_than_its_bound(spatial: Scenario) -> None:
     """The true difference of gravity at 10 000 points of the box, for any direction of the Sun."""
     box = spatial.set_model.bounds
     impulses = max_impulses_m_s(spatial.set_model, spatial.thruster)
-    # The minimum distance from the Sun, and thereby the bound, depends on its direction by less than 1e-4.
+    # The minimum distance from the Sun, and thereby the bound, depends on its direction by less
+    # than 1e-4.
     model = with_gravity(spatial.set_model, replace(SUN, direction_rad=0.0), impulses)
     minimum, maximum = corners(box)
     random = np.random.default_rng(6)
@@ -118,7 +136,9 @@ def test_gravity_is_never_greater_than_its_bound(spatial: Scenario) -> None:
     place[:, :2] += impulses * moment * random.uniform(-1.0, 1.0, (10_000, 2)) / np.sqrt(2.0)
     toward = random.normal(size=(10_000, 3)).astype(np.longdouble)
     toward[::2, 0] = 0.0  # in the plane of z
-    toward[::4, [1, 2]] = np.sqrt(np.longdouble(0.5)) * np.sign(toward[::4, [1, 2]])  # where the bound is sharp
+    toward[::4, [1, 2]] = np.sqrt(np.longdouble(0.5)) * np.sign(
+        toward[::4, [1, 2]]
+    )  # where the bound is sharp
     sun = SUN.distance_m * toward / np.sqrt((toward**2).sum(axis=1, keepdims=True))
     own = sun / SUN.distance_m**3
     there = (sun - place) / (((sun - place) ** 2).sum(axis=1, keepdims=True)) ** 1.5
@@ -129,7 +149,9 @@ def test_gravity_is_never_greater_than_its_bound(spatial: Scenario) -> None:
     assert (100.0 * pull[:, 2] <= model.gravity_speed_change * model.closing_speed_m_s).all()
 
 
-def test_without_motion_along_y_the_bound_of_gravity_is_the_planar_one(asteroid: Scenario, spatial: Scenario) -> None:
+def test_without_motion_along_y_the_bound_of_gravity_is_the_planar_one(
+    asteroid: Scenario, spatial: Scenario
+) -> None:
     def idle(model: SetModel) -> SetModel:
         bounds = replace(model.bounds, y_m=(0.0, 0.0), vy_m_s=(0.0, 0.0))
         return replace(model, bounds=bounds, disturbance_y_m_s2=0.0)
@@ -148,41 +170,56 @@ def test_without_motion_along_y_the_bound_of_gravity_is_the_planar_one(asteroid:
 
 def test_a_target_manoeuvres_along_each_axis_as_in_a_plane() -> None:
     random = np.random.default_rng(7)
-    draws, miss = random.uniform(-1.0, 1.0, (2, BATCH, 40)), random.normal(size=(2, BATCH))
+    draws = random.uniform(-1.0, 1.0, (2, BATCH, 40))
+    miss = random.normal(size=(2, BATCH))
     for manoeuvre in Manoeuvre:
         target = Target(manoeuvre, 0.3, 5.0, acceleration_y_m_s2=0.1)
         for step in (0, 7, 33):
             both = acceleration_m_s2(target, draws, step, 0.5, miss)
             for axis, most in ((0, 0.1), (1, 0.3)):
-                planar = acceleration_m_s2(Target(manoeuvre, most, 5.0), draws[[axis]], step, 0.5, miss[[axis]])
+                planar = acceleration_m_s2(
+                    Target(manoeuvre, most, 5.0), draws[[axis]], step, 0.5, miss[[axis]]
+                )
                 np.testing.assert_array_equal(both[[axis]], planar)
     same = acceleration_m_s2(Target(Manoeuvre.CONSTANT, 0.3), draws, 0, 0.5, miss)
     assert (np.abs(same) == 0.3).all()
 
 
 @pytest.mark.parametrize("wide", [1.0, 100.0])
-def test_the_acceleration_of_the_scaled_motion_is_within_its_bound(wide: float, spatial: Scenario) -> None:
-    """Gravity and the change of scale that it causes, for any direction of the Sun and a y axis of any width."""
+def test_the_acceleration_of_the_scaled_motion_is_within_its_bound(
+    wide: float, spatial: Scenario
+) -> None:
+    """Gravity and the change of scale that it causes, for any direction of the Sun and a y axis of
+    any width.
+    """
     start = spatial.set_model.bounds
     box = replace(start, y_m=(-1e4 * wide, 1e4 * wide), vy_m_s=(-100.0 * wide, 100.0 * wide))
     quiet = replace(spatial.set_model, bounds=box, model=Model.GUARANTEED, disturbance_m_s2=0.0)
     minimum, maximum = corners(box)
-    random, worst, speed = np.random.default_rng(12), np.zeros(2), quiet.closing_speed_m_s
+    random = np.random.default_rng(12)
+    worst = np.zeros(2)
+    speed = quiet.closing_speed_m_s
     for number in range(12):
         diagonal = (0.25 * np.pi * random.choice([-3, -1, 1, 3]), 0.0)
         anywhere = (random.uniform(-np.pi, np.pi), np.arcsin(random.uniform(-1.0, 1.0)))
         direction, elevation = anywhere if number % 3 else diagonal
         sun = replace(SUN, direction_rad=direction, elevation_rad=elevation)
         share = random.uniform(size=(40, 6))
-        states = minimum + (maximum - minimum) * np.where(random.uniform(size=(40, 6)) < 0.5, share.round(), share)
+        states = minimum + (maximum - minimum) * np.where(
+            random.uniform(size=(40, 6)) < 0.5, share.round(), share
+        )
         motion = KeplerMotion(states[:, :3], states[:, 3:], sun)
-        arrival_s, scaled = motion.arrival_s(), []
+        arrival_s = motion.arrival_s()
+        scaled = []
         for second in range(80):
             scaled.append(motion.sight().slope * speed * (arrival_s - second))
             motion.advance(1.0)
         model = with_gravity(quiet, sun, 0.0)
         bounds = np.array([model.axis(name).acceleration_m_s2 for name in model.axes])
         worst = np.maximum(worst, np.abs(np.diff(scaled, 2, axis=0)).max(axis=(0, 2)) / bounds)
-        assert np.abs(motion.velocity_m_s[:, 2] - states[:, 5]).max() < model.gravity_speed_change * speed
+        assert (
+            np.abs(motion.velocity_m_s[:, 2] - states[:, 5]).max()
+            < model.gravity_speed_change * speed
+        )
     assert (worst <= 1.0).all()
     assert worst[1] > 0.7

@@ -10,7 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from infoset.sim import empirical_distribution, estimate_hits, estimate_quantiles
-from infoset.sim.statistics import average_ranks, order_statistics, runs_for_hits, shown_quantiles, shows
+from infoset.sim.statistics import (
+    average_ranks,
+    order_statistics,
+    runs_for_hits,
+    shown_quantiles,
+    shows,
+)
 
 
 def test_the_distribution_of_a_small_sample_by_hand() -> None:
@@ -28,21 +34,27 @@ def test_the_band_is_massarts() -> None:
 
 
 def test_order_statistics_are_the_textbooks() -> None:
-    # The median of 10 values: the second and the ninth hold it with probability 1 - 22/1024 = 0.9785.
+    # The median of 10 values: the second and the ninth hold it with probability 1 - 22/1024 =
+    # 0.9785.
     assert order_statistics(10, 0.5, 0.95) == (2, 9)
-    # Of n values the maximum exceeds the 99 % quantile with probability 1 - 0.99^n: 0.975 from n = 368 on.
+    # Of n values the maximum exceeds the 99 % quantile with probability 1 - 0.99^n: 0.975 from n =
+    # 368 on.
     assert order_statistics(367, 0.99, 0.95)[1] == 368
     assert order_statistics(368, 0.99, 0.95)[1] == 368
 
 
 @given(size=st.integers(1, 400), level=st.floats(0.01, 0.99), confidence=st.floats(0.5, 0.999))
 @settings(deadline=None)
-def test_order_statistics_enclose_with_the_confidence_and_no_wider(size: int, level: float, confidence: float) -> None:
+def test_order_statistics_enclose_with_the_confidence_and_no_wider(
+    size: int, level: float, confidence: float
+) -> None:
     lower, upper = order_statistics(size, level, confidence)
     tail = 0.5 * (1.0 - confidence)
 
     def at_most(count: int) -> float:
-        return math.fsum(math.comb(size, k) * level**k * (1.0 - level) ** (size - k) for k in range(count + 1))
+        return math.fsum(
+            math.comb(size, k) * level**k * (1.0 - level) ** (size - k) for k in range(count + 1)
+        )
 
     assert at_most(lower - 1) <= tail + 1e-9
     assert at_most(lower) >= tail - 1e-9
@@ -66,7 +78,9 @@ def tail(runs: int, hits: range, probability: float) -> float:
     return float(sum(math.comb(runs, k) * p**k * (1 - p) ** (runs - k) for k in hits))
 
 
-@pytest.mark.parametrize(("hits", "runs"), [(1, 1), (1, 2), (19, 20), (48, 50), (50, 50), (0, 7), (3, 160), (187, 200)])
+@pytest.mark.parametrize(
+    ("hits", "runs"), [(1, 1), (1, 2), (19, 20), (48, 50), (50, 50), (0, 7), (3, 160), (187, 200)]
+)
 @pytest.mark.parametrize("confidence", [0.8, 0.95, 0.999])
 def test_the_interval_of_hits_ends_where_the_binomial_tails_are_half_the_rest(
     hits: int, runs: int, confidence: float
@@ -85,7 +99,9 @@ def test_the_interval_of_hits_ends_where_the_binomial_tails_are_half_the_rest(
         assert found.upper == 1.0
 
 
-@pytest.mark.parametrize(("level", "fewest"), [(0.5, 2), (0.1, 10), (0.9, 10), (0.99, 100), (0.999, 1000), (1.0, 1)])
+@pytest.mark.parametrize(
+    ("level", "fewest"), [(0.5, 2), (0.1, 10), (0.9, 10), (0.99, 100), (0.999, 1000), (1.0, 1)]
+)
 def test_a_quantile_needs_values_beyond_it(level: float, fewest: int) -> None:
     assert shows(fewest, level)
     assert shows(10 * fewest, level)
@@ -96,9 +112,15 @@ def test_a_quantile_needs_values_beyond_it(level: float, fewest: int) -> None:
 
 
 def probability_of_at_most(misses: int, runs: int, share: Fraction) -> Fraction:
-    """Return the probability of at most so many misses in some runs; `share` is the probability of a hit."""
+    """Return the probability of at most so many misses in some runs; `share` is the probability of
+    a hit.
+    """
     return sum(
-        (comb(runs, miss) * (1 - share) ** miss * share ** (runs - miss) for miss in range(misses + 1)), Fraction(0)
+        (
+            comb(runs, miss) * (1 - share) ** miss * share ** (runs - miss)
+            for miss in range(misses + 1)
+        ),
+        Fraction(0),
     )
 
 
@@ -113,7 +135,9 @@ def probability_of_at_most(misses: int, runs: int, share: Fraction) -> Fraction:
         ("0.75", 3, "0.6"),
     ],
 )
-def test_the_runs_for_hits_are_the_least_of_the_exact_test(share: str, misses: int, confidence: str) -> None:
+def test_the_runs_for_hits_are_the_least_of_the_exact_test(
+    share: str, misses: int, confidence: str
+) -> None:
     runs = runs_for_hits(float(share), misses, float(confidence))
     level = 1 - Fraction(confidence)
     assert probability_of_at_most(misses, runs, Fraction(share)) <= level
@@ -131,9 +155,14 @@ def test_runs_for_hits_of_values_without_a_meaning_are_refused() -> None:
             runs_for_hits(*arguments)
 
 
-@given(values=st.lists(st.sampled_from([-2.5, -0.0, 0.0, 1.0, math.nextafter(1.0, 2.0), 7.0, 1e300]), max_size=40))
+@given(
+    values=st.lists(
+        st.sampled_from([-2.5, -0.0, 0.0, 1.0, math.nextafter(1.0, 2.0), 7.0, 1e300]), max_size=40
+    )
+)
 def test_average_ranks_are_those_of_the_definition(values: list[float]) -> None:
     expected = [
-        sum(other < value for other in values) + 0.5 * (sum(other == value for other in values) + 1) for value in values
+        sum(other < value for other in values) + 0.5 * (sum(other == value for other in values) + 1)
+        for value in values
     ]
     assert average_ranks(np.array(values)).tolist() == expected

@@ -27,7 +27,13 @@ def test_rules_are_read_and_written() -> None:
     assert required == Requirement(QuantileName("guaranteed_miss_m", 0.5), 12.5)
     assert str(required) == "guaranteed_miss_m p50<12.5"
     assert QuantileName.of_percent("miss_m", "5") == QuantileName("miss_m", 0.05)
-    assert [level_name(each) for each in (0.05, 0.5, 0.99, 0.999, 0.9999)] == ["p5", "p50", "p99", "p99.9", "p99.99"]
+    assert [level_name(each) for each in (0.05, 0.5, 0.99, 0.999, 0.9999)] == [
+        "p5",
+        "p50",
+        "p99",
+        "p99.9",
+        "p99.99",
+    ]
     assert str(parse_requirement("miss_m p99.99995<1e-07")) == "miss_m p99.99995<1e-07"
     assert str(StoppingRule.parse("miss_m p0.5 ci<1234567.5")) == "miss_m p0.5 ci<1234567.5"
     assert QuantileName.of_percent("miss_m", "1e-3") == QuantileName("miss_m", 1e-5)
@@ -42,7 +48,9 @@ def test_rules_are_read_and_written() -> None:
 def test_the_texts_of_rules_and_requirements_are_exact(level: float, number: float) -> None:
     # A manifest stores these texts.
     quantile = QuantileName("guaranteed_miss_m", level)
-    rule, required, hits = StoppingRule(quantile, number), Requirement(quantile, number), HitRequirement(level)
+    rule = StoppingRule(quantile, number)
+    required = Requirement(quantile, number)
+    hits = HitRequirement(level)
     assert StoppingRule.parse(str(rule)) == rule
     assert parse_requirement(str(required)) == required
     assert parse_requirement(str(hits)) == hits
@@ -61,7 +69,9 @@ def test_the_texts_of_rules_and_requirements_are_exact(level: float, number: flo
     ],
 )
 def test_what_is_no_rule(text: str) -> None:
-    with pytest.raises(ValueError, match=r"must be|there is no quantity|greater than 0|between p0 and p100"):
+    with pytest.raises(
+        ValueError, match=r"must be|there is no quantity|greater than 0|between p0 and p100"
+    ):
         StoppingRule.parse(text)
 
 

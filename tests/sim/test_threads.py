@@ -1,4 +1,6 @@
-"""What several threads may share: scenarios, sets that do not change, and simulations at the same time."""
+"""What several threads may share: scenarios, sets that do not change, and simulations at the same
+time.
+"""
 
 from __future__ import annotations
 
@@ -40,13 +42,19 @@ def test_simulations_at_the_same_time_share_a_scenario(brief: Scenario) -> None:
     ],
 )
 def test_threads_share_a_set(make: Callable[[], Any]) -> None:
-    """Each thread asks for what a set computes when it is first used, and adds the set to itself."""
+    """Each thread asks for what a set computes when it is first used, and adds the set to
+    itself.
+    """
     shared = make()
     dimension = CUBE.shape[1] if isinstance(shared, Polytope) else 2
 
     def support(number: int, one: Any) -> float:
         direction = np.cos(np.arange(dimension) + number)
-        return float(np.squeeze(one.support_function(direction) + one.minkowski_sum(one).support_function(direction)))
+        return float(
+            np.squeeze(
+                one.support_function(direction) + one.minkowski_sum(one).support_function(direction)
+            )
+        )
 
     together = in_threads(lambda number: support(number, shared))
     assert together == [support(number, make()) for number in range(3 * THREADS)]

@@ -29,7 +29,12 @@ def asked(brief: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Campaign
     sensor = linear(brief.angle_sensor)
     cells = tuple(
         replace(
-            brief, **of_model(replace(brief.set_model, angle_sensor=replace(sensor, error_at_zero_range_rad=error)))
+            brief,
+            **of_model(
+                replace(
+                    brief.set_model, angle_sensor=replace(sensor, error_at_zero_range_rad=error)
+                )
+            ),
         )
         for error in ERRORS
     )
@@ -78,17 +83,24 @@ def test_cells_stop_when_they_are_decided(flown: CampaignFolder) -> None:
         decided = [verdict.decision is not Decision.UNDECIDED for verdict in verdicts]
         assert all(decided) or size == 160
         if size > 16:
-            before = [judge(sample[: sample.size - 8], REQUIRED, watched=True).decision for sample in values]
+            before = [
+                judge(sample[: sample.size - 8], REQUIRED, watched=True).decision
+                for sample in values
+            ]
             assert Decision.UNDECIDED in before
 
 
-def test_the_runs_of_a_cell_are_those_of_a_longer_sweep(asked: Campaign, flown: CampaignFolder, tmp_path: Path) -> None:
+def test_the_runs_of_a_cell_are_those_of_a_longer_sweep(
+    asked: Campaign, flown: CampaignFolder, tmp_path: Path
+) -> None:
     whole = replace(asked, runs=160, until=None, max_runs=None, folder=tmp_path / "whole").run()
     for cell, size in enumerate(flown.manifest.cell_runs):
         assert flown.runs(cell=cell).equals(whole.runs(cell=cell)[:size])
 
 
-@pytest.mark.parametrize("seed", [1, *(pytest.param(each, marks=pytest.mark.thorough) for each in (2, 3))])
+@pytest.mark.parametrize(
+    "seed", [1, *(pytest.param(each, marks=pytest.mark.thorough) for each in (2, 3))]
+)
 def test_neither_workers_nor_interruptions_change_what_is_stored(
     seed: int, asked: Campaign, flown: CampaignFolder, tmp_path: Path
 ) -> None:
@@ -126,7 +138,9 @@ def test_a_sweep_of_fixed_runs_is_continued_until_it_is_decided(
 
 
 @pytest.mark.thorough
-def test_more_runs_in_each_cell_change_no_decision(asked: Campaign, flown: CampaignFolder, tmp_path: Path) -> None:
+def test_more_runs_in_each_cell_change_no_decision(
+    asked: Campaign, flown: CampaignFolder, tmp_path: Path
+) -> None:
     longer = replace(asked, runs=max(flown.manifest.cell_runs), folder=tmp_path / "longer").run()
     assert set(longer.manifest.cell_runs) == {max(flown.manifest.cell_runs)}
     for cell in range(len(ERRORS)):

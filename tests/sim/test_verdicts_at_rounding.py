@@ -1,4 +1,6 @@
-"""Verdicts that rounding must not decide: exactly known parts, few living labels, a guaranteed miss of zero."""
+"""Verdicts that rounding must not decide: exactly known parts, few living labels, a guaranteed miss
+of zero.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from infoset import AngleSensor, InformationSetView, InitialSet, Model, RateSensor, Recovery, StateBox
+from infoset import (
+    AngleSensor,
+    InformationSetView,
+    InitialSet,
+    Model,
+    RateSensor,
+    Recovery,
+    StateBox,
+)
 from infoset.arrays import Floats
 from infoset.experiments.interception.scenario_file import load_scenario
 from infoset.guidance import LineOfSight, NoiseKind, Situation
@@ -24,12 +34,15 @@ LAST_ANGLE_AT, LABEL_M = 26, 5095928.0671172105
 """Step of the last angle of `narrow-labels`, and the label of its truth."""
 
 
-# A truth on the boundary of a section that is thinner than rounding --------------------------------------------------
+# A truth on the boundary of a section that is thinner than rounding
+# --------------------------------------------------
 
 
 @pytest.mark.parametrize("noise", [NoiseKind.RANDOM, NoiseKind.GAME])
 @pytest.mark.parametrize("has_range_sensor", [False, True])
-def test_rounding_does_not_move_a_truth_with_exactly_known_z_outside(noise: NoiseKind, has_range_sensor: bool) -> None:
+def test_rounding_does_not_move_a_truth_with_exactly_known_z_outside(
+    noise: NoiseKind, has_range_sensor: bool
+) -> None:
     """With a rate sensor and gravity: formerly 68 of 200 true states were outside, by 4e-16 m."""
     scenario = replace(load_scenario(CASES / "exactly-known-offset.toml"), noise=noise)
     sensor = scenario.range_sensor if has_range_sensor else None
@@ -39,22 +52,31 @@ def test_rounding_does_not_move_a_truth_with_exactly_known_z_outside(noise: Nois
 
 
 def displaced(scenario: Scenario, z_m: float) -> Results:
-    """Simulate one engagement with a given true z at the start, which may be outside the box of the set."""
+    """Simulate one engagement with a given true z at the start, which may be outside the box of the
+    set.
+    """
     known = draw(scenario, [0], 0)
-    flight = Engagements(scenario, replace(known, position_m=np.array([[z_m, known.position_m[0, 1]]])))
+    flight = Engagements(
+        scenario, replace(known, position_m=np.array([[z_m, known.position_m[0, 1]]]))
+    )
     while flight.flying:
         flight.advance()
     return flight.results(np.array([0]))
 
 
 @pytest.mark.parametrize(("disturbance_m_s2", "max_m"), [(0.007, 4e-15), (30.0, 2e-11)])
-def test_a_truth_outside_by_a_hundred_allowances_is_reported(disturbance_m_s2: float, max_m: float) -> None:
-    """The allowance is 4 ulp of the terms of z. For z = 0 they are the maximum V times the time to go."""
+def test_a_truth_outside_by_a_hundred_allowances_is_reported(
+    disturbance_m_s2: float, max_m: float
+) -> None:
+    """The allowance is 4 ulp of the terms of z. For z = 0 they are the maximum V times the time to
+    go.
+    """
     scenario = load_scenario(CASES / "exactly-known-offset.toml")
     model = replace(scenario.set_model, disturbance_m_s2=disturbance_m_s2)
     scenario = replace(scenario, **of_model(model), sun=None)
     # At t = 0 the set contains the first half of a step's disturbance.
-    to_go_s, v_m_s = scenario.nominal_range_m / model.closing_speed_m_s, 0.5 * disturbance_m_s2 * model.step_s
+    to_go_s = scenario.nominal_range_m / model.closing_speed_m_s
+    v_m_s = 0.5 * disturbance_m_s2 * model.step_s
     allowance_m = 4 * ULP * to_go_s * v_m_s
     assert 0.5 * max_m < allowance_m < max_m
     assert displaced(scenario, 0.0).truth_kept.all()
@@ -62,7 +84,8 @@ def test_a_truth_outside_by_a_hundred_allowances_is_reported(disturbance_m_s2: f
         assert not displaced(scenario, side * 100.0 * allowance_m).truth_kept.any()
 
 
-# Living labels in a very short interval ------------------------------------------------------------------------------
+# Living labels in a very short interval
+# --------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -87,13 +110,18 @@ class Stored:
 
 
 def narrow_labels(share: float) -> Engagements:
-    """Errors of 1e-12 rad, almost at their bounds: labels live within 150 ulp around that of the truth at the end."""
+    """Errors of 1e-12 rad, almost at their bounds: labels live within 150 ulp around that of the
+    truth at the end.
+    """
     scenario = load_scenario(CASES / "narrow-labels.toml")
     scenario = replace(scenario, **of_model(replace(scenario.set_model, recovery=Recovery.NONE)))
     with np.load(CASES / "narrow-labels.npz") as arrays:
         stored = Stored(dict(arrays), scenario.thruster.delay_steps, share)
-    position_m, velocity_m_s = stored.arrays["position"], stored.arrays["velocity"]
-    known = replace(draw(scenario, [0], 0), position_m=position_m, velocity_m_s=velocity_m_s, images=None)
+    position_m = stored.arrays["position"]
+    velocity_m_s = stored.arrays["velocity"]
+    known = replace(
+        draw(scenario, [0], 0), position_m=position_m, velocity_m_s=velocity_m_s, images=None
+    )
     given = stored.arrays["acc"].reshape(1, 1, -1)
     target = np.pad(given, ((0, 0), (0, 0), (0, max(0, known.steps - given.shape[-1]))))
     return Engagements(scenario, known, strategy=stored, noise=stored, target_m_s2=target)
@@ -113,7 +141,9 @@ def test_a_set_with_few_living_labels_does_not_become_empty(share: float) -> Non
 
 
 def test_labels_are_found_down_to_the_stated_width() -> None:
-    """The last angle is moved step by step until no label lives; replays of all floats show the interval."""
+    """The last angle is moved step by step until no label lives; replays of all floats show the
+    interval.
+    """
     flight = narrow_labels(3e-8)
     while flight.step < LAST_ANGLE_AT:
         flight.advance()
@@ -124,7 +154,9 @@ def test_labels_are_found_down_to_the_stated_width() -> None:
     for moved_rad in np.linspace(0.0, 2e-16, 41).tolist():
         after = flight._information.copy()
         after.measure_angle(last_rad + moved_rad)
-        lives = labels[[not after.section_at(label).polygons[0].is_empty for label in labels.tolist()]]
+        lives = labels[
+            [not after.section_at(label).polygons[0].is_empty for label in labels.tolist()]
+        ]
         width = np.ptp(lives) / LABEL_M if lives.size else 0.0
         if width > 1e-15 or lives.size == 0:
             assert after.living.any() == (lives.size > 0)
@@ -133,18 +165,24 @@ def test_labels_are_found_down_to_the_stated_width() -> None:
     assert sum(1e-15 < width < 3e-14 for width in widths) > 20
 
 
-# A guaranteed miss of zero --------------------------------------------------------------------------------------------
+# A guaranteed miss of zero
+# --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("rate_sensor", [None, RateSensor(1.0, 1e-9)])
 def test_a_guaranteed_miss_of_zero_allows_for_the_rounding_of_the_miss(
     asteroid: Scenario, rate_sensor: RateSensor | None
 ) -> None:
-    """A target straight ahead in free space, at rest across the line: the miss is the rounding error of x."""
-    misses_m, ranges_m = [], np.geomspace(3e3, 9e7, 12)
+    """A target straight ahead in free space, at rest across the line: the miss is the rounding
+    error of x.
+    """
+    misses_m = []
+    ranges_m = np.geomspace(3e3, 9e7, 12)
     for range_m in ranges_m.tolist():
         speed_m_s = range_m / 77.7
-        known = StateBox((0.0, 0.0), (range_m, range_m), (0.0, 0.0), (-1.01 * speed_m_s, -0.99 * speed_m_s))
+        known = StateBox(
+            (0.0, 0.0), (range_m, range_m), (0.0, 0.0), (-1.01 * speed_m_s, -0.99 * speed_m_s)
+        )
         model = replace(
             asteroid.set_model,
             model=Model.GUARANTEED,
@@ -157,7 +195,12 @@ def test_a_guaranteed_miss_of_zero_allows_for_the_rounding_of_the_miss(
             step_s=1.0,
         )
         scenario = replace(
-            asteroid, sun=None, nominal_range_m=range_m, dispersion=known, **of_model(model), rate_sensor=rate_sensor
+            asteroid,
+            sun=None,
+            nominal_range_m=range_m,
+            dispersion=known,
+            **of_model(model),
+            rate_sensor=rate_sensor,
         )
         results = simulate(scenario, 10)
         assert results.truth_kept.all()

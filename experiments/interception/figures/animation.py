@@ -12,7 +12,11 @@ from PIL import Image
 from infoset.arrays import Floats
 from infoset.experiments.common.figure_style import INK, plain, style, subplots
 from infoset.experiments.interception.course import Clock, evenly
-from infoset.experiments.interception.figures.process import draw_predicted_miss, level_predicted_miss, traces_of
+from infoset.experiments.interception.figures.process import (
+    draw_predicted_miss,
+    level_predicted_miss,
+    traces_of,
+)
 from infoset.experiments.interception.figures.sets import draw_plane, level_planes, planes_at
 from infoset.experiments.interception.figures.shared import count_down
 from infoset.sim import Record
@@ -31,14 +35,18 @@ def animate(
 ) -> bytes:
     """Return a GIF animation of engagements, side by side, of eight seconds and 16 colours.
 
-    Frames are evenly distributed over the steps, and take about 0.2 s of computing each. A frame is 425 pixels wide, or
-    640 for two planes.
+    Frames are evenly distributed over the steps, and take about 0.2 s of computing each. A frame is
+    425 pixels wide, or 640 for two planes.
     """
     clock = Clock.of(records)
     chosen = _frame_times(records, clock, max_frames)
     traces = traces_of(records)
-    width_mm, width_px = (120.0, 425) if len(traces) == 1 else (85.0 * len(traces), 320 * len(traces))
-    figure, (above, below) = subplots(135.0, 2, len(traces), width_mm=width_mm, height_ratios=[1.2, 1.0])
+    width_mm, width_px = (
+        (120.0, 425) if len(traces) == 1 else (85.0 * len(traces), 320 * len(traces))
+    )
+    figure, (above, below) = subplots(
+        135.0, 2, len(traces), width_mm=width_mm, height_ratios=[1.2, 1.0]
+    )
     figure.set_dpi(width_px / figure.get_figwidth())
     for axes, trace in zip(below, traces, strict=True):
         draw_predicted_miss(axes, trace, clock)
@@ -66,13 +74,24 @@ def animate(
         image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
         frames.append(image.quantize(COLOURS, dither=Image.Dither.NONE))
         progress((index + 1) / len(chosen))
-    content, frame_ms = BytesIO(), round(1000 * DURATION_S / len(frames))
-    frames[0].save(content, "gif", save_all=True, append_images=frames[1:], duration=frame_ms, loop=0, optimize=True)
+    content = BytesIO()
+    frame_ms = round(1000 * DURATION_S / len(frames))
+    frames[0].save(
+        content,
+        "gif",
+        save_all=True,
+        append_images=frames[1:],
+        duration=frame_ms,
+        loop=0,
+        optimize=True,
+    )
     return content.getvalue()
 
 
 def _frame_times(records: Sequence[Record], clock: Clock, most: int) -> Floats:
-    """Return at most `most` times of steps, evenly distributed over the time axis or over the steps."""
+    """Return at most `most` times of steps, evenly distributed over the time axis or over the
+    steps.
+    """
     times = np.unique(np.concatenate([record.time_s for record in records]))
     last = max(records, key=lambda record: record.scenario.nominal_arrival_s)
     places = -np.log(clock.at(last, times)) if clock.counts_down else np.arange(len(times))

@@ -1,4 +1,6 @@
-"""The approach of single engagements: the B-plane, and possible misses and impulses against the time before arrival."""
+"""The approach of single engagements: the B-plane, and possible misses and impulses against the
+time before arrival.
+"""
 
 from __future__ import annotations
 
@@ -43,20 +45,31 @@ from infoset.guidance.thruster import modulus
 from infoset.sim import Record
 
 _POSSIBLE = "possible miss without further impulses"
-_TRUE: dict[str, Any] = {"color": INK, "linewidth": 0.9, "label": "miss of the true state without further impulses"}
+_TRUE: dict[str, Any] = {
+    "color": INK,
+    "linewidth": 0.9,
+    "label": "miss of the true state without further impulses",
+}
 _CENTRED: dict[str, Any] = {"color": SET_EDGE, "linewidth": 1.1, "linestyle": (0, (4, 1.5))}
-_END: dict[str, Any] = {"color": INK, "marker": "x", "markersize": 6.0, "markeredgewidth": 1.4, "linestyle": "none"}
+_END: dict[str, Any] = {
+    "color": INK,
+    "marker": "x",
+    "markersize": 6.0,
+    "markeredgewidth": 1.4,
+    "linestyle": "none",
+}
 _MIN_SHOWN = 1e-3
 """Minimum miss of a logarithmic axis, as a multiple of the minimum possible miss."""
 
 
 @style()
 def draw_approach(records: Sequence[Record]) -> Figure:
-    """Draw possible misses and impulses against the time before the nominal arrival, and in space the B-plane.
+    """Draw possible misses and impulses against the time before the nominal arrival, and in space
+    the B-plane.
 
-    Each record has a row. The possible miss is the maximum distance of a point of the box of predicted misses, which
-    contains those of all sections. After an impulse that centres the box it is half the diagonal of the box. Both end
-    when the first section leaves at the range threshold.
+    Each record has a row. The possible miss is the maximum distance of a point of the box of
+    predicted misses, which contains those of all sections. After an impulse that centres the box it
+    is half the diagonal of the box. Both end when the first section leaves at the range threshold.
     """
     figure = new_figure(25.0 + 75.0 * len(records))
     rows = figure.subfigures(len(records), 1, squeeze=False)[:, 0]
@@ -68,7 +81,8 @@ def draw_approach(records: Sequence[Record]) -> Figure:
             layout = [["plane", *line] for line in layout]
             sizes["width_ratios"] = [1.0, 1.3]
         panels = row.subplot_mosaic(layout, **sizes)
-        possible, impulses = panels["possible"], panels["impulses"]
+        possible = panels["possible"]
+        impulses = panels["impulses"]
         _draw_possible(possible, record)
         _draw_moduli(impulses, record)
         count_down((possible, impulses), record.scenario)
@@ -82,15 +96,20 @@ def draw_approach(records: Sequence[Record]) -> Figure:
 
 def _draw_possible(axes: Axes, record: Record) -> None:
     known = complete_steps(record)
-    misses, times = record.predicted_miss_m[known], Clock(counts_down=True).at(record)
+    misses = record.predicted_miss_m[known]
+    times = Clock(counts_down=True).at(record)
     maximum = modulus(np.abs(misses).max(axis=-1).T)
     centred = modulus(0.5 * (misses[..., 1] - misses[..., 0]).T)
     true = modulus(true_predicted_misses(record).T)
-    levels = [level for level in (max_guarantee_m(record.result), record.scenario.radius_m) if level]
+    levels = [
+        level for level in (max_guarantee_m(record.result), record.scenario.radius_m) if level
+    ]
     top = max([*maximum, *true, *levels])
     bottom = max(min([*centred, *true, *levels]), _MIN_SHOWN * min([*centred, top]), 1e-6)
     axes.set(yscale="log", ylim=(0.5 * bottom, 2.0 * top), ylabel="miss, m")
-    axes.fill_between(times[known], np.full(len(known), 1e-9), maximum, color=SET_FILL, linewidth=0.0)
+    axes.fill_between(
+        times[known], np.full(len(known), 1e-9), maximum, color=SET_FILL, linewidth=0.0
+    )
     axes.plot(times[known], maximum, color=SET_EDGE, label=_POSSIBLE)
     axes.plot(times[known], centred, label="after an impulse that centres the set", **_CENTRED)
     axes.plot(times, true, **_TRUE)
@@ -101,7 +120,14 @@ def _draw_possible(axes: Axes, record: Record) -> None:
 
 def _draw_moduli(axes: Axes, record: Record) -> None:
     sizes = modulus(record.impulse_m_s.T)
-    draw_impulses(axes, Clock(counts_down=True).at(record), sizes, color=IMPULSE, linewidth=0.9, label="impulse")
+    draw_impulses(
+        axes,
+        Clock(counts_down=True).at(record),
+        sizes,
+        color=IMPULSE,
+        linewidth=0.9,
+        label="impulse",
+    )
     if sizes.any():
         axes.set(yscale="log", ylim=(0.4 * sizes[sizes > 0.0].min(), 2.5 * sizes.max()))
         plain_ticks(axes.yaxis)
@@ -109,15 +135,24 @@ def _draw_moduli(axes: Axes, record: Record) -> None:
 
 
 def _draw_b_plane(axes: Axes, record: Record) -> None:
-    """Draw the B-plane: the box of possible misses at the last decision, and the path of the true predicted miss."""
+    """Draw the B-plane: the box of possible misses at the last decision, and the path of the true
+    predicted miss.
+    """
     known = complete_steps(record)
     end = record.result.lateral_miss_m[0]
-    guaranteed, radius = max_guarantee_m(record.result), record.scenario.radius_m
+    guaranteed = max_guarantee_m(record.result)
+    radius = record.scenario.radius_m
     sizes = [float(np.abs(end).max()), guaranteed or 0.0]
     if len(known):
         y, z = record.predicted_miss_m[known[-1]]
         sizes.append(float(np.abs([y, z]).max()))
-        box = Rectangle((y[0], z[0]), y[1] - y[0], z[1] - z[0], label="possible misses at the last decision", **SET)
+        box = Rectangle(
+            (y[0], z[0]),
+            y[1] - y[0],
+            z[1] - z[0],
+            label="possible misses at the last decision",
+            **SET,
+        )
         axes.add_patch(box)
     if radius is not None and radius <= RADIUS_SHOWN * max(sizes):
         sizes.append(radius)

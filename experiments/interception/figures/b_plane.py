@@ -36,10 +36,14 @@ _MAX_COLUMNS = 3
 _OWN_LIMITS_FROM = 3.0
 """Ratio of the maximum and the minimum median above which each panel has its own limits."""
 RADIUS_SHOWN = 2.0
-"""The axes extend to the radius of the body if it is at most this multiple of the maximum miss shown."""
+"""The axes extend to the radius of the body if it is at most this multiple of the maximum miss
+shown.
+"""
 _AT_BODY_SCALE = "at the scale of the body"
 _BODY_FROM, _BODY_SCALE = 4.0, 2.0
-"""Ratio of the axes and the radius of the body from which a second panel extends to some radii of the body."""
+"""Ratio of the axes and the radius of the body from which a second panel extends to some radii of
+the body.
+"""
 
 _CIRCLES: tuple[tuple[float, str, Any], ...] = (
     (0.5, "circle: median of the miss", "-"),
@@ -75,11 +79,16 @@ class Cloud:
 
 
 def cloud(title: str, samples: Sequence[Results]) -> Cloud:
-    """Return the misses of runs in space; with several results of the same runs, the worst result of each run."""
+    """Return the misses of runs in space; with several results of the same runs, the worst result
+    of each run.
+    """
     misses = np.array([results.miss_m for results in samples])
     has_axes = samples[0].b_plane_t_rad is not None
-    across = np.array([results.b_plane_m if has_axes else results.lateral_miss_m for results in samples])
-    worst, runs = misses.argmax(axis=0), np.arange(misses.shape[1])
+    across = np.array(
+        [results.b_plane_m if has_axes else results.lateral_miss_m for results in samples]
+    )
+    worst = misses.argmax(axis=0)
+    runs = np.arange(misses.shape[1])
     bounds = [bound for bound in map(max_guarantee_m, samples) if bound is not None]
     most_m = max(bounds) if len(bounds) == len(samples) else None
     return Cloud(title, across[worst, runs], misses[worst, runs], most_m, has_axes)
@@ -88,13 +97,17 @@ def cloud(title: str, samples: Sequence[Results]) -> Cloud:
 def ellipse(across_m: Floats, level: float, within_m: float = np.inf) -> Floats | None:
     """Return the outline, m, shape (2, 181), of the ellipse that contains a share of the points.
 
-    It has the centre (y, z) and the axes of the covariance of the points; its size is the quantile of their Mahalanobis
-    radii. None if the points are on a line, or a part of it is beyond a distance that no point has.
+    It has the centre (y, z) and the axes of the covariance of the points; its size is the quantile
+    of their Mahalanobis radii. None if the points are on a line, or a part of it is beyond a
+    distance that no point has.
     """
-    variances, axes = np.linalg.eigh(np.cov(across_m.T)) if len(across_m) > 2 else (np.zeros(2), np.eye(2))
+    variances, axes = (
+        np.linalg.eigh(np.cov(across_m.T)) if len(across_m) > 2 else (np.zeros(2), np.eye(2))
+    )
     if variances[0] <= 1e-12 * variances[1]:
         return None
-    centre, scaled = across_m.mean(axis=0), axes * np.sqrt(variances)
+    centre = across_m.mean(axis=0)
+    scaled = axes * np.sqrt(variances)
     radii = np.linalg.norm(np.linalg.solve(scaled, (across_m - centre).T), axis=0)
     outline = np.asarray(centre[:, None] + scaled @ ring(float(np.quantile(radii, level))))
     return None if np.hypot(*outline).max() > within_m else outline
@@ -102,12 +115,13 @@ def ellipse(across_m: Floats, level: float, within_m: float = np.inf) -> Floats 
 
 @style()
 def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figure:
-    """Draw the miss of each run as a point in the plane across the approach, one panel for each cloud.
+    """Draw the miss of each run as a point in the plane across the approach, one panel for each
+    cloud.
 
-    Ellipses contain 50 % and 99 % of the runs. The radii of the circles are the median and the 90 % quantile of the
-    miss, and the maximum guaranteed miss. All panels have the same limits, unless the median misses differ much. The
-    radius of the body, m, is drawn as a disc; if it is small beside the misses, each cloud has a second panel at the
-    scale of the body.
+    Ellipses contain 50 % and 99 % of the runs. The radii of the circles are the median and the 90 %
+    quantile of the miss, and the maximum guaranteed miss. All panels have the same limits, unless
+    the median misses differ much. The radius of the body, m, is drawn as a disc; if it is small
+    beside the misses, each cloud has a second panel at the scale of the body.
     """
     medians = [float(np.median(each.miss_m)) for each in clouds]
     alone = max(medians) > _OWN_LIMITS_FROM * min(medians)
@@ -119,9 +133,18 @@ def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figu
     figure, grid = subplots(40.0 + 68.0 * rows, rows, columns, width_mm=56.0 * columns + 22.0)
     panels = first_panels(grid, len(halves))
     titles = []
-    for place, (axes, each, half) in enumerate(zip(panels, itertools.cycle(clouds), halves, strict=False)):
+    for place, (axes, each, half) in enumerate(
+        zip(panels, itertools.cycle(clouds), halves, strict=False)
+    ):
         lines = _draw_cloud(axes, each, half, radius_m)
-        titles.append("\n".join([plain(each.title), *(lines if place < len(clouds) else [_AT_BODY_SCALE, lines[-1]])]))
+        titles.append(
+            "\n".join(
+                [
+                    plain(each.title),
+                    *(lines if place < len(clouds) else [_AT_BODY_SCALE, lines[-1]]),
+                ]
+            )
+        )
     letters(panels, titles, fontsize="small")
     note = "The scale differs from panel to panel." if len(set(halves)) > 1 else None
     legend_below(figure, min(2, columns), title=note)
@@ -129,17 +152,30 @@ def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figu
 
 
 def _half_width(clouds: Sequence[Cloud], radius_m: float | None) -> float:
-    """Return half the length of the axes: the misses and, if not much greater, the radius of the body and Φ."""
+    """Return half the length of the axes: the misses and, if not much greater, the radius of the
+    body and Φ.
+    """
     maximum = axis_limit([each.miss_m for each in clouds]) or 1.0
-    sizes = [size for size in (radius_m, *(each.guaranteed_m for each in clouds)) if size is not None]
+    sizes = [
+        size for size in (radius_m, *(each.guaranteed_m for each in clouds)) if size is not None
+    ]
     return 1.08 * max([maximum, *(size for size in sizes if size <= RADIUS_SHOWN * maximum)])
 
 
 def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) -> list[str]:
-    """Draw the points and lines of a panel, and return lines about the miss: quantiles, the bound, and hits."""
-    count, known = len(each.miss_m), []
-    size, alpha = float(np.clip(45.0 / np.sqrt(count), 1.6, 3.5)), float(np.clip(30.0 / np.sqrt(count), 0.35, 0.8))
-    point: dict[str, Any] = {"color": SET_EDGE, "marker": "o", "linestyle": "none", "markeredgewidth": 0.0}
+    """Draw the points and lines of a panel, and return lines about the miss: quantiles, the bound,
+    and hits.
+    """
+    count = len(each.miss_m)
+    known = []
+    size = float(np.clip(45.0 / np.sqrt(count), 1.6, 3.5))
+    alpha = float(np.clip(30.0 / np.sqrt(count), 0.35, 0.8))
+    point: dict[str, Any] = {
+        "color": SET_EDGE,
+        "marker": "o",
+        "linestyle": "none",
+        "markeredgewidth": 0.0,
+    }
     point |= {"markersize": size, "alpha": alpha, "rasterized": count > MAX_VECTORS}
     point["zorder"] = 3.2  # the white edge of a circle would hide the points on it
     axes.plot(*each.across_m.T, label="miss of one run", **point)
@@ -147,8 +183,12 @@ def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) ->
     for level, name, dashes in _CIRCLES:
         if shows(count, level):
             quantile = float(np.quantile(each.miss_m, level))
-            axes.plot(*ring(quantile), label=name, color=GAME, linestyle=dashes, linewidth=0.9, **line)
-            known.append(f"{'median' if level == 0.5 else f'{100 * level:g} %'} {number(quantile)} m")
+            axes.plot(
+                *ring(quantile), label=name, color=GAME, linestyle=dashes, linewidth=0.9, **line
+            )
+            known.append(
+                f"{'median' if level == 0.5 else f'{100 * level:g} %'} {number(quantile)} m"
+            )
     within_m = np.inf if each.guaranteed_m is None else each.guaranteed_m
     for level, name, dashes in _ELLIPSES:
         if shows(count, level) and (outline := ellipse(each.across_m, level, within_m)) is not None:
@@ -158,9 +198,24 @@ def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) ->
         axes.set(xlabel=r"$B\cdot T$, m", ylabel=r"$B\cdot R$, m", ylim=(half, -half))
     outside = int((np.abs(each.across_m) > half).any(axis=1).sum())
     if outside:
-        place: dict[str, Any] = {"xycoords": "axes fraction", "ha": "right", "va": "bottom", "path_effects": HALO}
-        axes.annotate(f"beyond the axes: {outside} of {count}", (0.97, 0.03), fontsize="small", zorder=5.0, **place)
+        place: dict[str, Any] = {
+            "xycoords": "axes fraction",
+            "ha": "right",
+            "va": "bottom",
+            "path_effects": HALO,
+        }
+        axes.annotate(
+            f"beyond the axes: {outside} of {count}",
+            (0.97, 0.03),
+            fontsize="small",
+            zorder=5.0,
+            **place,
+        )
     lines = [", ".join(known)]
     lines += [] if each.guaranteed_m is None else [f"maximum Φ {number(each.guaranteed_m)} m"]
-    lines += [] if radius_m is None else [f"hits: {int((each.miss_m <= radius_m).sum())} of {some_runs(count)}"]
+    lines += (
+        []
+        if radius_m is None
+        else [f"hits: {int((each.miss_m <= radius_m).sum())} of {some_runs(count)}"]
+    )
     return lines

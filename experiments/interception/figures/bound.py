@@ -1,4 +1,6 @@
-"""The lower bound of the miss that any strategy can guarantee: over the label, its pair, and strategies against it."""
+"""The lower bound of the miss that any strategy can guarantee: over the label, its pair, and
+strategies against it.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,8 @@ from infoset.sim import Scenario
 from infoset.sim.bound.lower_bound import LowerBound
 from infoset.sim.bound.pair_of_motions import TruthPair, later_impulses
 
-_FIRST, _SECOND = CURVE_LOOKS[3], CURVE_LOOKS[2]
+_FIRST = CURVE_LOOKS[3]
+_SECOND = CURVE_LOOKS[2]
 _LOOKS = tuple(
     {"color": look["color"], "marker": marker, "markersize": 3.0}
     for look, marker in zip((_FIRST, CURVE_LOOKS[1], _SECOND), "os^", strict=True)
@@ -40,18 +43,24 @@ _SECONDS_SHOWN = 3.0
 
 
 @style()
-def draw_bound(scenario: Scenario, lower: LowerBound, worst_m: Mapping[str, float] | None = None) -> Figure:
-    """Draw the bound in one column: over the label, the true states that prove it, and the misses of strategies.
+def draw_bound(
+    scenario: Scenario, lower: LowerBound, worst_m: Mapping[str, float] | None = None
+) -> Figure:
+    """Draw the bound in one column: over the label, the true states that prove it, and the misses
+    of strategies.
 
-    Panel (a) has one curve per closing speed, (b) the motions of the pair, (c) the maximum misses found, `worst_m`,
-    m, by the name of the strategy; without them it is left out. The bound is the result of `lower_bound` for this
-    scenario. In space, (b) has the offset of the two states along the direction of their difference at x = 0. A bound
-    by a single motion has its offset from the x axis.
+    Panel (a) has one curve per closing speed, (b) the motions of the pair, (c) the maximum misses
+    found, `worst_m`, m, by the name of the strategy; without them it is left out. The bound is the
+    result of `lower_bound` for this scenario. In space, (b) has the offset of the two states along
+    the direction of their difference at x = 0. A bound by a single motion has its offset from the x
+    axis.
     """
     heights_mm = [75.0, 85.0]
     if worst_m:
         heights_mm.append(20.0 + 6.0 * len(worst_m))
-    figure, grid = subplots(sum(heights_mm), len(heights_mm), height_ratios=heights_mm, width_mm=_COLUMN_MM)
+    figure, grid = subplots(
+        sum(heights_mm), len(heights_mm), height_ratios=heights_mm, width_mm=_COLUMN_MM
+    )
     panels = [*grid.flat]
     _draw_labels(panels[0], lower)
     _draw_pair(panels[1], scenario, lower)
@@ -65,14 +74,32 @@ def draw_bound(scenario: Scenario, lower: LowerBound, worst_m: Mapping[str, floa
 def _draw_labels(axes: Axes, lower: LowerBound) -> None:
     for look, speed in zip(_LOOKS, lower.speeds_m_s, strict=False):
         labels_m, bounds_m = lower.curve(speed)
-        # No lines: the bound ripples over the distance of one step, and only some stretches of labels are evaluated.
-        axes.plot(labels_m / 1e3, bounds_m, label=f"{-speed / 1e3:g} km/s", linestyle="none", **look)
+        # No lines: the bound ripples over the distance of one step, and only some stretches of
+        # labels are evaluated.
+        axes.plot(
+            labels_m / 1e3, bounds_m, label=f"{-speed / 1e3:g} km/s", linestyle="none", **look
+        )
     pair = lower.pair
-    axes.plot(pair.label_m / 1e3, pair.bound_m, marker="*", markersize=9.0, color=INK, linestyle="none", zorder=5)
+    axes.plot(
+        pair.label_m / 1e3,
+        pair.bound_m,
+        marker="*",
+        markersize=9.0,
+        color=INK,
+        linestyle="none",
+        zorder=5,
+    )
     right = 2e-3 * pair.label_m > sum(axes.get_xlim())  # in the right half
-    place: dict[str, Any] = {"xytext": (-7.0 if right else 7.0, 3.0), "ha": "right" if right else "left"}
+    place: dict[str, Any] = {
+        "xytext": (-7.0 if right else 7.0, 3.0),
+        "ha": "right" if right else "left",
+    }
     axes.annotate(
-        f"{pair.bound_m:.1f} m", (pair.label_m / 1e3, pair.bound_m), color=INK, textcoords="offset points", **place
+        f"{pair.bound_m:.1f} m",
+        (pair.label_m / 1e3, pair.bound_m),
+        color=INK,
+        textcoords="offset points",
+        **place,
     )
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.6 * (high - low))  # space for the legend
@@ -81,29 +108,40 @@ def _draw_labels(axes: Axes, lower: LowerBound) -> None:
 
 
 def _draw_pair(axes: Axes, scenario: Scenario, lower: LowerBound) -> None:
-    pair, model = lower.pair, scenario.set_model
+    pair = lower.pair
+    model = scenario.set_model
     direction = _direction(pair)
     half = direction @ pair.track_m
     to_go = pair.arrival_s - pair.times_s
-    alike_until = np.inf if pair.is_single else pair.arrival_s - pair.last_common_step * model.step_s
+    alike_until = (
+        np.inf if pair.is_single else pair.arrival_s - pair.last_common_step * model.step_s
+    )
     shown = float(min(_SECONDS_SHOWN * alike_until + 2.0 * model.step_s, to_go[0]))
     top = float(half[-1])
     if not pair.is_single:
         top = max(top, _draw_equal_measurements(axes, scenario, pair, shown))
         axes.vlines(alike_until, -top, top, **BOUND)
-    given_s, sizes = later_impulses(scenario, -1 if pair.is_single else pair.last_common_step, pair.arrival_s)
+    given_s, sizes = later_impulses(
+        scenario, -1 if pair.is_single else pair.last_common_step, pair.arrival_s
+    )
     corrected = half - np.maximum(pair.times_s[:, None] - given_s, 0.0) @ sizes
     after = to_go <= alike_until + 1e-9
     mark: dict[str, Any] = {} if pair.is_single else {"marker": "o", "markersize": 2.2}
     without = "no impulses" if pair.is_single else "first state, equal impulses"
-    for sign, look, name in ((1.0, _FIRST, without), (-1.0, _SECOND, "second state"))[: 1 if pair.is_single else 2]:
+    for sign, look, name in ((1.0, _FIRST, without), (-1.0, _SECOND, "second state"))[
+        : 1 if pair.is_single else 2
+    ]:
         axes.plot(to_go, sign * half, label=name, **look, **mark)
         axes.plot(to_go[after], sign * corrected[after], color=look["color"], **_CORRECTED)
-    axes.plot([], [], color=INK, label=f"corrected by at most {pair.correction_m:.1f} m", **_CORRECTED)
+    axes.plot(
+        [], [], color=INK, label=f"corrected by at most {pair.correction_m:.1f} m", **_CORRECTED
+    )
     axes.set_xlim(shown, 0.0)
     axes.set_ylim(0.0 if pair.is_single else -1.12 * top, 2.2 * top)  # space for the legend
     axes.set_xlabel("time to go, s")
-    axes.set_ylabel("offset without impulses, m" if pair.is_single else "offset from the midpoint, m")
+    axes.set_ylabel(
+        "offset without impulses, m" if pair.is_single else "offset from the midpoint, m"
+    )
     axes.legend(loc="upper right", fontsize="small", borderaxespad=0.2)
 
 
@@ -115,12 +153,15 @@ def _direction(pair: TruthPair) -> Floats:
 
 def _draw_strategies(axes: Axes, bound_m: float, worst_m: Mapping[str, float]) -> None:
     rows = sorted(worst_m.items(), key=lambda item: item[1])
-    places, misses = np.arange(len(rows)), np.array([miss_m for _, miss_m in rows])
+    places = np.arange(len(rows))
+    misses = np.array([miss_m for _, miss_m in rows])
     maximum = max(bound_m, float(misses[-1]))
     axes.axvspan(0.0, bound_m, color=REGION_FILL, linewidth=0.0)
     axes.axvline(bound_m, color=INK, linewidth=1.2)
     axes.hlines(places, bound_m, misses, color=SET_EDGE, linewidth=0.8)
-    axes.plot(misses, places, marker="o", markersize=4.0, linestyle="none", color=_LOOKS[1]["color"])
+    axes.plot(
+        misses, places, marker="o", markersize=4.0, linestyle="none", color=_LOOKS[1]["color"]
+    )
     beside: dict[str, Any] = {"xytext": (5.0, 0.0), "textcoords": "offset points", "va": "center"}
     for place, miss_m in zip(places, misses, strict=True):
         axes.annotate(f"{number(miss_m)} m", (miss_m, place), fontsize="small", **beside)
@@ -134,8 +175,12 @@ def _draw_strategies(axes: Axes, bound_m: float, worst_m: Mapping[str, float]) -
     axes.set_xlabel(f"maximum miss, m (bound {number(bound_m)} m)")
 
 
-def _draw_equal_measurements(axes: Axes, scenario: Scenario, pair: TruthPair, shown: float) -> float:
-    """Draw the limits of the offset of each state with equal measurements; return the largest one, m."""
+def _draw_equal_measurements(
+    axes: Axes, scenario: Scenario, pair: TruthPair, shown: float
+) -> float:
+    """Draw the limits of the offset of each state with equal measurements; return the largest one,
+    m.
+    """
     model = scenario.set_model
     fine = np.linspace(0.0, shown, 200)
     ranges = -pair.vx_m_s * fine

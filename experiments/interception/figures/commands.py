@@ -1,4 +1,6 @@
-"""The figures of the commands, in the order of their names, each drawn when the last one is written, and `plot`."""
+"""The figures of the commands, in the order of their names, each drawn when the last one is
+written, and `plot`.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,11 @@ from infoset.experiments.interception.figures.approach import draw_approach
 from infoset.experiments.interception.figures.b_plane import cloud, draw_b_plane
 from infoset.experiments.interception.figures.comparison import draw_comparison
 from infoset.experiments.interception.figures.corridor import draw_corridor
-from infoset.experiments.interception.figures.distributions import Sample, draw_distributions, draw_samples
+from infoset.experiments.interception.figures.distributions import (
+    Sample,
+    draw_distributions,
+    draw_samples,
+)
 from infoset.experiments.interception.figures.process import draw_process
 from infoset.experiments.interception.figures.sets import draw_sets
 from infoset.experiments.interception.published import printed_single_runs
@@ -24,15 +30,22 @@ from infoset.sim import Record, Results, Scenario
 DEFAULT_TIMES = (0.5, 4.0, 8.0)
 
 
-def draw_experiment(scenario: Scenario, curves: Sequence[Curve], courses: Sequence[Courses]) -> Iterator[Figure]:
-    """Draw the distributions and the corridor, and in space the misses across the approach for each noise."""
+def draw_experiment(
+    scenario: Scenario, curves: Sequence[Curve], courses: Sequence[Courses]
+) -> Iterator[Figure]:
+    """Draw the distributions and the corridor, and in space the misses across the approach for each
+    noise.
+    """
     of_paper = is_of_paper(scenario)
     printed = printed_single_runs() if of_paper else None
     yield draw_distributions(curves, scenario.radius_m, printed, numbered=of_paper)
     yield draw_corridor(curves, courses)
     for noise in dict.fromkeys(curve.noise for curve in curves) if scenario.is_spatial else ():
         clouds = [
-            cloud(f"{noise} noise,\n{'with' if curve.range_sensor else 'no'} range sensor", [curve.results])
+            cloud(
+                f"{noise} noise,\n{'with' if curve.range_sensor else 'no'} range sensor",
+                [curve.results],
+            )
             for curve in curves
             if curve.noise == noise
         ]
@@ -47,22 +60,29 @@ def draw_compared(scenario: Scenario, compared: Sequence[Comparison]) -> Iterato
     yield draw_comparison(compared, scenario.radius_m)
     for noise in dict.fromkeys(one.noise for one in compared) if scenario.is_spatial else ():
         chosen = [one for one in compared if one.noise == noise]
-        clouds = [cloud(f"{one.strategy}\n{one.noise_title}", [*one.results.values()]) for one in chosen]
+        clouds = [
+            cloud(f"{one.strategy}\n{one.noise_title}", [*one.results.values()]) for one in chosen
+        ]
         yield draw_b_plane(clouds, scenario.radius_m)
 
 
 def draw_flights(records: Sequence[Record], times_s: Sequence[float]) -> Iterator[Figure]:
-    """Draw one or two engagements: over time, their sets at some times, and their approach; no times: the default."""
+    """Draw one or two engagements: over time, their sets at some times, and their approach; no
+    times: the default.
+    """
     yield draw_process(records)
     yield draw_sets(records, times_s or _default_times(records))
     yield draw_approach(records)
 
 
 def _default_times(records: Sequence[Record]) -> tuple[float, ...]:
-    """Return the times of figure 3, s: those of the paper, or in a long flight evenly over the logarithm of time."""
+    """Return the times of figure 3, s: those of the paper, or in a long flight evenly over the
+    logarithm of time.
+    """
     if not Clock.of(records).counts_down:
         return DEFAULT_TIMES
-    arrival_s, step_s = records[0].scenario.nominal_arrival_s, records[0].scenario.set_model.step_s
+    arrival_s = records[0].scenario.nominal_arrival_s
+    step_s = records[0].scenario.set_model.step_s
     return tuple((arrival_s - np.geomspace(arrival_s, step_s, 5)[1:4]).tolist())
 
 
@@ -72,9 +92,11 @@ def plot(results: Results | Record | Sequence[Record]) -> Figure:
     Parameters
     ----------
     results : Results, Record or sequence of Record
-        Results give the distributions of miss and impulse, each with its 95 % confidence band. Records give angle,
-        rate, predicted miss and impulses over time (`draw_process`).
+        Results give the distributions of miss and impulse, each with its 95 % confidence band.
+        Records give angle, rate, predicted miss and impulses over time (`draw_process`).
     """
     if not isinstance(results, Results):
         return draw_process([results] if isinstance(results, Record) else results)
-    return draw_samples([Sample(some_runs(len(results)), CURVE_LOOKS[1], results.miss_m, results.impulse_m_s)])
+    return draw_samples(
+        [Sample(some_runs(len(results)), CURVE_LOOKS[1], results.miss_m, results.impulse_m_s)]
+    )

@@ -10,7 +10,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from infoset.arrays import Floats
-from infoset.experiments.common.figure_style import INK, SET, legend_below, letters, plain_ticks, style, subplots
+from infoset.experiments.common.figure_style import (
+    INK,
+    SET,
+    legend_below,
+    letters,
+    plain_ticks,
+    style,
+    subplots,
+)
 from infoset.experiments.common.screen import some_runs
 from infoset.experiments.interception.figures.distributions import draw_radius
 from infoset.experiments.interception.study import Comparison
@@ -24,7 +32,8 @@ _MARK: dict[str, Any] = {"color": INK, "linestyle": "none", "zorder": 4.0}
 
 @style()
 def draw_comparison(compared: Sequence[Comparison], radius_m: float | None = None) -> Figure:
-    """Draw the distributions of the miss (left) and of the impulse spent, one row per strategy in a panel per noise.
+    """Draw the distributions of the miss (left) and of the impulse spent, one row per strategy in a
+    panel per noise.
 
     Misses are on a logarithmic axis, with a line at the radius of the body, m.
     """
@@ -32,7 +41,9 @@ def draw_comparison(compared: Sequence[Comparison], radius_m: float | None = Non
     noises = {each.noise: each.noise_title for each in compared}
     height = len(noises) * (12.0 + 8.0 * len(names)) + 21.0
     figure, grid = subplots(height, len(noises), 2, sharex="col", sharey=True)
-    misses, impulses = ([each.worst(name) for each in compared] for name in ("miss_m", "impulse_m_s"))
+    misses, impulses = (
+        [each.worst(name) for each in compared] for name in ("miss_m", "impulse_m_s")
+    )
     edges = _logarithmic(misses), np.linspace(0.0, 1.04 * float(np.max(impulses)) or 1.0, _BINS + 1)
     for column, samples, bins in zip(grid.T, (misses, impulses), edges, strict=True):
         for axes, noise in zip(column, noises, strict=True):
@@ -54,7 +65,9 @@ def draw_comparison(compared: Sequence[Comparison], radius_m: float | None = Non
 
 
 def _logarithmic(samples: Sequence[Floats]) -> Floats:
-    """Return the edges of the bins of misses, of which a few small values may be below the first."""
+    """Return the edges of the bins of misses, of which a few small values may be below the
+    first.
+    """
     positive = [sample[sample > 0.0] for sample in samples if (sample > 0.0).any()]
     if not positive:
         return np.geomspace(0.1, 1.0, _BINS + 1)
@@ -64,15 +77,22 @@ def _logarithmic(samples: Sequence[Floats]) -> Floats:
 
 
 def _draw_strategy(axes: Axes, place: int, sample: Floats, edges: Floats) -> None:
-    """Draw a histogram on the line of its strategy, and below it a bar with the quantiles that the runs show."""
+    """Draw a histogram on the line of its strategy, and below it a bar with the quantiles that the
+    runs show.
+    """
     counts, _ = np.histogram(np.clip(sample, edges[0], edges[-1]), bins=edges)
-    heights, label = place - _HILL * counts / counts.max(), f"histogram of {some_runs(len(sample))}"
+    heights = place - _HILL * counts / counts.max()
+    label = f"histogram of {some_runs(len(sample))}"
     axes.stairs(heights, edges, baseline=place, fill=True, label=label, **SET | {"linewidth": 0.5})
-    low, middle, high, nearly, worst = np.maximum(np.quantile(sample, (0.1, 0.5, 0.9, 0.99, 1.0)), edges[0])
+    low, middle, high, nearly, worst = np.maximum(
+        np.quantile(sample, (0.1, 0.5, 0.9, 0.99, 1.0)), edges[0]
+    )
     level = place + _BAR
     bar: dict[str, Any] = {"color": INK, "zorder": 3.0, "solid_capstyle": "butt"}
     axes.plot([middle, worst], [level, level], linewidth=0.6, **bar)
-    axes.plot(middle, level, marker="o", markersize=5.0, markerfacecolor="white", label="median", **_MARK)
+    axes.plot(
+        middle, level, marker="o", markersize=5.0, markerfacecolor="white", label="median", **_MARK
+    )
     if shows(len(sample), 0.9):
         axes.plot([low, high], [level, level], linewidth=2.4, label="10 to 90 %", **bar)
     if shows(len(sample), 0.99):

@@ -1,4 +1,6 @@
-"""The corridor of many runs: quantiles of possible misses and of impulses against the time before arrival."""
+"""The corridor of many runs: quantiles of possible misses and of impulses against the time before
+arrival.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,12 @@ from infoset.experiments.common.figure_style import (
 )
 from infoset.experiments.common.screen import some_runs
 from infoset.experiments.interception.course import Courses
-from infoset.experiments.interception.figures.shared import count_down, draw_end, draw_levels, name_events
+from infoset.experiments.interception.figures.shared import (
+    count_down,
+    draw_end,
+    draw_levels,
+    name_events,
+)
 from infoset.experiments.interception.study import Curve, max_guarantee_m
 from infoset.sim.statistics import shows
 
@@ -39,12 +46,15 @@ _IMPULSES: tuple[tuple[float, str, dict[str, Any]], ...] = (
 def draw_corridor(curves: Sequence[Curve], courses: Sequence[Courses]) -> Figure:
     """Draw possible misses and impulses of each curve against the time before the nominal arrival.
 
-    The possible miss is the maximum without further impulses. Its quantiles are those of the runs that still have a
-    complete set (see `Courses`), and end when these are less than half of the runs. Quantiles for which the runs are
-    too few are not drawn.
+    The possible miss is the maximum without further impulses. Its quantiles are those of the runs
+    that still have a complete set (see `Courses`), and end when these are less than half of the
+    runs. Quantiles for which the runs are too few are not drawn.
     """
-    rows, columns = -(-len(curves) // 2), min(2, len(curves))
-    figure, grid = subplots(20.0 + 75.0 * rows, 2 * rows, columns, sharex=True, height_ratios=[2.4, 1.0] * rows)
+    rows = -(-len(curves) // 2)
+    columns = min(2, len(curves))
+    figure, grid = subplots(
+        20.0 + 75.0 * rows, 2 * rows, columns, sharex=True, height_ratios=[2.4, 1.0] * rows
+    )
     above, below = (first_panels(part, len(curves)) for part in (grid[::2], grid[1::2]))
     titles = []
     for first, second, curve, course in zip(above, below, curves, courses, strict=True):
@@ -72,7 +82,9 @@ def _draw_possible(axes: Axes, course: Courses) -> None:
     times = course.before_arrival_s[shown]
     axes.set_yscale("log")
     if shown.any():
-        low, median, high, maximum = np.nanquantile(course.possible_m[:, shown], (0.1, 0.5, 0.9, 1.0), axis=0)
+        low, median, high, maximum = np.nanquantile(
+            course.possible_m[:, shown], (0.1, 0.5, 0.9, 1.0), axis=0
+        )
         if shows(len(course.possible_m), 0.9):
             band = "possible miss: 10 to 90 %"
             axes.fill_between(times, low, high, facecolor=SET_FILL, linewidth=0.0, label=band)

@@ -29,10 +29,18 @@ MAX_POINTS = 2000
 """Most points of a curve; more would only make the file larger."""
 
 _DOTTED: dict[str, Any] = {"linestyle": (0, (1, 1.2)), "linewidth": 0.9}
-_RUN: dict[str, Any] = {"marker": "^", "markersize": 7.0, "linestyle": "none", "zorder": 4.0, "clip_on": False}
+_RUN: dict[str, Any] = {
+    "marker": "^",
+    "markersize": 7.0,
+    "linestyle": "none",
+    "zorder": 4.0,
+    "clip_on": False,
+}
 _BAND = "95 % confidence band (Dvoretzky-Kiefer-Wolfowitz)"
 _LOGARITHMIC_FROM = 50.0
-"""Ratio of the end of the axis of the miss to the smallest median, or to the radius, above which it is logarithmic."""
+"""Ratio of the end of the axis of the miss to the smallest median, or to the radius, above which it
+is logarithmic.
+"""
 _MIN_SHOWN = 0.01
 """Quantile at which a logarithmic axis starts: misses can be arbitrarily small."""
 
@@ -61,37 +69,47 @@ def draw_distributions(
 ) -> Figure:
     """Draw the distribution functions of the curves of the experiment with `draw_samples`.
 
-    `printed` are the miss, m, and the impulse, m/s, of the run that the paper prints for a noise; if `numbered`, the
-    curves have their numbers in the paper's figure 4.
+    `printed` are the miss, m, and the impulse, m/s, of the run that the paper prints for a noise;
+    if `numbered`, the curves have their numbers in the paper's figure 4.
     """
-    samples, runs = [], []
+    samples = []
+    runs = []
     for curve in curves:
         sensor = "with" if curve.range_sensor else "no"
         name = f"{curve.noise} noise, {sensor} range sensor, {some_runs(len(curve.results))}"
         if numbered:
             name = f"{curve.number}  {name}"
-        samples.append(Sample(name, CURVE_LOOKS[curve.number], curve.results.miss_m, curve.results.impulse_m_s))
+        samples.append(
+            Sample(name, CURVE_LOOKS[curve.number], curve.results.miss_m, curve.results.impulse_m_s)
+        )
         if printed and curve.noise in printed and not curve.range_sensor:
             miss_m, impulse_m_s = np.array(printed[curve.noise])[:, None]
             title = f"printed: one run from z = \N{MINUS SIGN}8 km, {curve.noise} noise"
-            runs.append(Sample(title, {"color": CURVE_LOOKS[curve.number]["color"]}, miss_m, impulse_m_s))
+            runs.append(
+                Sample(title, {"color": CURVE_LOOKS[curve.number]["color"]}, miss_m, impulse_m_s)
+            )
     return draw_samples(samples, radius_m, runs)
 
 
 @style()
-def draw_samples(samples: Sequence[Sample], radius_m: float | None = None, runs: Sequence[Sample] = ()) -> Figure:
-    """Draw the distribution functions of (a) the miss and (b) the impulse spent, with their 95 % confidence bands.
+def draw_samples(
+    samples: Sequence[Sample], radius_m: float | None = None, runs: Sequence[Sample] = ()
+) -> Figure:
+    """Draw the distribution functions of (a) the miss and (b) the impulse spent, with their 95 %
+    confidence bands.
 
-    Where a few values are far beyond the others, the axis ends before them and its label says how many; where the
-    curves or the radius lie decades apart, the axis of the miss is logarithmic. The radius of the body, m, is a line in
-    (a). Single runs are marks on the axes.
+    Where a few values are far beyond the others, the axis ends before them and its label says how
+    many; where the curves or the radius lie decades apart, the axis of the miss is logarithmic. The
+    radius of the body, m, is a line in (a). Single runs are marks on the axes.
     """
     figure, (panels,) = subplots(85.0, 1, 2, sharey=True)
     left, right = panels
-    misses, impulses = [sample.miss_m for sample in samples], [sample.impulse_m_s for sample in samples]
+    misses = [sample.miss_m for sample in samples]
+    impulses = [sample.impulse_m_s for sample in samples]
     bounds = [sample.guaranteed_miss_m for sample in samples if sample.guaranteed_miss_m.size]
     scale_misses(left, [*misses, *bounds], radius_m)
-    minimum, limit = min(float(each.min()) for each in impulses), axis_limit(impulses)
+    minimum = min(float(each.min()) for each in impulses)
+    limit = axis_limit(impulses)
     limit = max([limit, *(float(run.impulse_m_s.max()) for run in runs)])
     margin = 0.05 * (limit - minimum) or 0.5
     right.set(xlim=(max(0.0, minimum - margin), limit + margin), ylim=(-0.02, 1.02))
@@ -99,7 +117,13 @@ def draw_samples(samples: Sequence[Sample], radius_m: float | None = None, runs:
         _draw_curve(left, sample.miss_m, sample.look, sample.name)
         _draw_curve(right, sample.impulse_m_s, sample.look, sample.name)
         if sample.guaranteed_miss_m.size:
-            _draw_curve(left, sample.guaranteed_miss_m, sample.look | _DOTTED, sample.guaranteed_name, banded=False)
+            _draw_curve(
+                left,
+                sample.guaranteed_miss_m,
+                sample.look | _DOTTED,
+                sample.guaranteed_name,
+                banded=False,
+            )
     for run in runs:
         left.plot(run.miss_m, [0.0], label=run.name, **_RUN | run.look)
         right.plot(run.impulse_m_s, [0.0], **_RUN | run.look)
@@ -107,18 +131,29 @@ def draw_samples(samples: Sequence[Sample], radius_m: float | None = None, runs:
     draw_radius(left, radius_m)
     left.set_ylabel("share of runs")
     letters(panels, ("miss", "impulse spent"))
-    left.set_xlabel("\n".join(["miss, m", *_beyond(left, "runs", misses), *_beyond(left, "guaranteed misses", bounds)]))
+    left.set_xlabel(
+        "\n".join(
+            ["miss, m", *_beyond(left, "runs", misses), *_beyond(left, "guaranteed misses", bounds)]
+        )
+    )
     right.set_xlabel("\n".join(["impulse spent, m/s", *_beyond(right, "runs", impulses)]))
     legend_below(figure, 2)
     return figure
 
 
 def scale_misses(axes: Axes, samples: Sequence[Floats], radius_m: float | None) -> None:
-    """Scale the axis of the misses so that every sample and the radius are visible: logarithmic if decades apart."""
-    sizes = [float(np.median(sample)) for sample in samples] + ([] if radius_m is None else [radius_m])
+    """Scale the axis of the misses so that every sample and the radius are visible: logarithmic if
+    decades apart.
+    """
+    sizes = [float(np.median(sample)) for sample in samples] + (
+        [] if radius_m is None else [radius_m]
+    )
     if 0.0 < _LOGARITHMIC_FROM * min(sizes) < axis_limit(samples):
         firsts = [float(np.quantile(sample[sample > 0.0], _MIN_SHOWN)) for sample in samples]
-        axes.set(xscale="log", xlim=(0.5 * min(*firsts, *sizes), 2.0 * max(float(sample.max()) for sample in samples)))
+        axes.set(
+            xscale="log",
+            xlim=(0.5 * min(*firsts, *sizes), 2.0 * max(float(sample.max()) for sample in samples)),
+        )
         plain_ticks(axes.xaxis)
     else:
         axes.set_xlim(0.0, 1.04 * axis_limit(samples) or 0.5)
@@ -127,8 +162,9 @@ def scale_misses(axes: Axes, samples: Sequence[Floats], radius_m: float | None) 
 def axis_limit(samples: Sequence[Floats]) -> float:
     """Return the end of an axis: beyond all values, or of all but a few very large ones.
 
-    It is the maximum value if that is at most twice the farthest upper fence (upper quartile and three times the
-    distance between the quartiles) of the samples, else the maximum value within half as much again as that fence.
+    It is the maximum value if that is at most twice the farthest upper fence (upper quartile and
+    three times the distance between the quartiles) of the samples, else the maximum value within
+    half as much again as that fence.
     """
     quartiles = [np.quantile(sample, (0.25, 0.75)) for sample in samples]
     fence = max(float(upper + 3.0 * (upper - lower)) for lower, upper in quartiles)
@@ -139,9 +175,15 @@ def axis_limit(samples: Sequence[Floats]) -> float:
 
 
 def _beyond(axes: Axes, name: str, samples: Sequence[Floats]) -> list[str]:
-    """Return a note with the number of values beyond a horizontal axis; none without such values."""
+    """Return a note with the number of values beyond a horizontal axis; none without such
+    values.
+    """
     count = sum(int((sample > axes.get_xlim()[1]).sum()) for sample in samples)
-    return [f"{name} beyond the axis: {count} of {sum(sample.size for sample in samples)}"] if count else []
+    return (
+        [f"{name} beyond the axis: {count} of {sum(sample.size for sample in samples)}"]
+        if count
+        else []
+    )
 
 
 def draw_radius(axes: Axes, radius_m: float | None) -> None:
@@ -149,18 +191,30 @@ def draw_radius(axes: Axes, radius_m: float | None) -> None:
     if radius_m is None:
         return
     inside = radius_m <= axes.get_xlim()[1]
-    label = f"body radius, {radius_m:g} m: {'a smaller miss is a hit' if inside else 'beyond the axis'}"
+    label = (
+        f"body radius, {radius_m:g} m: {'a smaller miss is a hit' if inside else 'beyond the axis'}"
+    )
     axes.plot([radius_m, radius_m] if inside else [], [0.0, 1.0] if inside else [], label=label,
               transform=axes.get_xaxis_transform(), **RADIUS)  # fmt: skip
 
 
-def _draw_curve(axes: Axes, values: Floats, look: dict[str, Any], label: str, *, banded: bool = True) -> None:
+def _draw_curve(
+    axes: Axes, values: Floats, look: dict[str, Any], label: str, *, banded: bool = True
+) -> None:
     """Draw a distribution function over axes with final limits, and its confidence band."""
     every = empirical_distribution(values)
     kept = np.unique(np.linspace(0, values.size - 1, min(values.size, MAX_POINTS)).astype(np.int64))
-    rising, end = every.values[kept], max(float(values.max()), axes.get_xlim()[1])
+    rising = every.values[kept]
+    end = max(float(values.max()), axes.get_xlim()[1])
     if banded:
-        band: dict[str, Any] = {"facecolor": look["color"], "alpha": 0.15, "linewidth": 0.0, "step": "post"}
+        band: dict[str, Any] = {
+            "facecolor": look["color"],
+            "alpha": 0.15,
+            "linewidth": 0.0,
+            "step": "post",
+        }
         axes.fill_between(rising, every.lower[kept], every.upper[kept], **band)
     shares = [0.0, *every.probability[kept], 1.0]
-    axes.plot([rising[0], *rising, end], shares, drawstyle="steps-post", zorder=3.0, label=label, **look)
+    axes.plot(
+        [rising[0], *rising, end], shares, drawstyle="steps-post", zorder=3.0, label=label, **look
+    )

@@ -24,15 +24,24 @@ from infoset.experiments.common.figure_style import (
     plain,
     style,
 )
-from infoset.experiments.interception.course import Clock, outcome_title, record_titles, true_predicted_misses
+from infoset.experiments.interception.course import (
+    Clock,
+    outcome_title,
+    record_titles,
+    true_predicted_misses,
+)
 from infoset.experiments.interception.figures.shared import MAX_VECTORS, count_down, draw_impulses
 from infoset.sensors import BearingSensor
 from infoset.sim import Record
 
 RANGE_SHARE = 0.1
-"""Share of the first range below which values do not set the limits: angle and rate grow as 1/x and 1/x^2."""
+"""Share of the first range below which values do not set the limits: angle and rate grow as 1/x and
+1/x^2.
+"""
 _MIN_RATE = 0.02
-"""Quantile of the moduli of the rates at which their logarithmic axis starts: a rate can be zero."""
+"""Quantile of the moduli of the rates at which their logarithmic axis starts: a rate can be
+zero.
+"""
 _ZERO: dict[str, Any] = {"color": LIMIT, "linewidth": 0.6}
 
 Trace = tuple[Record, int]
@@ -41,11 +50,13 @@ Trace = tuple[Record, int]
 
 @style()
 def draw_process(records: Sequence[Record]) -> Figure:
-    """Draw angle, angular rate, impulse and predicted miss over time, one column per record and lateral axis.
+    """Draw angle, angular rate, impulse and predicted miss over time, one column per record and
+    lateral axis.
 
-    The axes of a row have the same limits. At least one record is needed. On a logarithmic time axis (`Clock`), where
-    angle and rate grow by many decades, the angle is replaced by the error of its measurement with its bound, the rate
-    by its modulus, and the predicted miss has that of the true state.
+    The axes of a row have the same limits. At least one record is needed. On a logarithmic time
+    axis (`Clock`), where angle and rate grow by many decades, the angle is replaced by the error of
+    its measurement with its bound, the rate by its modulus, and the predicted miss has that of the
+    true state.
     """
     if not records:
         raise ValueError("at least one record is needed")
@@ -91,7 +102,9 @@ def draw_process(records: Sequence[Record]) -> Figure:
 
 def traces_of(records: Sequence[Record]) -> list[Trace]:
     """Return the columns of figures: each record with each of its lateral axes."""
-    return [(record, axis) for record in records for axis in range(len(record.scenario.set_model.axes))]
+    return [
+        (record, axis) for record in records for axis in range(len(record.scenario.set_model.axes))
+    ]
 
 
 def _name_rows(rows: Sequence[Axes], clock: Clock) -> None:
@@ -121,9 +134,14 @@ def _measured(trace: Trace, sensor: str) -> tuple[Integers, Floats]:
     return steps, np.asarray(_SCALE[sensor] * values)
 
 
-def _draw_sight(axes: Axes, trace: Trace, clock: Clock, sensor: str, *, is_modulus: bool = False) -> None:
-    """Draw the angle or the rate of the line of sight, or its modulus, and its measurements as dots."""
-    times, change = clock.at(trace[0]), np.abs if is_modulus else np.asarray
+def _draw_sight(
+    axes: Axes, trace: Trace, clock: Clock, sensor: str, *, is_modulus: bool = False
+) -> None:
+    """Draw the angle or the rate of the line of sight, or its modulus, and its measurements as
+    dots.
+    """
+    times = clock.at(trace[0])
+    change = np.abs if is_modulus else np.asarray
     steps, values = _measured(trace, sensor)
     if steps.size:
         _dots(axes, times[steps], change(values), f"measured {sensor}")
@@ -131,7 +149,12 @@ def _draw_sight(axes: Axes, trace: Trace, clock: Clock, sensor: str, *, is_modul
 
 
 def _dots(axes: Axes, times: Floats, values: Floats, label: str) -> None:
-    look: dict[str, Any] = {"color": MEASURED, "markersize": 3.0, "markeredgewidth": 0.0, "label": label}
+    look: dict[str, Any] = {
+        "color": MEASURED,
+        "markersize": 3.0,
+        "markeredgewidth": 0.0,
+        "label": label,
+    }
     axes.plot(times, values, ".", rasterized=len(values) > MAX_VECTORS, **look)
 
 
@@ -141,7 +164,12 @@ def _draw_angle_error(axes: Axes, trace: Trace, clock: Clock) -> None:
     times = clock.at(record)[steps]
     bounds = 1e6 * _sensor(trace).error_bound(record.true_range_m[steps])
     axes.axhline(0.0, **_ZERO)
-    band: dict[str, Any] = {"facecolor": MEASURED, "alpha": 0.18, "linewidth": 0.0, "label": "bound of the angle error"}
+    band: dict[str, Any] = {
+        "facecolor": MEASURED,
+        "alpha": 0.18,
+        "linewidth": 0.0,
+        "label": "bound of the angle error",
+    }
     axes.fill_between(times, -bounds, bounds, **band)
     _dots(axes, times, 1e3 * (values - _true(trace, "angle")[steps]), "error of the measured angle")
 
@@ -152,32 +180,43 @@ def _sensor(trace: Trace) -> BearingSensor:
 
 
 def _level_errors(row: Sequence[Axes], traces: Sequence[Trace]) -> None:
-    """Give axes of angle errors the same limits: logarithmic beyond the power of ten of the first bound."""
+    """Give axes of angle errors the same limits: logarithmic beyond the power of ten of the first
+    bound.
+    """
     bounds = [np.abs(axes.dataLim.intervaly).max() for axes in row]
     firsts = [1e6 * float(_sensor(trace).error_bound(trace[0].true_range_m[0])) for trace in traces]
-    maximum, first = max(bounds), 10.0 ** np.ceil(np.log10(max(firsts)))
+    maximum = max(bounds)
+    first = 10.0 ** np.ceil(np.log10(max(firsts)))
     for axes in row:
         axes.set_yscale("symlog", linthresh=first)
         axes.set_ylim(-1.3 * maximum, 1.3 * maximum)
 
 
 def _level_moduli(row: Sequence[Axes]) -> None:
-    moduli = np.concatenate([np.asarray(line.get_ydata(), dtype=np.float64) for axes in row for line in axes.lines])
+    moduli = np.concatenate(
+        [np.asarray(line.get_ydata(), dtype=np.float64) for axes in row for line in axes.lines]
+    )
     known = moduli[moduli > 0.0] if moduli.any() else np.ones(1)
     for axes in row:
-        axes.set(yscale="log", ylim=(0.5 * float(np.quantile(known, _MIN_RATE)), 2.0 * float(known.max())))
+        axes.set(
+            yscale="log",
+            ylim=(0.5 * float(np.quantile(known, _MIN_RATE)), 2.0 * float(known.max())),
+        )
 
 
 def _draw_impulse(axes: Axes, trace: Trace, clock: Clock, impulse_m_s: float) -> None:
     record, axis = trace
-    maximum, times = record.scenario.thruster.max_impulse_m_s, clock.at(record)
+    maximum = record.scenario.thruster.max_impulse_m_s
+    times = clock.at(record)
     axes.axhline(0.0, **_ZERO)
     label = f"maximum impulse, {maximum:g} m/s"
     if maximum > 1.2 * impulse_m_s:
         label = f"maximum {maximum:g} m/s, beyond the axis"
     for limit in (-maximum, maximum):
         axes.axhline(limit, label=label, **BOUND)
-    draw_impulses(axes, times, record.impulse_m_s[:, axis], color=IMPULSE, linewidth=0.9, label="impulse")
+    draw_impulses(
+        axes, times, record.impulse_m_s[:, axis], color=IMPULSE, linewidth=0.9, label="impulse"
+    )
 
 
 def draw_predicted_miss(axes: Axes, trace: Trace, clock: Clock) -> None:
@@ -187,12 +226,23 @@ def draw_predicted_miss(axes: Axes, trace: Trace, clock: Clock) -> None:
     known = np.isfinite(lower)
     axes.axhline(0.0, **_ZERO)
     axes.fill_between(
-        times[known], lower[known], upper[known], facecolor=SET_FILL, linewidth=0.0, label="predicted-miss interval"
+        times[known],
+        lower[known],
+        upper[known],
+        facecolor=SET_FILL,
+        linewidth=0.0,
+        label="predicted-miss interval",
     )
     for bound in (lower, upper):
         axes.plot(times[known], bound[known], color=SET_EDGE, linewidth=0.9)
     if clock.counts_down:
-        axes.plot(times, true_predicted_misses(record)[:, axis], color=TRUTH, linewidth=1.0, label="true value")
+        axes.plot(
+            times,
+            true_predicted_misses(record)[:, axis],
+            color=TRUTH,
+            linewidth=1.0,
+            label="true value",
+        )
 
 
 def level_predicted_miss(row: Sequence[Axes]) -> None:
@@ -212,6 +262,7 @@ def _level(row: Sequence[Axes], traces: Sequence[Trace], sensor: str) -> None:
         values += [_true(trace, sensor)[shown], measured[shown[steps]]]
     far = np.concatenate(values)
     margin = 0.12 * float(np.ptp(far)) or 0.1 * float(np.abs(far).max()) or 1.0
-    low, high = float(far.min()) - margin, float(far.max()) + margin
+    low = float(far.min()) - margin
+    high = float(far.max()) + margin
     for axes in row:
         axes.set_ylim(low, high)

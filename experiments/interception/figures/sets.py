@@ -33,23 +33,41 @@ from infoset.sim import Record
 TRUTH_MARK = "true (ω, α)"
 MEASUREMENT_MARK = "measured α, drawn at the true ω"
 SECTIONS_MARK = "sections of the set, the nearest dark"
-_TRUTH: dict[str, Any] = {"marker": "x", "color": INK, "markersize": 7.0, "markeredgewidth": 1.6, "linestyle": "none"}
-_SQUARE: dict[str, Any] = {"marker": "s", "color": INK, "markerfacecolor": "white", "markersize": 5.5}
+_TRUTH: dict[str, Any] = {
+    "marker": "x",
+    "color": INK,
+    "markersize": 7.0,
+    "markeredgewidth": 1.6,
+    "linestyle": "none",
+}
+_SQUARE: dict[str, Any] = {
+    "marker": "s",
+    "color": INK,
+    "markerfacecolor": "white",
+    "markersize": 5.5,
+}
 _SECTIONS = 5
-_RATES, _ANGLES, _SMALL = ("µrad/s", "nrad/s"), ("mrad", "µrad"), 0.1
+_RATES = ("µrad/s", "nrad/s")
+_ANGLES = ("mrad", "µrad")
+_SMALL = 0.1
 """Units of the axes, and the number up to which the second ones are used."""
 _VISIBLE = 0.3
-"""Share of common limits below which a set is too small to see; the planes of a row then have their own limits."""
+"""Share of common limits below which a set is too small to see; the planes of a row then have their
+own limits.
+"""
 _FAR = 1.5
-"""Distance of a measured angle from its set, in heights of the set, from which it is outside the limits."""
+"""Distance of a measured angle from its set, in heights of the set, from which it is outside the
+limits.
+"""
 
 
 @style()
 def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8.0)) -> Figure:
-    """Draw sections of the sets after the measurement: one row per time, one column per record and lateral axis.
+    """Draw sections of the sets after the measurement: one row per time, one column per record and
+    lateral axis.
 
-    At most five sections are drawn, evenly chosen over the range. The planes of a row have the same limits for each
-    lateral axis, unless a set would then be too small to see.
+    At most five sections are drawn, evenly chosen over the range. The planes of a row have the same
+    limits for each lateral axis, unless a set would then be too small to see.
 
     Parameters
     ----------
@@ -60,7 +78,9 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
         raise ValueError("at least one record and one time are needed")
     rows = [planes_at(records, time_s, _SECTIONS) for time_s in times_s]
     columns = len(rows[0])
-    figure, grid = subplots(15.0 + 60.0 * len(rows), len(rows), columns, width_mm=WIDTH_MM if columns > 1 else 100.0)
+    figure, grid = subplots(
+        15.0 + 60.0 * len(rows), len(rows), columns, width_mm=WIDTH_MM if columns > 1 else 100.0
+    )
     for row, planes in zip(grid, rows, strict=True):
         for axes, plane in zip(row, planes, strict=True):
             draw_plane(axes, plane)
@@ -95,33 +115,49 @@ class Plane:
     @property
     def measured_rad(self) -> float | None:
         """The measured angle, if there is one."""
-        return self.record.measured["angle"][self.step, self.axis] if self.record.measures("angle")[self.step] else None
+        return (
+            self.record.measured["angle"][self.step, self.axis]
+            if self.record.measures("angle")[self.step]
+            else None
+        )
 
     @property
     def outlines(self) -> list[Floats]:
         """Vertices of the sections, omega in µrad/s and alpha in mrad."""
-        return [section.omega_alpha[self.axis].polygon() * np.array([1e6, 1e3]) for section in self.chosen]
+        return [
+            section.omega_alpha[self.axis].polygon() * np.array([1e6, 1e3])
+            for section in self.chosen
+        ]
 
     @property
     def true(self) -> Floats:
         """The true omega, µrad/s, and alpha, mrad, shape (2,)."""
         at = (self.step, self.axis)
-        return np.array([self.record.true_rate_rad_s[at] * 1e6, self.record.true_angle_rad[at] * 1e3])
+        return np.array(
+            [self.record.true_rate_rad_s[at] * 1e6, self.record.true_angle_rad[at] * 1e3]
+        )
 
     @property
     def box(self) -> Floats:
-        """The least and the greatest omega and alpha of the set, the true state and a measurement near them, (2, 2)."""
+        """The least and the greatest omega and alpha of the set, the true state and a measurement
+        near them, (2, 2).
+        """
         points = np.vstack([*self.outlines, self.true])
-        low, high = points.min(axis=0), points.max(axis=0)
-        far, angle = _FAR * (high[1] - low[1]), low[1] if self.measured_rad is None else self.measured_rad * 1e3
+        low = points.min(axis=0)
+        high = points.max(axis=0)
+        far = _FAR * (high[1] - low[1])
+        angle = low[1] if self.measured_rad is None else self.measured_rad * 1e3
         if far == 0.0 or low[1] - far <= angle <= high[1] + far:
             low[1], high[1] = min(low[1], angle), max(high[1], angle)
         return np.array([low, high])
 
 
 def planes_at(records: Sequence[Record], time_s: float, sections: int) -> list[Plane]:
-    """Return the planes of each record at its step nearest to a time, with at most so many sections."""
-    planes, clock = [], Clock.of(records)
+    """Return the planes of each record at its step nearest to a time, with at most so many
+    sections.
+    """
+    planes = []
+    clock = Clock.of(records)
     for number, (record, name) in enumerate(zip(records, record_titles(records), strict=True)):
         step = int(np.abs(record.time_s - time_s).argmin())
         chosen = choose_sections(record.sections[step], sections)
@@ -129,7 +165,8 @@ def planes_at(records: Sequence[Record], time_s: float, sections: int) -> list[P
         noise = name.removeprefix(f"({ascii_lowercase[number]}) ") if len(records) > 1 else name
         title = plain(f"{noise},\n{clock.text(record, float(record.time_s[step]))}, {ranges}")
         planes += [
-            Plane(title, noise, record, axis, step, chosen) for axis in range(len(record.scenario.set_model.axes))
+            Plane(title, noise, record, axis, step, chosen)
+            for axis in range(len(record.scenario.set_model.axes))
         ]
     return planes
 
@@ -139,10 +176,15 @@ def _km(section: Section) -> str:
 
 
 def choose_sections(sections: Sequence[Section], most: int) -> list[Section]:
-    """Return at most `most` sections in their order, evenly distributed over the range, with the first and the last."""
+    """Return at most `most` sections in their order, evenly distributed over the range, with the
+    first and the last.
+    """
     if len(sections) <= most:
         return list(sections)
-    return [sections[index] for index in evenly(np.array([section.range_m for section in sections]), most)]
+    return [
+        sections[index]
+        for index in evenly(np.array([section.range_m for section in sections]), most)
+    ]
 
 
 def draw_plane(axes: Axes, plane: Plane) -> None:
@@ -156,10 +198,13 @@ def draw_plane(axes: Axes, plane: Plane) -> None:
 
 
 def _shade_allowed(axes: Axes, plane: Plane) -> None:
-    """Shade the angles that the measurement allows at the nearest and the farthest drawn section."""
+    """Shade the angles that the measurement allows at the nearest and the farthest drawn
+    section.
+    """
     if plane.measured_rad is None or not plane.chosen:
         return
-    sensor, label = plane.record.scenario.set_model.axis(plane.name).angle_sensor, "angles allowed by the measurement"
+    sensor = plane.record.scenario.set_model.axis(plane.name).angle_sensor
+    label = "angles allowed by the measurement"
     for section in (plane.chosen[0], plane.chosen[-1]):
         error = float(sensor.error_bound(section.range_m))
         low, high = ((plane.measured_rad + sign * error) * 1e3 for sign in (-1.0, 1.0))
@@ -169,28 +214,47 @@ def _shade_allowed(axes: Axes, plane: Plane) -> None:
 def _draw_outline(axes: Axes, outline: Floats, colour: Floats, zorder: float) -> None:
     """Draw a section; a point becomes a dot and a segment a thick line with dots at its ends."""
     if len(outline) > 2:
-        look: dict[str, Any] = {"edgecolor": colour, "linewidth": 1.1, "joinstyle": "round", "zorder": zorder}
-        axes.add_patch(Polygon(outline.tolist(), facecolor=(*colour[:3], 0.05), label=SECTIONS_MARK, **look))
+        look: dict[str, Any] = {
+            "edgecolor": colour,
+            "linewidth": 1.1,
+            "joinstyle": "round",
+            "zorder": zorder,
+        }
+        axes.add_patch(
+            Polygon(outline.tolist(), facecolor=(*colour[:3], 0.05), label=SECTIONS_MARK, **look)
+        )
     elif len(outline):
-        dots: dict[str, Any] = {"linewidth": 2.0, "marker": "o", "markersize": 4.0, "label": SECTIONS_MARK}
+        dots: dict[str, Any] = {
+            "linewidth": 2.0,
+            "marker": "o",
+            "markersize": 4.0,
+            "label": SECTIONS_MARK,
+        }
         axes.plot(*outline.T, color=colour, zorder=zorder + 1.0, **dots)
 
 
 def level_planes(row: Sequence[Axes], planes: Sequence[Plane]) -> None:
     """Set the limits of planes, and draw the measurements within them.
 
-    The planes of a lateral axis have the same limits, or their own if a set would then be too small to see.
+    The planes of a lateral axis have the same limits, or their own if a set would then be too small
+    to see.
     """
     for axis in {plane.axis for plane in planes}:
-        same = [(axes, plane) for axes, plane in zip(row, planes, strict=True) if plane.axis == axis]
+        same = [
+            (axes, plane) for axes, plane in zip(row, planes, strict=True) if plane.axis == axis
+        ]
         boxes = np.array([plane.box for _, plane in same])
-        low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+        low = boxes[:, 0].min(axis=0)
+        high = boxes[:, 1].max(axis=0)
         if (boxes[:, 1] - boxes[:, 0] >= _VISIBLE * (high - low)).all():
             boxes[:] = low, high
         for (axes, plane), (low, high) in zip(same, boxes, strict=True):
             margin = 0.07 * (high - low)
             margin = np.where(margin > 0.0, margin, np.maximum(0.05 * np.abs(high), 1e-6))
-            axes.set(xlim=(low[0] - margin[0], high[0] + margin[0]), ylim=(low[1] - margin[1], high[1] + margin[1]))
+            axes.set(
+                xlim=(low[0] - margin[0], high[0] + margin[0]),
+                ylim=(low[1] - margin[1], high[1] + margin[1]),
+            )
             axes.locator_params("x", nbins=3)
             axes.locator_params("y", nbins=4)
             _name_units(axes)
@@ -199,7 +263,10 @@ def level_planes(row: Sequence[Axes], planes: Sequence[Plane]) -> None:
 
 def _name_units(axes: Axes) -> None:
     """Write the numbers of both axes, in a smaller unit if they are small."""
-    for one, limits, units in ((axes.xaxis, axes.get_xlim(), _RATES), (axes.yaxis, axes.get_ylim(), _ANGLES)):
+    for one, limits, units in (
+        (axes.xaxis, axes.get_xlim(), _RATES),
+        (axes.yaxis, axes.get_ylim(), _ANGLES),
+    ):
         is_small = float(np.abs(limits).max()) <= _SMALL
         one.set_major_formatter(partial(_number, factor=1e3 if is_small else 1.0))
         one.set_label_text(one.get_label_text().replace(units[0], units[is_small]))
@@ -213,5 +280,10 @@ def _draw_measurement(axes: Axes, plane: Plane) -> None:
     """Draw the measured angle as a square, which is not seen if it is far from the set."""
     if plane.measured_rad is not None:
         axes.plot(
-            plane.true[0], plane.measured_rad * 1e3, zorder=5, label=MEASUREMENT_MARK, linestyle="none", **_SQUARE
+            plane.true[0],
+            plane.measured_rad * 1e3,
+            zorder=5,
+            label=MEASUREMENT_MARK,
+            linestyle="none",
+            **_SQUARE,
         )

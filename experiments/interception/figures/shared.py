@@ -1,4 +1,6 @@
-"""What figures of the interception share: lines of levels, the time before the arrival, and its events."""
+"""What figures of the interception share: lines of levels, the time before the arrival, and its
+events.
+"""
 
 from __future__ import annotations
 
@@ -27,11 +29,15 @@ _MORE_TICKS_S = (0.1, 10.0, 10.0 * SECONDS["min"], 6.0 * SECONDS["h"], 10.0 * SE
 _LONG = 1000.0
 """Ratio of the first and the last time from which a flight is long."""
 _MIN_DISC = 0.02
-"""Share of the axes below which the disc of a body is not drawn: it would be hidden by the mark of its centre."""
+"""Share of the axes below which the disc of a body is not drawn: it would be hidden by the mark of
+its centre.
+"""
 
 
 def draw_levels(axes: Axes, guaranteed_m: float | None, radius_m: float | None) -> None:
-    """Draw the guaranteed miss and the radius of the body, if they are known, as horizontal lines."""
+    """Draw the guaranteed miss and the radius of the body, if they are known, as horizontal
+    lines.
+    """
     if guaranteed_m:
         axes.axhline(guaranteed_m, label="guaranteed miss Φ", **GUARANTEE)
     if radius_m:
@@ -39,23 +45,49 @@ def draw_levels(axes: Axes, guaranteed_m: float | None, radius_m: float | None) 
 
 
 def draw_end(axes: Axes, time_s: float, miss_m: float, scenario: Scenario) -> None:
-    """Mark the end of the possible miss: from there on the set is not complete (see `complete_steps`)."""
+    """Mark the end of the possible miss: from there on the set is not complete (see
+    `complete_steps`).
+    """
     label = f"end: nearest range in the set {scenario.set_model.range_threshold_m / 1e3:g} km"
-    axes.plot(time_s, miss_m, marker="D", markersize=4.0, color=INK, linestyle="none", zorder=4.0, label=label)
+    axes.plot(
+        time_s,
+        miss_m,
+        marker="D",
+        markersize=4.0,
+        color=INK,
+        linestyle="none",
+        zorder=4.0,
+        label=label,
+    )
 
 
-def draw_body(axes: Axes, half_m: float, guaranteed_m: float | None, radius_m: float | None) -> None:
-    """Draw the B-plane of axes that extend by `half_m` around the centre of the body: disc, guaranteed miss, labels."""
+def draw_body(
+    axes: Axes, half_m: float, guaranteed_m: float | None, radius_m: float | None
+) -> None:
+    """Draw the B-plane of axes that extend by `half_m` around the centre of the body: disc,
+    guaranteed miss, labels.
+    """
     if radius_m is not None and radius_m >= _MIN_DISC * half_m:
         label = f"body radius, {radius_m:g} m{': beyond the axes' if radius_m > half_m else ''}"
         fill = axes.fill(*ring(radius_m), facecolor=BODY_FILL, zorder=0.6, label=label)
         fill[0].set(edgecolor=INK, linestyle=RADIUS["linestyle"])
     if guaranteed_m is not None and guaranteed_m <= half_m:
         axes.plot(*ring(guaranteed_m), label="guaranteed miss Φ", zorder=3.1, **GUARANTEE)
-    centre: dict[str, Any] = {"color": INK, "marker": "+", "markersize": 7.0, "linestyle": "none", "zorder": 4.0}
+    centre: dict[str, Any] = {
+        "color": INK,
+        "marker": "+",
+        "markersize": 7.0,
+        "linestyle": "none",
+        "zorder": 4.0,
+    }
     axes.plot(0.0, 0.0, markeredgewidth=1.1, label="centre of the body", **centre)
     unit, per_m = length_unit(half_m)
-    axes.set(xlim=(-half_m, half_m), ylim=(-half_m, half_m), aspect="equal", xlabel=f"miss along y, {unit}")
+    axes.set(
+        xlim=(-half_m, half_m),
+        ylim=(-half_m, half_m),
+        aspect="equal",
+        xlabel=f"miss along y, {unit}",
+    )
     axes.set_ylabel(f"miss along z, {unit}")
     for one in (axes.xaxis, axes.yaxis):
         one.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 5, 10]))
@@ -75,12 +107,16 @@ def draw_impulses(axes: Axes, times: Any, sizes: Any, **look: Any) -> None:
 
 
 def count_down(column: Sequence[Axes], scenario: Scenario) -> None:
-    """Make the time axis of axes above each other logarithmic in the time before the arrival; draw the schedule."""
-    begin_s, end_s = scenario.nominal_arrival_s, min_to_go_s(scenario)
+    """Make the time axis of axes above each other logarithmic in the time before the arrival; draw
+    the schedule.
+    """
+    begin_s = scenario.nominal_arrival_s
+    end_s = min_to_go_s(scenario)
     ticks = [tick for tick in _TICKS_S if end_s <= tick <= begin_s]
     more = [tick for tick in _MORE_TICKS_S if end_s <= tick <= begin_s]
     if begin_s < _LONG * end_s:
-        ticks, more = [*ticks, *more], []
+        ticks = [*ticks, *more]
+        more = []
     for axes in column:
         axes.set_xscale("log")
         axes.set_xlim(1.1 * begin_s, end_s)
@@ -94,10 +130,17 @@ def count_down(column: Sequence[Axes], scenario: Scenario) -> None:
 
 
 def name_events(axes: Axes, scenario: Scenario) -> None:
-    """Write the names of the times of the schedule along their lines, in turn to the left and to the right."""
-    for number, (name, time_s) in enumerate(sorted(marks(scenario).items(), key=lambda item: -item[1])):
+    """Write the names of the times of the schedule along their lines, in turn to the left and to
+    the right.
+    """
+    for number, (name, time_s) in enumerate(
+        sorted(marks(scenario).items(), key=lambda item: -item[1])
+    ):
         side, offset = (("right", -2.0), ("left", 2.0))[number % 2]
-        place: dict[str, Any] = {"xycoords": axes.get_xaxis_transform(), "textcoords": "offset points"}
+        place: dict[str, Any] = {
+            "xycoords": axes.get_xaxis_transform(),
+            "textcoords": "offset points",
+        }
         axes.annotate(
             f"{name}, {duration_text(time_s)}", (time_s, 0.97), xytext=(offset, 0.0), rotation=90.0, ha=side, va="top",
             fontsize="small", path_effects=HALO, zorder=5.0, **place,

@@ -8,10 +8,24 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset.experiments.common.screen import Part, RowByRow, figure_files, number, number_table, parts_of, show
+from infoset.experiments.common.screen import (
+    Part,
+    RowByRow,
+    figure_files,
+    number,
+    number_table,
+    parts_of,
+    show,
+)
 from infoset.experiments.common.units import M_PER_KM
 from infoset.experiments.interception.command import Bound
-from infoset.experiments.interception.runs.shared import Progress, WorstMisses, find_worst_misses, need_finite, work_of
+from infoset.experiments.interception.runs.shared import (
+    Progress,
+    WorstMisses,
+    find_worst_misses,
+    need_finite,
+    work_of,
+)
 from infoset.experiments.interception.scenario_file import study_scenario
 from infoset.experiments.interception.strategies import chosen_strategies
 from infoset.experiments.interception.study import max_guarantee_m
@@ -36,7 +50,9 @@ STRATEGY_TITLES = (
 
 @dataclass(frozen=True)
 class WorstOfStrategy:
-    """Simulations of one strategy: the pairs of the bound, and the worst engagements of the searches."""
+    """Simulations of one strategy: the pairs of the bound, and the worst engagements of the
+    searches.
+    """
 
     name: str
     flights: tuple[tuple[TruthPair, PairFlight], ...]
@@ -46,7 +62,12 @@ class WorstOfStrategy:
     @property
     def results(self) -> Results:
         """Results of all simulations."""
-        return join([*(flight.results for _, flight in self.flights), *(record.result for record in self.records)])
+        return join(
+            [
+                *(flight.results for _, flight in self.flights),
+                *(record.result for record in self.records),
+            ]
+        )
 
     @property
     def pairs_m(self) -> float:
@@ -60,13 +81,21 @@ class WorstOfStrategy:
 
     @property
     def set_kept_m(self) -> float | None:
-        """Maximum miss of the engagements whose set never became empty, m; None if there is none."""
+        """Maximum miss of the engagements whose set never became empty, m; None if there is
+        none.
+        """
         results = self.results
         return max(results.miss_m[~results.set_emptied].tolist(), default=None)
 
     def over(self, lower: LowerBound) -> float | None:
-        """Return the maximum miss with the set never empty, divided by the bound; None if one of them is missing."""
-        return self.set_kept_m / lower.bound_m if lower.bound_m > 0.0 and self.set_kept_m is not None else None
+        """Return the maximum miss with the set never empty, divided by the bound; None if one of
+        them is missing.
+        """
+        return (
+            self.set_kept_m / lower.bound_m
+            if lower.bound_m > 0.0 and self.set_kept_m is not None
+            else None
+        )
 
 
 def run(options: Bound) -> None:
@@ -79,9 +108,15 @@ def run(options: Bound) -> None:
         nominal = _nominal(scenario)
         quiet = options.quiet or work.written.stdout_taken
         show(_bound_parts(scenario, lower, nominal), quiet)
-        worst = _worst_of_strategies(scenario, lower, strategies, options, work.begin("strategies"), quiet)
+        worst = _worst_of_strategies(
+            scenario, lower, strategies, options, work.begin("strategies"), quiet
+        )
         (reserve, reasons), best = _value(scenario, lower), _best(worst)
-        parts_m = {} if reserve is None else {name.removesuffix("_m"): part for name, part in asdict(reserve).items()}
+        parts_m = (
+            {}
+            if reserve is None
+            else {name.removesuffix("_m"): part for name, part in asdict(reserve).items()}
+        )
         value = {
             "at_least_m": lower.bound_m,
             "at_most_m": reserve and lower.bound_m + reserve.total_m,
@@ -96,7 +131,13 @@ def run(options: Bound) -> None:
 
             worst_m = {strategy.name: strategy.worst_m for strategy in worst}
             work.written.figure(FIGURE, draw_bound(scenario, lower, worst_m))
-    show([*_value_lines(lower.bound_m, reserve, reasons, best), *_notes(scenario, lower, options, worst)], quiet)
+    show(
+        [
+            *_value_lines(lower.bound_m, reserve, reasons, best),
+            *_notes(scenario, lower, options, worst),
+        ],
+        quiet,
+    )
 
 
 def _worst_of_strategies(
@@ -116,7 +157,12 @@ def _worst_of_strategies(
     for (name, own), report in zip(strategies.items(), reports, strict=True):
         strategy = _simulate(scenario, lower, name, own, options, report)
         searched = strategy.searched.misses().values()
-        values = (strategy.pairs_m, *searched, strategy.over(lower), max_guarantee_m(strategy.results))
+        values = (
+            strategy.pairs_m,
+            *searched,
+            strategy.over(lower),
+            max_guarantee_m(strategy.results),
+        )
         rows.add(name, *map(number, values))
         worst.append(strategy)
     show([""], quiet)
@@ -124,7 +170,12 @@ def _worst_of_strategies(
 
 
 def _simulate(
-    scenario: Scenario, lower: LowerBound, name: str, own: Strategy | None, options: Bound, report: Progress
+    scenario: Scenario,
+    lower: LowerBound,
+    name: str,
+    own: Strategy | None,
+    options: Bound,
+    report: Progress,
 ) -> WorstOfStrategy:
     flown = scenario if own is not None else replace(scenario, strategy=name)
     flights = [(pair, fly_pair(flown, pair, own)) for pair in lower.pairs]
@@ -132,17 +183,23 @@ def _simulate(
         need_finite(flight.results)
     searched = WorstMisses(None, None)
     if options.budget > 0:
-        searched = find_worst_misses(flown, own, budget=options.budget, seed=options.seed, begin=lambda _name: report)
+        searched = find_worst_misses(
+            flown, own, budget=options.budget, seed=options.seed, begin=lambda _name: report
+        )
     report(1.0)
     records = tuple(engagement.record(own) for engagement in searched.engagements)
     return WorstOfStrategy(name, tuple(flights), searched, records)
 
 
 def _nominal(scenario: Scenario) -> TruthPair:
-    """Return the best pair at the nominal range and closing speed, or at the possible ones nearest to them."""
+    """Return the best pair at the nominal range and closing speed, or at the possible ones nearest
+    to them.
+    """
     box = scenario.set_model.bounds
     label_m = float(np.clip(scenario.nominal_range_m, *box.x_m))
-    return pair_at(scenario, label_m, float(np.clip(-scenario.set_model.closing_speed_m_s, *box.vx_m_s)))
+    return pair_at(
+        scenario, label_m, float(np.clip(-scenario.set_model.closing_speed_m_s, *box.vx_m_s))
+    )
 
 
 def _summary(
@@ -152,7 +209,11 @@ def _summary(
     return {
         "disturbance_m_s2": {axis: model.axis(axis).disturbance_m_s2 for axis in model.axes},
         "lower_bound_m": lower.bound_m,
-        **({} if scenario.radius_m is None else {"hit_cannot_be_guaranteed": lower.bound_m > scenario.radius_m}),
+        **(
+            {}
+            if scenario.radius_m is None
+            else {"hit_cannot_be_guaranteed": lower.bound_m > scenario.radius_m}
+        ),
         "reached_at": _where(lower.pair, scenario),
         "at_nominal_range": {**_where(nominal, scenario), "bound_m": nominal.bound_m},
         "by_label": [
@@ -205,7 +266,10 @@ def _where(pair: TruthPair, scenario: Scenario) -> dict[str, object]:
 
 def _by_axis(quantity: str, values_m: NDArray[np.float64], scenario: Scenario) -> dict[str, object]:
     """Return values by lateral axis, m, with the names of their keys."""
-    return {f"{quantity}_{axis}_m": values_m[index].tolist() for index, axis in enumerate(scenario.set_model.axes)}
+    return {
+        f"{quantity}_{axis}_m": values_m[index].tolist()
+        for index, axis in enumerate(scenario.set_model.axes)
+    }
 
 
 def _equal_until_s(pair: TruthPair, scenario: Scenario) -> float:
@@ -214,7 +278,9 @@ def _equal_until_s(pair: TruthPair, scenario: Scenario) -> float:
 
 
 def _value(scenario: Scenario, lower: LowerBound) -> tuple[ValueReserve | None, tuple[str, ...]]:
-    """Return how much greater than the bound the value of the game can be, or None and why this is not proved."""
+    """Return how much greater than the bound the value of the game can be, or None and why this is
+    not proved.
+    """
     reasons = why_no_value(scenario)
     reserve = None if reasons else value_reserve(scenario, lower)
     return (None, (reserve,)) if isinstance(reserve, str) else (reserve, reasons)
@@ -227,26 +293,40 @@ def _best(worst: Sequence[WorstOfStrategy]) -> WorstOfStrategy | None:
 
 
 def _value_lines(
-    lower_m: float, reserve: ValueReserve | None, reasons: Sequence[str], best: WorstOfStrategy | None
+    lower_m: float,
+    reserve: ValueReserve | None,
+    reasons: Sequence[str],
+    best: WorstOfStrategy | None,
 ) -> Iterator[str]:
     if reserve is not None:
         parts = ", ".join(
-            f"{name.removesuffix('_m').replace('_', ' ')} {number(part)}" for name, part in asdict(reserve).items()
+            f"{name.removesuffix('_m').replace('_', ' ')} {number(part)}"
+            for name, part in asdict(reserve).items()
         )
         yield (
-            f"the bound is the value of the game up to a reserve of {number(reserve.total_m)} m: no strategy "
-            f"guarantees less than {number(lower_m)} m, and symmetric-miss guarantees at most the reserve more"
+            f"the bound is the value of the game up to a reserve of {number(reserve.total_m)} m: "
+            f"no strategy guarantees less than {number(lower_m)} m, and symmetric-miss guarantees "
+            "at most the reserve more"
         )
         yield f"reserve, m: {parts}"
         return
-    found = f"; minimum of the maximum misses found: {number(best.worst_m)} m, of {best.name}" if best else ""
+    found = (
+        f"; minimum of the maximum misses found: {number(best.worst_m)} m, of {best.name}"
+        if best
+        else ""
+    )
     yield f"the value of the game is at least {number(lower_m)} m{found}"
     yield f"no upper end is proved, because of: {', '.join(reasons)}"
 
 
 def _bound_parts(scenario: Scenario, lower: LowerBound, nominal: TruthPair) -> Iterator[Part]:
     model = scenario.set_model
-    titles = ("closing speed\nkm/s", "bound\nm", "range at t = 0\nkm", "equal measurements until\ns before arrival")
+    titles = (
+        "closing speed\nkm/s",
+        "bound\nm",
+        "range at t = 0\nkm",
+        "equal measurements until\ns before arrival",
+    )
     bounds = number_table(*titles)
     for pair in lower.pairs:
         bounds.add_row(
@@ -256,7 +336,10 @@ def _bound_parts(scenario: Scenario, lower: LowerBound, nominal: TruthPair) -> I
             "one motion" if pair.is_single else f"{_equal_until_s(pair, scenario):.2f}",
         )
     bound_m = number(lower.bound_m)
-    yield f"{scenario.name}, model {model.model.value}: no strategy can guarantee a miss below {bound_m} m"
+    yield (
+        f"{scenario.name}, model {model.model.value}: no strategy can guarantee a miss below "
+        f"{bound_m} m"
+    )
     if scenario.radius_m is not None:
         body = f"the body of radius {scenario.radius_m:g} m"
         if lower.bound_m > scenario.radius_m:
@@ -264,8 +347,8 @@ def _bound_parts(scenario: Scenario, lower: LowerBound, nominal: TruthPair) -> I
         else:
             yield f"this does not exclude a strategy that guarantees a hit of {body}"
     yield (
-        f"at the range {nominal.label_m / M_PER_KM:.1f} km and closing speed {-nominal.vx_m_s / M_PER_KM:g} km/s, the "
-        f"nominal ones: {number(nominal.bound_m)} m"
+        f"at the range {nominal.label_m / M_PER_KM:.1f} km and closing speed "
+        f"{-nominal.vx_m_s / M_PER_KM:g} km/s, the nominal ones: {number(nominal.bound_m)} m"
     )
     for axis in model.axes:
         maximum = model.axis(axis).disturbance_m_s2
@@ -273,16 +356,30 @@ def _bound_parts(scenario: Scenario, lower: LowerBound, nominal: TruthPair) -> I
     yield from (bounds, "")
 
 
-def _notes(scenario: Scenario, lower: LowerBound, options: Bound, worst: Sequence[WorstOfStrategy]) -> Iterator[str]:
+def _notes(
+    scenario: Scenario, lower: LowerBound, options: Bound, worst: Sequence[WorstOfStrategy]
+) -> Iterator[str]:
     if any(strategy.results.set_emptied.any() for strategy in worst):
         hint = "" if scenario.set_model.is_guaranteed else "; try --model guaranteed"
-        yield f"in some engagements a measurement contradicted all states of the set, which became empty{hint}"
+        yield (
+            "in some engagements a measurement contradicted all states of the set, which became "
+            f"empty{hint}"
+        )
     if any(pair.is_single for pair in lower.pairs):
-        yield "one motion: a start that all impulses together do not bring nearer, whatever is measured"
+        yield (
+            "one motion: a start that all impulses together do not bring nearer, whatever is "
+            "measured"
+        )
     if not worst:
         return
     yield "pairs: maximum miss of the states that prove the bound"
-    search = f"maximum misses found by `infoset adversary --objective fixed-truth --budget {options.budget}`"
+    search = (
+        "maximum misses found by `infoset adversary --objective fixed-truth --budget "
+        f"{options.budget}`"
+    )
     yield f"set never empty, also empty: {search if options.budget else 'not searched'}"
-    yield "miss / bound: maximum miss of pairs and search, without sets that became empty, divided by the bound"
+    yield (
+        "miss / bound: maximum miss of pairs and search, without sets that became empty, divided "
+        "by the bound"
+    )
     yield "guaranteed: maximum bound Phi on the miss, computed during these engagements"

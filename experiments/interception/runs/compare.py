@@ -47,13 +47,24 @@ NEAR = 0.1
 """Relative difference of quantiles up to which strategies count as equally good."""
 TIES = "for each run, the worst of the four tie rules"
 ACROSS = ("miss_y_m", "miss_z_m", "b_dot_t_m", "b_dot_r_m")
-COLUMNS = ("run", "miss_m", "impulse_m_s", "outcome", "truth_kept", "set_emptied", "hit", "cause", *ACROSS)
+COLUMNS = (
+    "run",
+    "miss_m",
+    "impulse_m_s",
+    "outcome",
+    "truth_kept",
+    "set_emptied",
+    "hit",
+    "cause",
+    *ACROSS,
+)
 
 
 def run(options: Compare) -> None:
     """Simulate the strategies, write the files and print the table."""
     scenario, notes = study_scenario(options)
-    strategies, noises = chosen_strategies(scenario, options.strategies), chosen_noises(options.noise)
+    strategies = chosen_strategies(scenario, options.strategies)
+    noises = chosen_noises(options.noise)
     figures = [FIGURE, *b_plane_figures(scenario, noises)]
     with work_of(options, scenario, ["results.csv", *figure_files(*figures)], notes=notes) as work:
         wanted = compared_scenarios(scenario, strategies, noises)
@@ -86,7 +97,9 @@ def run(options: Compare) -> None:
 
 
 def _summary(comparison: Comparison) -> dict[str, object]:
-    outcomes = Counter(outcome.value for results in comparison.results.values() for outcome in results.outcomes)
+    outcomes = Counter(
+        outcome.value for results in comparison.results.values() for outcome in results.outcomes
+    )
     phi_held = comparison.worst("phi_held")
     return {
         "name": comparison.strategy,
@@ -97,7 +110,10 @@ def _summary(comparison: Comparison) -> dict[str, object]:
         "phi_held": int(phi_held.sum()) if phi_held.count() else None,
         "outcomes": dict(outcomes),
         "ties": {
-            tie.value: {"miss_m": summary(results.miss_m), "impulse_m_s": summary(results.impulse_m_s)}
+            tie.value: {
+                "miss_m": summary(results.miss_m),
+                "impulse_m_s": summary(results.impulse_m_s),
+            }
             for tie, results in comparison.results.items()
             if tie is not None
         },
@@ -106,13 +122,19 @@ def _summary(comparison: Comparison) -> dict[str, object]:
 
 def _csv(compared: Sequence[Comparison]) -> str:
     rows: list[list[Cell]] = []
-    (known,) = {tuple(results.to_dict()) for comparison in compared for results in comparison.results.values()}
+    (known,) = {
+        tuple(results.to_dict())
+        for comparison in compared
+        for results in comparison.results.values()
+    }
     names = [name for name in COLUMNS if name in known]
     for comparison in compared:
         for tie, results in comparison.results.items():
             columns = results.to_dict()
             head = [comparison.strategy, comparison.noise, None if tie is None else tie.value]
-            rows += [[*head, *values] for values in zip(*(columns[name] for name in names), strict=True)]
+            rows += [
+                [*head, *values] for values in zip(*(columns[name] for name in names), strict=True)
+            ]
     return csv_text(("strategy", "noise", "tie", *names), rows)
 
 
@@ -127,12 +149,21 @@ def _parts(scenario: Scenario, compared: Sequence[Comparison]) -> Iterator[Part]
     for comparison in sorted(compared, key=lambda each: noises.index(each.noise)):
         head = (comparison.noise, comparison.strategy)
         table.add_row(*head, "miss, m", *map(number, summary(comparison.worst("miss_m")).values()))
-        table.add_row("", "", "impulse, m/s", *map(number, summary(comparison.worst("impulse_m_s")).values()))
-        counts, hits = set_counts(*map(comparison.worst, ("truth_kept", "set_emptied"))), comparison.hits
+        table.add_row(
+            "", "", "impulse, m/s", *map(number, summary(comparison.worst("impulse_m_s")).values())
+        )
+        counts = set_counts(*map(comparison.worst, ("truth_kept", "set_emptied")))
+        hits = comparison.hits
         total += counts
-        shares = [f"{count} ({percent(count / counts.runs)})" for count in (counts.truth_kept, counts.set_emptied)]
+        shares = [
+            f"{count} ({percent(count / counts.runs)})"
+            for count in (counts.truth_kept, counts.set_emptied)
+        ]
         if hits is not None:
-            shares += [f"{hits.hits} ({percent(hits.probability)})", f"{percent(hits.lower)} to {percent(hits.upper)}"]
+            shares += [
+                f"{hits.hits} ({percent(hits.probability)})",
+                f"{percent(hits.lower)} to {percent(hits.upper)}",
+            ]
         sets.add_row(*head, *shares)
     runs = len(compared[0].worst("miss_m"))
     ties = f"; game noise: {TIES}" if NoiseKind.GAME.value in noises else ""
@@ -143,7 +174,11 @@ def _parts(scenario: Scenario, compared: Sequence[Comparison]) -> Iterator[Part]
         if comparison.hits is not None and (causes := miss_text(comparison.missed, runs, scenario)):
             yield f"{comparison.noise} noise, {comparison.strategy}: {causes}"
     if len(noises) > 1:
-        yield from ("", "what depends on the noise, 90 % quantile of the miss, m:", _by_noise(compared, noises))
+        yield from (
+            "",
+            "what depends on the noise, 90 % quantile of the miss, m:",
+            _by_noise(compared, noises),
+        )
         yield _best(compared, noises)
     yield from noise_notes(scenario, noises, TIES)
     yield from quantile_notes(runs, [*QUANTILES.values()])
@@ -151,10 +186,14 @@ def _parts(scenario: Scenario, compared: Sequence[Comparison]) -> Iterator[Part]
 
 
 def _by_noise(compared: Sequence[Comparison], noises: Sequence[str]) -> Table:
-    """Return a table of the 90 % quantile of the miss by strategy and noise, with the ratio of its extremes."""
+    """Return a table of the 90 % quantile of the miss by strategy and noise, with the ratio of its
+    extremes.
+    """
     table = number_table("strategy", *noises, "maximum / minimum")
     for name in dict.fromkeys(comparison.strategy for comparison in compared):
-        values = [summary(each.worst("miss_m"))["p90"] for each in compared if each.strategy == name]
+        values = [
+            summary(each.worst("miss_m"))["p90"] for each in compared if each.strategy == name
+        ]
         known = [value for value in values if value is not None]
         ratio = max(known) / min(known) if known and min(known) > 0.0 else None
         table.add_row(name, *map(number, (*values, ratio)))
@@ -162,11 +201,21 @@ def _by_noise(compared: Sequence[Comparison], noises: Sequence[str]) -> Table:
 
 
 def _best(compared: Sequence[Comparison], noises: Sequence[str]) -> str:
-    """Return a line with the strategies whose 90 % quantile of the miss is near the least one, for each noise."""
+    """Return a line with the strategies whose 90 % quantile of the miss is near the least one, for
+    each noise.
+    """
     near = {}
     for noise in noises:
-        quantiles = {each.strategy: np.quantile(each.worst("miss_m"), 0.9) for each in compared if each.noise == noise}
-        near[noise] = [name for name, value in quantiles.items() if value <= (1.0 + NEAR) * min(quantiles.values())]
+        quantiles = {
+            each.strategy: np.quantile(each.worst("miss_m"), 0.9)
+            for each in compared
+            if each.noise == noise
+        }
+        near[noise] = [
+            name
+            for name, value in quantiles.items()
+            if value <= (1.0 + NEAR) * min(quantiles.values())
+        ]
     always = [name for name in near[noises[0]] if all(name in names for names in near.values())]
     within = f"within {NEAR:.0%} of the least in these runs"
     if always:

@@ -44,15 +44,28 @@ def run(options: Engage) -> None:
         scenario = replace(scenario, noise=NoiseKind(chosen))
     files = {f"--record of {noise}": options.record for noise in noises}
     if both and (file := options.record) is not None:
-        files = {f"--record of {noise}": file.with_name(f"{file.stem}-{noise}{file.suffix}") for noise in noises}
-    names = ["steps.csv", *(f"record-{noise}.npz" for noise in noises), *figure_files(*engagement_figures(scenario))]
+        files = {
+            f"--record of {noise}": file.with_name(f"{file.stem}-{noise}{file.suffix}")
+            for noise in noises
+        }
+    names = [
+        "steps.csv",
+        *(f"record-{noise}.npz" for noise in noises),
+        *figure_files(*engagement_figures(scenario)),
+    ]
     with work_of(options, scenario, names, files) as work:
-        records, summaries = [], {}
+        records = []
+        summaries = {}
         for noise in noises:
             began_s = perf_counter()
             progress = work.begin(f"{noise} noise")
             record = fly_one(
-                scenario, options.run, seed=options.seed, strategy=own, noise=wanted[noise], progress=progress
+                scenario,
+                options.run,
+                seed=options.seed,
+                strategy=own,
+                noise=wanted[noise],
+                progress=progress,
             )
             need_finite(record.result)
             records.append(record)
@@ -66,8 +79,13 @@ def run(options: Engage) -> None:
 
 
 def _summary(record: Record, elapsed_s: float) -> dict[str, object]:
-    scenario, first = record.scenario, record.inconsistency
-    contradiction = first and {"step": first.step, "time_s": float(record.time_s[first.step]), "label_m": first.label_m}
+    scenario = record.scenario
+    first = record.inconsistency
+    contradiction = first and {
+        "step": first.step,
+        "time_s": float(record.time_s[first.step]),
+        "label_m": first.label_m,
+    }
     published = {}
     if is_of_paper(scenario):
         is_game = record.noise_name == NoiseKind.GAME.value
@@ -88,7 +106,9 @@ def _summary(record: Record, elapsed_s: float) -> dict[str, object]:
 
 
 def steps_csv(records: Sequence[Record]) -> str:
-    """Return a line for each step of engagements of one scenario, as CSV; columns name the lateral axis."""
+    """Return a line for each step of engagements of one scenario, as CSV; columns name the lateral
+    axis.
+    """
     rows = [{"noise": record.noise_name, **row} for record in records for row in _step_rows(record)]
     return csv_text([*rows[0]], [[*row.values()] for row in rows])
 
@@ -115,7 +135,10 @@ def _step_rows(record: Record) -> list[dict[str, Cell]]:
     return [
         {
             "step": step,
-            **{name: None if np.isnan(values[step]) else float(values[step]) for name, values in columns.items()},
+            **{
+                name: None if np.isnan(values[step]) else float(values[step])
+                for name, values in columns.items()
+            },
             "sections": len(record.sections[step]),
         }
         for step in range(record.steps)

@@ -17,8 +17,9 @@ FIGURES_OF_PAPER = ("figure-2-process", "figure-3-sets", "figure-approach")
 
 
 PRINTED_NOTE = (
-    "the paper prints impulses of one run with each noise, from z = -8 km and without a range sensor; "
-    "docs/interception.md says which variants were tried, and that the difference to ours is not explained"
+    "the paper prints impulses of one run with each noise, from z = -8 km and without a range "
+    "sensor; docs/interception.md says which variants were tried, and that the difference to ours "
+    "is not explained"
 )
 
 
@@ -28,10 +29,14 @@ def engagement_figures(scenario: Scenario) -> Sequence[str]:
 
 
 def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
-    """Yield the results of engagements side by side, with the paper's for its scenario, for the screen."""
+    """Yield the results of engagements side by side, with the paper's for its scenario, for the
+    screen.
+    """
     bounds = sorted({bound_name(record.scenario).removesuffix(", m") for record in records})
     lateral = sorted({axis for record in records for axis in record.scenario.set_model.axes})
-    printed = printed_single_runs() if any(is_of_paper(record.scenario) for record in records) else {}
+    printed = (
+        printed_single_runs() if any(is_of_paper(record.scenario) for record in records) else {}
+    )
     columns: list[tuple[str, dict[str, str]]] = []
     for record in records:
         result = {name: values[0] for name, values in record.result.to_dict().items()}
@@ -44,7 +49,9 @@ def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
             f"{' / '.join(bounds)}, m": number(result["guaranteed_miss_m"]),
             "outcome": _outcome(record),
             "true state inside the set\nat every step": _yes(result["truth_kept"]),
-            "smallest distance from the true\nstate to the set's boundary, m": number(result["truth_margin_m"]),
+            "smallest distance from the true\nstate to the set's boundary, m": number(
+                result["truth_margin_m"]
+            ),
             "miss within the bound Phi": _yes(result["phi_held"]),
             "steps": str(record.steps),
             "seed, run": f"{record.seed}, {record.run}",
@@ -62,7 +69,9 @@ def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
 
 
 def _printed_impulse(record: Record, printed: Mapping[str, tuple[float, float]]) -> dict[str, str]:
-    """Return the row with the impulse that the paper prints for a noise; no row without printed numbers."""
+    """Return the row with the impulse that the paper prints for a noise; no row without printed
+    numbers.
+    """
     if not printed:
         return {}
     of_noise = printed.get(record.noise_name) if is_of_paper(record.scenario) else None
@@ -74,10 +83,12 @@ def _yes(value: bool | None) -> str:
 
 
 def _outcome(record: Record) -> str:
-    outcome, contradiction = record.ending, record.inconsistency
+    outcome = record.ending
+    contradiction = record.inconsistency
     if contradiction is None:
         return outcome
-    time_s, label_km = float(record.time_s[contradiction.step]), contradiction.label_m / 1e3
+    time_s = float(record.time_s[contradiction.step])
+    label_km = contradiction.label_m / 1e3
     return f"{outcome}; set empty at {time_s:g} s, section {label_km:.0f} km"
 
 

@@ -59,7 +59,9 @@ CORRIDOR = "figure-corridor"
 LEVELS = {"p50_m_s": 0.5, "p99_m_s": 0.99}
 """Levels of the quantiles of a burn, by key in JSON."""
 MAX_BURN_ROWS = 20
-"""Maximum number of burns of a curve in the table: the four curves of an experiment are two screens."""
+"""Maximum number of burns of a curve in the table: the four curves of an experiment are two
+screens.
+"""
 
 
 def run(options: Experiment) -> None:
@@ -67,9 +69,13 @@ def run(options: Experiment) -> None:
     scenario = scenario_with(options)
     own = own_strategy(options.strategy)
     of_file = scenario.noise if scenario.noise is not NoiseKind.GAME else NoiseKind.RANDOM
-    noise = chosen_noise(options.noise or of_file.value, [name for name in NOISES if name != NoiseKind.GAME.value])
+    noise = chosen_noise(
+        options.noise or of_file.value, [name for name in NOISES if name != NoiseKind.GAME.value]
+    )
     name, own_noise, kind = (
-        (noise, None, NoiseKind(noise)) if isinstance(noise, str) else (noise.name, noise, NoiseKind.RANDOM)
+        (noise, None, NoiseKind(noise))
+        if isinstance(noise, str)
+        else (noise.name, noise, NoiseKind.RANDOM)
     )
     names = {1: name, 2: name, 3: NoiseKind.GAME.value, 4: NoiseKind.GAME.value}
     figures = [
@@ -79,10 +85,18 @@ def run(options: Experiment) -> None:
     ]
     with work_of(options, scenario, ["results.csv", *figure_files(*figures)]) as work:
         if scenario.range_sensor is None:
-            cases = "curves 1 and 3 only" if is_of_paper(scenario) else f"{name} and game noise only"
+            cases = (
+                "curves 1 and 3 only" if is_of_paper(scenario) else f"{name} and game noise only"
+            )
             say(f"{scenario.name} has no [range_sensor]: {cases}", options.quiet)
         slowest_first = [
-            (curve, flown, _progress_title(scenario, curve, case_title(names[curve], flown.range_sensor is not None)))
+            (
+                curve,
+                flown,
+                _progress_title(
+                    scenario, curve, case_title(names[curve], flown.range_sensor is not None)
+                ),
+            )
             for curve, flown in reversed(curve_scenarios(scenario, kind))
         ]
         courses = [Courses(flown, options.runs) for _, flown, _ in slowest_first]
@@ -104,7 +118,9 @@ def run(options: Experiment) -> None:
         remedies: dict[int, list[Remedy]] = {curve.number: [] for curve in curves}
         if options.remedy and scenario.body is not None:
             for task, curve in zip(tasks[::-1], curves, strict=True):
-                found = find_remedies(task, curve.results, work.begin(f"remedies of {curve.title(scenario)}"))
+                found = find_remedies(
+                    task, curve.results, work.begin(f"remedies of {curve.title(scenario)}")
+                )
                 remedies[curve.number] = found
         work.save(
             {
@@ -115,7 +131,11 @@ def run(options: Experiment) -> None:
                     {
                         **_key(scenario, curve),
                         **hit_key(curve.results.hits, curve.results.missed),
-                        **({"redrawn_share": share} if (share := curve.results.redrawn_share) is not None else {}),
+                        **(
+                            {"redrawn_share": share}
+                            if (share := curve.results.redrawn_share) is not None
+                            else {}
+                        ),
                         **burns_key(scenario, curve.results),
                         **({"remedies": remedies[curve.number]} if options.remedy else {}),
                         **outcome_columns(curve.results),
@@ -129,7 +149,9 @@ def run(options: Experiment) -> None:
         if options.out is not None:
             from infoset.experiments.interception.figures.commands import draw_experiment
 
-            work.written.draw(figures, draw_experiment(scenario, curves, courses[::-1]), work.begin("figure"))
+            work.written.draw(
+                figures, draw_experiment(scenario, curves, courses[::-1]), work.begin("figure")
+            )
     show(_parts(scenario, curves, remedies), options.quiet or work.written.stdout_taken)
 
 
@@ -151,8 +173,11 @@ def _csv(scenario: Scenario, curves: Sequence[Curve]) -> str:
     return csv_text((*_key(scenario, curves[0]), *curves[0].results.to_dict()), rows)
 
 
-def _parts(scenario: Scenario, curves: Sequence[Curve], remedies: Mapping[int, Sequence[Remedy]]) -> Iterator[Part]:
-    table, runs = number_table(_heading(scenario), "quantity", *QUANTILES, left=2), len(curves[0].results)
+def _parts(
+    scenario: Scenario, curves: Sequence[Curve], remedies: Mapping[int, Sequence[Remedy]]
+) -> Iterator[Part]:
+    table = number_table(_heading(scenario), "quantity", *QUANTILES, left=2)
+    runs = len(curves[0].results)
     for curve in curves:
         results = curve.results
         head = f"{curve.number} {curve.noise}" if is_of_paper(scenario) else curve.noise
@@ -163,8 +188,8 @@ def _parts(scenario: Scenario, curves: Sequence[Curve], remedies: Mapping[int, S
             bounds = summary(results.guaranteed_miss_m.compressed())
             table.add_row("", bound_name(scenario), *map(number, bounds.values()))
     yield (
-        f"{scenario.name}: quantiles of {some_runs(runs)} per {_heading(scenario)}; game noise with the tie rule "
-        f"{scenario.tie.value}"
+        f"{scenario.name}: quantiles of {some_runs(runs)} per {_heading(scenario)}; game noise "
+        f"with the tie rule {scenario.tie.value}"
     )
     yield table
     burns = len(scenario.impulse_steps or ()) if scenario.thruster.is_scheduled else 0
@@ -175,7 +200,8 @@ def _parts(scenario: Scenario, curves: Sequence[Curve], remedies: Mapping[int, S
     counts = SetCounts()
     for curve in curves:
         results = curve.results
-        sets, held = set_counts(results.truth_kept, results.set_emptied), results.phi_held.compressed()
+        sets = set_counts(results.truth_kept, results.set_emptied)
+        held = results.phi_held.compressed()
         counts += sets
         outcomes = Counter(outcome.value for outcome in results.outcomes)
         lines = [hit_text(results.hits, scenario), certificate(sets, int(held.sum()), len(held))]
@@ -202,14 +228,17 @@ def _heading(scenario: Scenario) -> str:
 
 
 def burns_key(scenario: Scenario, results: Results) -> dict[str, list[dict[str, float | None]]]:
-    """Return the key `burns` of a curve in JSON: for each burn its time, quantiles of its size, and its share.
+    """Return the key `burns` of a curve in JSON: for each burn its time, quantiles of its size, and
+    its share.
 
-    The share is that of all impulses of all runs; None without any impulse. No key without a schedule.
+    The share is that of all impulses of all runs; None without any impulse. No key without a
+    schedule.
     """
     if results.burns_m_s is None:
         return {}
     whole = float(results.burns_m_s.sum())
-    arrival_s, step_s = scenario.nominal_arrival_s, scenario.set_model.step_s
+    arrival_s = scenario.nominal_arrival_s
+    step_s = scenario.set_model.step_s
     return {
         "burns": [
             {
@@ -225,7 +254,12 @@ def burns_key(scenario: Scenario, results: Results) -> dict[str, list[dict[str, 
 def burn_table(scenario: Scenario, curves: Sequence[Curve]) -> Table:
     """Return the table of the burns of all curves."""
     table = number_table(
-        _heading(scenario), "burn, s before arrival", "p50, m/s", "p99, m/s", "share of impulse, %", left=1
+        _heading(scenario),
+        "burn, s before arrival",
+        "p50, m/s",
+        "p99, m/s",
+        "share of impulse, %",
+        left=1,
     )
     for curve in curves:
         for burn in burns_key(scenario, curve.results).get("burns", []):

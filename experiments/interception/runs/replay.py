@@ -21,12 +21,15 @@ from infoset.experiments.interception.runs.engagement_table import (
 def run(options: Replay) -> None:
     """Read the records, write the files and print the table."""
     if len(options.records) > MAX_RECORDS:
-        raise InputError(f"replay needs one record or two records, found {len(options.records)}; omit some")
+        raise InputError(
+            f"replay needs one record or two records, found {len(options.records)}; omit some"
+        )
     with input_errors("--times", "; for example --times 0.5,40,90"):
         times_s = [float(time_s) for time_s in options.times.split(",") if time_s]
         if not all(0.0 <= time_s < math.inf for time_s in times_s):
             raise ValueError("times must be finite and not negative")
-    # The scenario, on which the names of the figures depend, is known after the records are read, which can take long.
+    # The scenario, on which the names of the figures depend, is known after the records are read,
+    # which can take long.
     figures = figure_files(*dict.fromkeys([*FIGURES, *FIGURES_OF_PAPER]))
     with (
         output_of(options, figures, {"--gif": options.gif}) as written,

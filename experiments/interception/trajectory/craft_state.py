@@ -1,4 +1,6 @@
-"""The state of a spacecraft or an object at an epoch, from each source, with its frame and covariance."""
+"""The state of a spacecraft or an object at an epoch, from each source, with its frame and
+covariance.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,12 @@ import numpy as np
 
 from infoset.arrays import Floats
 from infoset.experiments.common.errors import InputError
-from infoset.experiments.interception.trajectory.epochs import Epoch, converted, is_guess, tdb_drift_s
+from infoset.experiments.interception.trajectory.epochs import (
+    Epoch,
+    converted,
+    is_guess,
+    tdb_drift_s,
+)
 from infoset.experiments.interception.trajectory.frames import (
     SOLAR_SYSTEM,
     Frame,
@@ -23,17 +30,23 @@ from infoset.experiments.interception.trajectory.oem import OemCovariance, OemSe
 from infoset.sim.approach import propagate
 
 SAME_EPOCH_S = Fraction(1, 1000)
-"""Difference between the epoch of a covariance and of the states: files write both with milliseconds."""
+"""Difference between the epoch of a covariance and of the states: files write both with
+milliseconds.
+"""
 MODEL_SHARE = 0.01
-"""Difference to two-body motion, as a share of the distance to the nearest tabulated state, that is a warning.
+"""Difference to two-body motion, as a share of the distance to the nearest tabulated state, that is
+a warning.
 
-Perturbations of an orbit change it by less (the Earth's oblateness by 0.1 %), wrong units and manoeuvres by more.
+Perturbations of an orbit change it by less (the Earth's oblateness by 0.1 %), wrong units and
+manoeuvres by more.
 """
 MAX_SPANS = 3
 """Number of the spans of segments that a message lists: a line has room for them."""
 ALONG_RADIUS = ("RTN", "RSW", "RIC", "QSW")
 ALONG_VELOCITY = ("TNW",)
-"""Names of local axes: radius, transverse, normal; and velocity, in-plane normal, normal of the orbit."""
+"""Names of local axes: radius, transverse, normal; and velocity, in-plane normal, normal of the
+orbit.
+"""
 
 
 @dataclass(frozen=True)
@@ -71,7 +84,8 @@ class CraftState:
 
 
 def epoch_scale(epoch: Epoch, files: Sequence[Sequence[OemSegment]]) -> str:
-    """Return the time scale of an epoch: as written, or that of all OEM files; UTC without such files, as in SPICE.
+    """Return the time scale of an epoch: as written, or that of all OEM files; UTC without such
+    files, as in SPICE.
 
     `InputError` if the files have several.
     """
@@ -95,16 +109,19 @@ def oem_craft(
     *,
     with_covariance: bool,
 ) -> CraftState:
-    """Return the state of an OEM file at an epoch in a time scale, with its covariance if that is wanted.
+    """Return the state of an OEM file at an epoch in a time scale, with its covariance if that is
+    wanted.
 
-    `InputError` if no segment holds the epoch, its frame rotates or is unknown, the epoch is in a gap, or the segment
-    has covariances and none of them is of the epoch.
+    `InputError` if no segment holds the epoch, its frame rotates or is unknown, the epoch is in a
+    gap, or the segment has covariances and none of them is of the epoch.
     """
     segment = _segment_at(segments, source, epoch, scale)
     where = f"{source}: segment {segment.number}"
     seconds = converted(epoch, scale, segment.scale)
     try:
-        frame = inertial_frame(segment.metadata["REF_FRAME"], segment.metadata.get("REF_FRAME_EPOCH"))
+        frame = inertial_frame(
+            segment.metadata["REF_FRAME"], segment.metadata.get("REF_FRAME_EPOCH")
+        )
         found = interpolate(
             seconds,
             segment.seconds,
@@ -128,8 +145,8 @@ def oem_craft(
     notes = []
     if found.method not in ("TABULATED", "LINEAR") and found.degree < segment.degree:
         notes.append(
-            f"{where}: has fewer states around the epoch than degree + 1 = {segment.degree + 1}: interpolated with "
-            f"degree {found.degree}"
+            f"{where}: has fewer states around the epoch than degree + 1 = {segment.degree + 1}: "
+            f"interpolated with degree {found.degree}"
         )
     return CraftState(
         state=found.state,
@@ -146,9 +163,16 @@ def oem_craft(
 
 
 def time_notes(epoch: Epoch, scale: str, wanted: Sequence[str]) -> list[str]:
-    """Return a line if an epoch in UTC is converted to other scales with leap seconds that are not yet known."""
+    """Return a line if an epoch in UTC is converted to other scales with leap seconds that are not
+    yet known.
+    """
     if any(is_guess(epoch, scale, each) for each in wanted):
-        return [f"the leap seconds of {epoch.day} are not yet known: UTC is converted with TAI - UTC = 37 s"]
+        return [
+            (
+                f"the leap seconds of {epoch.day} are not yet known: UTC is converted with TAI - "
+                "UTC = 37 s"
+            )
+        ]
     return []
 
 
@@ -159,8 +183,9 @@ def need_same_axes(one: CraftState, other: CraftState, source: str) -> None:
     if one.centre == other.centre and is_same_frame(one.frame, other.frame):
         return
     raise InputError(
-        f"{source}: {one.source} has {one.centre}, {one.frame.name}, and {other.source} has {other.centre}, "
-        f"{other.frame.name} (centre, frame): they must be the same; convert one of them"
+        f"{source}: {one.source} has {one.centre}, {one.frame.name}, and {other.source} has "
+        f"{other.centre}, {other.frame.name} (centre, frame): they must be the same; convert one "
+        "of them"
     )
 
 
@@ -170,13 +195,17 @@ def axes_note(one: CraftState, other: CraftState) -> list[str]:
     if len(known) != 1 or known[0].frame is None:
         return []
     return [
-        f"the vectors of the trajectory file are taken in the axes of {known[0].source}: {known[0].centre}, "
-        f"{known[0].frame.name}"
+        f"the vectors of the trajectory file are taken in the axes of {known[0].source}: "
+        f"{known[0].centre}, {known[0].frame.name}"
     ]
 
 
-def _segment_at(segments: Sequence[OemSegment], source: str, epoch: Epoch, scale: str) -> OemSegment:
-    """Return the segment that holds an epoch; of two that meet there, the later one, after a manoeuvre."""
+def _segment_at(
+    segments: Sequence[OemSegment], source: str, epoch: Epoch, scale: str
+) -> OemSegment:
+    """Return the segment that holds an epoch; of two that meet there, the later one, after a
+    manoeuvre.
+    """
     holding = []
     for segment in segments:
         try:
@@ -190,11 +219,14 @@ def _segment_at(segments: Sequence[OemSegment], source: str, epoch: Epoch, scale
         spans = ", ".join(map(_usable_span, segments[:MAX_SPANS]))
         more = f" and {len(segments) - MAX_SPANS} more" if len(segments) > MAX_SPANS else ""
         raise InputError(
-            f"{source}: no segment holds the epoch: the usable spans are {spans}{more}; take an epoch within one"
+            f"{source}: no segment holds the epoch: the usable spans are {spans}{more}; take an "
+            "epoch within one"
         )
     inside = [segment for segment, seconds in holding if segment.start < seconds < segment.stop]
     if len(inside) > 1:
-        raise InputError(f"{source}: segments {inside[0].number} and {inside[1].number} both hold the epoch")
+        raise InputError(
+            f"{source}: segments {inside[0].number} and {inside[1].number} both hold the epoch"
+        )
     return inside[0] if inside else holding[-1][0]
 
 
@@ -210,29 +242,40 @@ def _method_text(found: Interpolated) -> str:
     if found.method == "TABULATED":
         return "a tabulated state"
     return (
-        f"{found.method} of degree {found.degree}, estimated errors {found.error[0]:.2g} m and {found.error[1]:.2g} m/s"
+        f"{found.method} of degree {found.degree}, estimated errors {found.error[0]:.2g} m and "
+        f"{found.error[1]:.2g} m/s"
     )
 
 
-def _warnings(where: str, found: Interpolated, centre: str, frame: Frame, parameter_m3_s2: float) -> list[str]:
+def _warnings(
+    where: str, found: Interpolated, centre: str, frame: Frame, parameter_m3_s2: float
+) -> list[str]:
     lines = []
     if frame.is_of_date:
-        lines.append(f"{where}: the frame {frame.name} is of date, its axes turn slowly; EME2000 or ICRF are better")
+        lines.append(
+            f"{where}: the frame {frame.name} is of date, its axes turn slowly; EME2000 or ICRF "
+            "are better"
+        )
     if centre == SOLAR_SYSTEM and parameter_m3_s2:
-        lines.append(f"{where}: the centre is the {SOLAR_SYSTEM}, and gravity is computed from there")
+        lines.append(
+            f"{where}: the centre is the {SOLAR_SYSTEM}, and gravity is computed from there"
+        )
 
     distance_m = float(np.linalg.norm(found.state[0] - found.nearest[0]))
     difference_m = _two_body_difference(found, parameter_m3_s2)
     if difference_m > MODEL_SHARE * distance_m:
         lines.append(
-            f"{where}: the state differs by {difference_m / 1e3:.4g} km from two-body motion from the nearest "
-            f"tabulated state, {distance_m / 1e3:.4g} km away: check the units, gravitational_parameter and the steps"
+            f"{where}: the state differs by {difference_m / 1e3:.4g} km from two-body motion from "
+            f"the nearest tabulated state, {distance_m / 1e3:.4g} km away: check the units, "
+            "gravitational_parameter and the steps"
         )
     return lines
 
 
 def _two_body_difference(found: Interpolated, parameter_m3_s2: float) -> float:
-    """Return the distance from the two-body motion of the nearest tabulated state, m; infinite if that fails."""
+    """Return the distance from the two-body motion of the nearest tabulated state, m; infinite if
+    that fails.
+    """
     if not found.nearest_s:
         return 0.0
     pair = np.concatenate([found.nearest, np.zeros((2, 3))])
@@ -248,13 +291,15 @@ def _covariance_at(segment: OemSegment, where: str, seconds: Fraction) -> OemCov
     nearest = min(segment.covariances, key=lambda each: abs(each.seconds - seconds))
     if abs(nearest.seconds - seconds) > SAME_EPOCH_S:
         raise InputError(
-            f"{where}: has no covariance of the epoch, the nearest is of {nearest.epoch}; take that epoch, or write "
-            "[covariance] in the trajectory file"
+            f"{where}: has no covariance of the epoch, the nearest is of {nearest.epoch}; take "
+            "that epoch, or write [covariance] in the trajectory file"
         )
     return nearest
 
 
-def _axes_of(covariance: OemCovariance, where: str, segment: OemSegment, frame: Frame, state: Floats) -> Floats:
+def _axes_of(
+    covariance: OemCovariance, where: str, segment: OemSegment, frame: Frame, state: Floats
+) -> Floats:
     """Return the axes of a covariance as rows, in the axes of the states."""
     name = covariance.frame
     if name is None:
@@ -270,17 +315,23 @@ def _axes_of(covariance: OemCovariance, where: str, segment: OemSegment, frame: 
     if not is_same:
         raise InputError(
             f"{where}: COV_REF_FRAME {name} is neither the frame of the states nor one of "
-            f"{', '.join((*ALONG_RADIUS, *ALONG_VELOCITY))}; write [covariance] in the trajectory file"
+            f"{', '.join((*ALONG_RADIUS, *ALONG_VELOCITY))}; write [covariance] in the trajectory "
+            "file"
         )
     return np.eye(3)
 
 
 def _local_axes(state: Floats, where: str, *, along_radius: bool) -> Floats:
-    """Return the axes of an orbit at a state as rows; the first is along the radius or along the velocity."""
+    """Return the axes of an orbit at a state as rows; the first is along the radius or along the
+    velocity.
+    """
     position, velocity = state
     normal = np.cross(position, velocity)
     if not normal.any():
-        raise InputError(f"{where}: the covariance is in the axes of the orbit, and the motion is along the radius")
+        raise InputError(
+            f"{where}: the covariance is in the axes of the orbit, and the motion is along the "
+            "radius"
+        )
     first = position if along_radius else velocity
     first = first / np.linalg.norm(first)
     normal = normal / np.linalg.norm(normal)

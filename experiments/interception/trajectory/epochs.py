@@ -1,6 +1,7 @@
 """Epochs as text, and the time scales of orbit ephemeris messages and SPICE kernels.
 
-An epoch becomes an exact number of seconds, so the difference of two epochs keeps all of its digits.
+An epoch becomes an exact number of seconds, so the difference of two epochs keeps all of its
+digits.
 """
 
 from __future__ import annotations
@@ -54,12 +55,14 @@ LEAPS_KNOWN_UNTIL = date(2027, 6, 28)
 TT_FROM_TAI_S = Fraction("32.184")
 TAI_FROM_GPS_S = 19
 SCALES = ("UTC", "TAI", "TT", "TDB", "GPS")
-"""Time scales that are read. UT1, TCB, TCG and clocks of spacecraft have other lengths of the second."""
+"""Time scales that are read. UT1, TCB, TCG and clocks of spacecraft have other lengths of the
+second.
+"""
 SAME_SCALE = {"TDT": "TT", "ET": "TDB", "Z": "UTC"}
 """Other names of these scales."""
 
-# TDB - TT as SPICE kernels define it (NAIF, Time Required Reading): K sin(E) with E = M + e sin(M). The neglected
-# terms are below 50 microseconds, in which an object at 30 km/s moves by 1.5 m.
+# TDB - TT as SPICE kernels define it (NAIF, Time Required Reading): K sin(E) with E = M + e sin(M).
+# The neglected terms are below 50 microseconds, in which an object at 30 km/s moves by 1.5 m.
 _K_S = 1.657e-3
 _ECCENTRICITY = 1.671e-2
 _ANOMALY_RAD = 6.239996
@@ -82,7 +85,8 @@ class Epoch(NamedTuple):
 
 
 def parse_epoch(text: str) -> Epoch:
-    """Return an epoch such as ``2029-03-01T12:00:00.5``, ``2029-060T12:00:00.5Z`` or ``2029-03-01T12:00:00 TDB``.
+    """Return an epoch such as ``2029-03-01T12:00:00.5``, ``2029-060T12:00:00.5Z`` or
+    ``2029-03-01T12:00:00 TDB``.
 
     A ValueError is raised for other text.
     """
@@ -92,7 +96,8 @@ def parse_epoch(text: str) -> Epoch:
     year, month, day_of_month, day_of_year, hour, minute, second, suffix = match.groups()
     day = _day(int(year), month, day_of_month, day_of_year)
 
-    whole, seconds = 60 * int(hour or 0) + int(minute or 0), Fraction(second or 0)
+    whole = 60 * int(hour or 0) + int(minute or 0)
+    seconds = Fraction(second or 0)
     if int(hour or 0) > 23 or int(minute or 0) > 59 or seconds >= 61:
         raise ValueError("has an hour, minute or second that does not exist")
     if seconds >= 60 and (whole != 60 * 24 - 1 or day + timedelta(1) not in LEAP_DAYS[1:]):
@@ -104,12 +109,15 @@ def known_scale(name: str) -> str:
     """Return the name of a time scale in `SCALES`; a ValueError is raised for others."""
     scale = SAME_SCALE.get(name.upper(), name.upper())
     if scale not in SCALES:
-        raise ValueError(f"time scale {name} is not one of {', '.join(SCALES)}; convert the times to one of them")
+        raise ValueError(
+            f"time scale {name} is not one of {', '.join(SCALES)}; convert the times to one of them"
+        )
     return scale
 
 
 def seconds_in(epoch: Epoch, scale: str) -> Fraction:
-    """Return the seconds from J2000 to an epoch that is written in a scale, in a scale without leaps.
+    """Return the seconds from J2000 to an epoch that is written in a scale, in a scale without
+    leaps.
 
     UTC counts as TAI. A ValueError is raised for UTC before 1972, whose seconds had other lengths.
     """
@@ -122,7 +130,9 @@ def seconds_in(epoch: Epoch, scale: str) -> Fraction:
 
 
 def converted(epoch: Epoch, scale: str, wanted: str) -> Fraction:
-    """Return the seconds from J2000 to an epoch that is written in a scale, as `seconds_in` counts in another one."""
+    """Return the seconds from J2000 to an epoch that is written in a scale, as `seconds_in` counts
+    in another one.
+    """
     seconds = seconds_in(epoch, scale)
     if scale == wanted or {scale, wanted} == {"UTC", "TAI"}:
         return seconds
@@ -137,10 +147,14 @@ def is_guess(epoch: Epoch, scale: str, wanted: str) -> bool:
 def tdb_drift_s(seconds: Fraction, scale: str) -> float:
     """Return the variable part of TDB less a scale at a time of this scale, s.
 
-    Velocities are derivatives with respect to TDB, in which orbits around the Sun are computed. The drift is up to
-    3.3e-10 s/s: 1e-5 m/s at 30 km/s, or 9 m in ten days.
+    Velocities are derivatives with respect to TDB, in which orbits around the Sun are computed. The
+    drift is up to 3.3e-10 s/s: 1e-5 m/s at 30 km/s, or 9 m in ten days.
     """
-    return 0.0 if scale == "TDB" else float(_tdb_minus_tt(_to_tt(seconds, scale if scale != "UTC" else "TAI")))
+    return (
+        0.0
+        if scale == "TDB"
+        else float(_tdb_minus_tt(_to_tt(seconds, scale if scale != "UTC" else "TAI")))
+    )
 
 
 def _day(year: int, month: str | None, day_of_month: str | None, day_of_year: str | None) -> date:

@@ -1,4 +1,6 @@
-"""Reference frames and centres in orbit ephemeris messages: inertial frames, and names that mean the same."""
+"""Reference frames and centres in orbit ephemeris messages: inertial frames, and names that mean
+the same.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,8 @@ FIXED = {
     "B1950": "B1950",
     "GALACTIC": "GALACTIC|GALACTICII",
 }
-"""Frames whose axes are fixed to the stars, and the names of each, in capitals and without separators.
+"""Frames whose axes are fixed to the stars, and the names of each, in capitals and without
+separators.
 
 EME2000 and ICRF differ by 0.02 arc seconds, which is 16 km at the distance of the Sun.
 """
@@ -27,7 +30,9 @@ OF_DATE = {
     "MOD of the centre": "MODCB",
     "TRUE ECLIPTIC": "TRUEECLIPTIC",
 }
-"""Frames whose axes follow precession or nutation; with a REF_FRAME_EPOCH they are those of that epoch."""
+"""Frames whose axes follow precession or nutation; with a REF_FRAME_EPOCH they are those of that
+epoch.
+"""
 OF_EPOCH = {
     "TOE": "TOE|TOEEARTH",
     "MOE": "MOE|MOEEARTH",
@@ -71,7 +76,9 @@ class Frame(NamedTuple):
 
 
 def inertial_frame(name: str, epoch: str | None = None) -> Frame:
-    """Return the inertial frame of a REF_FRAME and its REF_FRAME_EPOCH; a ValueError is raised for any other frame."""
+    """Return the inertial frame of a REF_FRAME and its REF_FRAME_EPOCH; a ValueError is raised for
+    any other frame.
+    """
     plain = re.sub("[^A-Z0-9]", "", name.upper())
     fixed, of_date, of_epoch = (_common_name(plain, names) for names in (FIXED, OF_DATE, OF_EPOCH))
     if fixed is not None:
@@ -83,7 +90,8 @@ def inertial_frame(name: str, epoch: str | None = None) -> Frame:
     if of_date is not None or of_epoch is not None:
         return Frame(f"{of_date or of_epoch} at {epoch}")
     raise ValueError(
-        f"REF_FRAME {name} is not a known inertial frame, it may rotate; convert the file to EME2000 or ICRF"
+        f"REF_FRAME {name} is not a known inertial frame, it may rotate; convert the file to "
+        "EME2000 or ICRF"
     )
 
 
@@ -110,5 +118,7 @@ def is_same_frame(one: Frame, other: Frame) -> bool:
 
 def centre_name(name: str) -> str:
     """Return a centre by its common name in capitals."""
-    words = " ".join(re.split(r"[\s_]+|(?<=\w)-", name.strip().upper()))  # the minus of a number stays
+    words = " ".join(
+        re.split(r"[\s_]+|(?<=\w)-", name.strip().upper())
+    )  # the minus of a number stays
     return CENTRES.get(words, words)

@@ -1,4 +1,6 @@
-"""Interpolation of a table of states: the polynomials of Hermite and Lagrange through the states around an epoch."""
+"""Interpolation of a table of states: the polynomials of Hermite and Lagrange through the states
+around an epoch.
+"""
 
 from __future__ import annotations
 
@@ -15,14 +17,19 @@ METHODS = ("HERMITE", "LAGRANGE", "LINEAR")
 DEFAULT_DEGREE = 7
 """Degree for tables that name none; tables of orbits have degrees of 5 to 9."""
 MAX_DEGREE = 20
-"""Largest degree: near the ends of a table an error of the states grows by about two to the power of the degree."""
+"""Largest degree: near the ends of a table an error of the states grows by about two to the power
+of the degree.
+"""
 SPACING = Fraction(1, 2)
 """Smallest distance of two states of a polynomial in units of the interval that contains the epoch.
 
-Where a step of 600 s changes to one of a day, eight consecutive states amplify a rounding of 1 mm to 10 000 km.
+Where a step of 600 s changes to one of a day, eight consecutive states amplify a rounding of 1 mm
+to 10 000 km.
 """
 GAP = 20
-"""An interval of more than this number of neighbouring steps is a gap, and the states in it are not known."""
+"""An interval of more than this number of neighbouring steps is a gap, and the states in it are not
+known.
+"""
 
 
 class Interpolated(NamedTuple):
@@ -71,7 +78,8 @@ def interpolate(
     method, degree : str, int
         One of `METHODS`; degree + 1 states are used, or fewer if the table has no more.
     drift_s : callable
-        What is added to a time, s, to have the time with respect to which the velocities are derivatives.
+        What is added to a time, s, to have the time with respect to which the velocities are
+        derivatives.
 
     Raises
     ------
@@ -80,9 +88,10 @@ def interpolate(
 
     Notes
     -----
-    The states are the next ones on both sides of the epoch, as far as the ends of the table allow. Where the step
-    becomes shorter, some are left out (`SPACING`). The error is estimated by the same polynomial without the state
-    that is farthest in time, and for two states by the polynomial of the other method.
+    The states are the next ones on both sides of the epoch, as far as the ends of the table allow.
+    Where the step becomes shorter, some are left out (`SPACING`). The error is estimated by the
+    same polynomial without the state that is farthest in time, and for two states by the polynomial
+    of the other method.
     """
     after = bisect_right(times, epoch)
     if after and times[after - 1] == epoch:
@@ -94,7 +103,9 @@ def interpolate(
 
     window = _window(times, after, degree + 1)
     drift_at_epoch_s = drift_s(epoch)
-    relative_s = np.array([float(times[row] - epoch) + (drift_s(times[row]) - drift_at_epoch_s) for row in window])
+    relative_s = np.array(
+        [float(times[row] - epoch) + (drift_s(times[row]) - drift_at_epoch_s) for row in window]
+    )
     used = states[window]
     polynomial = hermite if method == "HERMITE" else lagrange
     state = polynomial(relative_s, used)
@@ -116,9 +127,11 @@ def interpolate(
 
 
 def lagrange(times_s: Floats, states: Floats) -> Floats:
-    """Return the value at time zero of Lagrange's polynomials through positions and velocities, shape (2, 3).
+    """Return the value at time zero of Lagrange's polynomials through positions and velocities,
+    shape (2, 3).
 
-    The weight of state i is the product of t_j / (t_j - t_i) over all other states j; no time is zero.
+    The weight of state i is the product of t_j / (t_j - t_i) over all other states j; no time is
+    zero.
     """
     weights, _, _ = _basis(times_s)
     base = states[np.argmin(np.abs(times_s))]
@@ -133,8 +146,9 @@ def hermite(times_s: Floats, states: Floats) -> Floats:
 
     Notes
     -----
-    With Lagrange's weights L_i, D_i = sum 1 / (t_i - t_j) and G_i = -sum 1 / t_j over all other states j, the position
-    is the sum of (1 + 2 t_i D_i) L_i^2 r_i - t_i L_i^2 v_i, and the velocity the sum of its derivatives.
+    With Lagrange's weights L_i, D_i = sum 1 / (t_i - t_j) and G_i = -sum 1 / t_j over all other
+    states j, the position is the sum of (1 + 2 t_i D_i) L_i^2 r_i - t_i L_i^2 v_i, and the velocity
+    the sum of its derivatives.
     """
     weights, slopes, growth = _basis(times_s)
     squares = weights**2
@@ -144,14 +158,17 @@ def hermite(times_s: Floats, states: Floats) -> Floats:
     rate_of_velocity = squares * (1.0 - 2.0 * times_s * growth)
 
     base = states[np.argmin(np.abs(times_s))]
-    positions, velocities = states[:, 0] - base[0], states[:, 1]
+    positions = states[:, 0] - base[0]
+    velocities = states[:, 1]
     position = base[0] + of_position @ positions + of_velocity @ velocities
     velocity = rate_of_position @ positions + rate_of_velocity @ velocities
     return np.stack([position, velocity])
 
 
 def _basis(times_s: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return Lagrange's weights at time zero, and the sums D_i and G_i of `hermite`, each of shape (n,)."""
+    """Return Lagrange's weights at time zero, and the sums D_i and G_i of `hermite`, each of shape
+    (n,).
+    """
     differences = times_s[:, None] - times_s
     np.fill_diagonal(differences, 1.0)
     ratios = -times_s / differences
@@ -163,7 +180,9 @@ def _basis(times_s: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _window(times: Sequence[Fraction], after: int, wanted: int) -> list[int]:
-    """Return the rows of up to a number of states around the interval that ends at row `after`, in order of time."""
+    """Return the rows of up to a number of states around the interval that ends at row `after`, in
+    order of time.
+    """
     apart = SPACING * (times[after] - times[after - 1])
     before = [after - 1]
     while len(before) < wanted:
@@ -186,9 +205,11 @@ def _window(times: Sequence[Fraction], after: int, wanted: int) -> list[int]:
 def _check_gap(times: Sequence[Fraction], after: int) -> None:
     """Raise a ValueError if the interval that ends at row `after` is a gap."""
     step = times[after] - times[after - 1]
-    neighbours = [times[row] - times[row - 1] for row in (after - 1, after + 1) if 0 < row < len(times)]
+    neighbours = [
+        times[row] - times[row - 1] for row in (after - 1, after + 1) if 0 < row < len(times)
+    ]
     if neighbours and step > GAP * max(neighbours):
         raise ValueError(
-            f"the epoch is in a gap of {float(step):.6g} s, {float(step / max(neighbours)):.3g} times the steps beside "
-            f"it (at most {GAP}); give a table with states there"
+            f"the epoch is in a gap of {float(step):.6g} s, {float(step / max(neighbours)):.3g} "
+            f"times the steps beside it (at most {GAP}); give a table with states there"
         )

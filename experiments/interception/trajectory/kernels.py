@@ -25,13 +25,16 @@ INERTIAL_CLASS = 1
 
 
 def kernel_files(names: Sequence[str], folder: Path, allowed: Sequence[Path]) -> list[Path]:
-    """Return the paths of kernels; raise `InputError` for a meta-kernel and for a file that may not be opened."""
+    """Return the paths of kernels; raise `InputError` for a meta-kernel and for a file that may not
+    be opened.
+    """
     files = []
     for name in names:
         file = named_file(name, folder, allowed)
         if not _is_binary(file) and NAMES_OF_FILES in read_input(file, MAX_TEXT_BYTES).upper():
             raise InputError(
-                f"{name}: is a meta-kernel, which loads further files; name the kernels themselves in kernels = [...]"
+                f"{name}: is a meta-kernel, which loads further files; name the kernels themselves "
+                "in kernels = [...]"
             )
         files.append(file)
     return files
@@ -50,10 +53,14 @@ def loaded(files: Sequence[Path]) -> Iterator[Any]:
 
 
 def kernel_state(spice: Any, body: str, time_s: float, frame: str, centre: str) -> Floats:
-    """Return position and velocity of a body at a time of SPICE (TDB from J2000), m and m/s, shape (2, 3)."""
+    """Return position and velocity of a body at a time of SPICE (TDB from J2000), m and m/s, shape
+    (2, 3).
+    """
     code = spice.namfrm(frame)
     if code == 0 or spice.frinfo(code)[1] != INERTIAL_CLASS:
-        raise InputError(f"frame: {frame} is not an inertial frame of SPICE; use J2000 or ECLIPJ2000")
+        raise InputError(
+            f"frame: {frame} is not an inertial frame of SPICE; use J2000 or ECLIPJ2000"
+        )
     state, _ = spice.spkezr(body, time_s, frame, "NONE", centre)
     return np.asarray(1e3 * np.reshape(state, (2, 3)))
 

@@ -1,7 +1,7 @@
 """Orbit ephemeris messages (OEM, CCSDS 502.0-B-1 to B-3) in keyword-value notation.
 
-The reader takes the content of a file and opens nothing. It reads over keywords that the program does not use, because
-versions of the standard differ in them.
+The reader takes the content of a file and opens nothing. It reads over keywords that the program
+does not use, because versions of the standard differ in them.
 """
 
 from __future__ import annotations
@@ -17,11 +17,16 @@ import numpy as np
 from infoset.arrays import Floats
 from infoset.experiments.common.errors import InputError, shown
 from infoset.experiments.interception.trajectory.epochs import known_scale, parse_epoch, seconds_in
-from infoset.experiments.interception.trajectory.interpolation import DEFAULT_DEGREE, MAX_DEGREE, METHODS
+from infoset.experiments.interception.trajectory.interpolation import (
+    DEFAULT_DEGREE,
+    MAX_DEGREE,
+    METHODS,
+)
 from infoset.limits import MAXIMUM
 
 MAX_OEM_BYTES = 20_000_000
-"""Size of the largest file that is read: 120 000 states of the usual length, 80 days in steps of a minute.
+"""Size of the largest file that is read: 120 000 states of the usual length, 80 days in steps of a
+minute.
 
 The shortest possible states fill it with 400 000 of them, which take 300 MB and ten seconds.
 """
@@ -29,7 +34,9 @@ VERSIONS = ("1.0", "2.0", "3.0")
 NEEDED_KEYS = ("CENTER_NAME", "REF_FRAME", "TIME_SYSTEM")
 """Keywords without which the states of a segment have no meaning."""
 ROW_LENGTHS = (7, 10)
-"""Number of words of a state: epoch, position and velocity, and in some files the acceleration, which is not used."""
+"""Number of words of a state: epoch, position and velocity, and in some files the acceleration,
+which is not used.
+"""
 COMPONENTS = 6
 METRES_PER_KM = 1e3
 
@@ -37,7 +44,9 @@ _PAIR = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)\s*=\s*(.*)")
 
 
 class OemCovariance(NamedTuple):
-    """A covariance of position and velocity, m^2, m^2/s and m^2/s^2, its epoch and its frame, None if not written."""
+    """A covariance of position and velocity, m^2, m^2/s and m^2/s^2, its epoch and its frame, None
+    if not written.
+    """
 
     epoch: str
     seconds: Fraction
@@ -81,7 +90,9 @@ class OemSegment:
 
 
 def read_oem(content: bytes, source: str) -> list[OemSegment]:
-    """Return the segments of an OEM file; raise `InputError` with `source` and the line if it is not valid."""
+    """Return the segments of an OEM file; raise `InputError` with `source` and the line if it is
+    not valid.
+    """
     reading = _Reading(source)
     for number, line in enumerate(re.split("\r\n|\r|\n", _text(content, source)), start=1):
         reading.take(number, line.strip())
@@ -89,9 +100,14 @@ def read_oem(content: bytes, source: str) -> list[OemSegment]:
 
 
 def _text(content: bytes, source: str) -> str:
-    """Return the text of a file in UTF-8, or in Latin-1, which older programs write into comments."""
+    """Return the text of a file in UTF-8, or in Latin-1, which older programs write into
+    comments.
+    """
     if content[:100].lstrip().startswith((b"<", b"\xef\xbb\xbf<")):
-        raise InputError(f"{source}: is XML, and OEM files are read in keyword-value notation (KVN); export it as KVN")
+        raise InputError(
+            f"{source}: is XML, and OEM files are read in keyword-value notation (KVN); export it "
+            "as KVN"
+        )
     if b"\0" in content:
         raise InputError(f"{source}: is not text; give an OEM file in keyword-value notation (KVN)")
     try:
@@ -101,7 +117,9 @@ def _text(content: bytes, source: str) -> str:
 
 
 class _Reading:
-    """A file that is being read line by line; `take` calls the function of the section in which the line is."""
+    """A file that is being read line by line; `take` calls the function of the section in which the
+    line is.
+    """
 
     def __init__(self, source: str) -> None:
         self._source = source
@@ -126,7 +144,9 @@ class _Reading:
         if self._section == self._covariances:
             raise self._fault("COVARIANCE_STOP is missing at the end of the file")
         if not self._segments:
-            raise InputError(f"{self._source}: has no segment (META_START); give a complete OEM file")
+            raise InputError(
+                f"{self._source}: has no segment (META_START); give a complete OEM file"
+            )
         self._end_segment()
         return self._segments
 
@@ -138,7 +158,9 @@ class _Reading:
         if match is None or match[1] != "CCSDS_OEM_VERS":
             raise self._fault("is not an OEM file: the first keyword must be CCSDS_OEM_VERS")
         if match[2] not in VERSIONS:
-            raise self._fault(f"CCSDS_OEM_VERS {shown(match[2])} is not one of {', '.join(VERSIONS)}")
+            raise self._fault(
+                f"CCSDS_OEM_VERS {shown(match[2])} is not one of {', '.join(VERSIONS)}"
+            )
         self._section = self._head
 
     def _head(self, line: str) -> None:
@@ -155,7 +177,9 @@ class _Reading:
 
         missing = [key for key in NEEDED_KEYS if not segment.metadata.get(key)]
         if missing:
-            raise self._fault(f"{missing[0]} is missing in the metadata of segment {segment.number}")
+            raise self._fault(
+                f"{missing[0]} is missing in the metadata of segment {segment.number}"
+            )
         try:
             segment.scale = known_scale(segment.metadata["TIME_SYSTEM"])
         except ValueError as error:
@@ -172,7 +196,10 @@ class _Reading:
 
         degree = metadata.get("INTERPOLATION_DEGREE", str(DEFAULT_DEGREE))
         if not re.fullmatch("[0-9]{1,4}", degree) or not 1 <= int(degree) <= MAX_DEGREE:
-            raise self._fault(f"INTERPOLATION_DEGREE must be a whole number from 1 to {MAX_DEGREE}: {shown(degree)}")
+            raise self._fault(
+                f"INTERPOLATION_DEGREE must be a whole number from 1 to {MAX_DEGREE}: "
+                f"{shown(degree)}"
+            )
         return method, int(degree)
 
     def _data(self, line: str) -> None:
@@ -187,30 +214,41 @@ class _Reading:
 
         words = line.split()
         if len(words) not in ROW_LENGTHS:
-            raise self._fault(f"must be an epoch and 6 numbers, or 9 with the acceleration: {shown(line)}")
+            raise self._fault(
+                f"must be an epoch and 6 numbers, or 9 with the acceleration: {shown(line)}"
+            )
         segment = self._segments[-1]
         seconds = self._seconds(words[0], segment.scale)
         if segment.seconds and seconds <= segment.seconds[-1]:
-            raise self._fault("the epoch is not later than the one before; sort the states, each epoch once")
+            raise self._fault(
+                "the epoch is not later than the one before; sort the states, each epoch once"
+            )
         segment.seconds.append(seconds)
         self._rows.append(self._numbers(words[1 : 1 + COMPONENTS]))
 
     def _covariances(self, line: str) -> None:
         if line == "COVARIANCE_STOP":
             if self._covariance or self._entries:
-                raise self._fault(f"the covariance ends after {len(self._entries)} of {COMPONENTS} rows")
+                raise self._fault(
+                    f"the covariance ends after {len(self._entries)} of {COMPONENTS} rows"
+                )
             self._section = self._data
             return
         if "=" in line:
             if self._entries:
-                raise self._fault(f"the covariance has {len(self._entries)} rows, it must have {COMPONENTS}")
-            self._keep_pair(line, self._covariance, "the covariance", known=("EPOCH", "COV_REF_FRAME"))
+                raise self._fault(
+                    f"the covariance has {len(self._entries)} rows, it must have {COMPONENTS}"
+                )
+            self._keep_pair(
+                line, self._covariance, "the covariance", known=("EPOCH", "COV_REF_FRAME")
+            )
             return
 
         row = self._numbers(line.split())
         if len(row) != len(self._entries) + 1:
             raise self._fault(
-                f"row {len(self._entries) + 1} of the covariance must have {len(self._entries) + 1} numbers"
+                f"row {len(self._entries) + 1} of the covariance must have "
+                f"{len(self._entries) + 1} numbers"
             )
         self._entries.append(row)
         if len(self._entries) == COMPONENTS:
@@ -254,7 +292,9 @@ class _Reading:
     def _times(self, segment: OemSegment, *keys: str) -> Iterator[Fraction]:
         for key in keys:
             if key in segment.metadata:
-                yield self._seconds(segment.metadata[key], segment.scale, f"{key} of segment {segment.number}: ")
+                yield self._seconds(
+                    segment.metadata[key], segment.scale, f"{key} of segment {segment.number}: "
+                )
 
     def _need_states(self) -> None:
         if not self._rows:
@@ -276,7 +316,9 @@ class _Reading:
             raise self._fault(f"must be numbers, found {shown(' '.join(words))}")
         return values
 
-    def _keep_pair(self, line: str, pairs: dict[str, str], where: str, known: tuple[str, ...] = ()) -> None:
+    def _keep_pair(
+        self, line: str, pairs: dict[str, str], where: str, known: tuple[str, ...] = ()
+    ) -> None:
         match = _PAIR.fullmatch(line)
         if match is None or (known and match[1] not in known):
             raise self._fault(f"must be KEYWORD = VALUE in {where}, found {shown(line)}")

@@ -10,14 +10,17 @@ from infoset.arrays import Flags, Floats, Integers
 from infoset.geometry.polytope.errors import SolverError
 
 HIGHS = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
-"""Options of HiGHS for linear programs on the scale of a polytope: feasibility tolerances of 1e-10."""
+"""Options of HiGHS for linear programs on the scale of a polytope: feasibility tolerances of
+1e-10.
+"""
 
 
 def simplices_of(sides: Flags, dimension: int) -> Integers:
     """Return the vertices of simplices that divide a polytope, shape (k, d + 1).
 
-    `sides[i, j]`, shape (f, v), is whether vertex j is on facet i. A face is the union of the pyramids over those of
-    its own facets that do not contain its first vertex, which are intersections of it with others.
+    `sides[i, j]`, shape (f, v), is whether vertex j is on facet i. A face is the union of the
+    pyramids over those of its own facets that do not contain its first vertex, which are
+    intersections of it with others.
 
     References
     ----------
@@ -39,7 +42,10 @@ def simplices_of(sides: Flags, dimension: int) -> Integers:
                 ]
         return known[face]
 
-    sets = [int.from_bytes(bits.tobytes(), "little") for bits in np.packbits(sides, axis=1, bitorder="little")]
+    sets = [
+        int.from_bytes(bits.tobytes(), "little")
+        for bits in np.packbits(sides, axis=1, bitorder="little")
+    ]
     whole = 0
     for side in sets:
         whole |= side
@@ -59,36 +65,47 @@ def _facets_of(face: int, others: list[int], size: int) -> list[int]:
 def largest_ball(rows: Floats, limits: Floats) -> tuple[Floats, float]:
     """Return the centre, shape (d,), and radius of a largest ball in {z: rows z <= limits}.
 
-    The distance of a facet is measured for rows as if of unit length. The radius is negative if the set is empty; its
-    absolute value is the minimum relaxation of the rows that has a point. An SolverError is raised if the linear
-    program (HiGHS) was not solved, for example because the set has balls of any size.
+    The distance of a facet is measured for rows as if of unit length. The radius is negative if the
+    set is empty; its absolute value is the minimum relaxation of the rows that has a point. An
+    SolverError is raised if the linear program (HiGHS) was not solved, for example because the set
+    has balls of any size.
     """
     units = np.abs(rows).max(axis=1, initial=1e-300)
     minimum = float(units.min(initial=1.0))  # the unit of the radius
     matrix = np.column_stack([rows / units[:, None], minimum / units])
     cost = np.zeros(matrix.shape[1])
     cost[-1] = -1.0
-    optimum = linprog(cost, A_ub=matrix, b_ub=limits / units, bounds=(None, None), method="highs", options=HIGHS)
+    optimum = linprog(
+        cost, A_ub=matrix, b_ub=limits / units, bounds=(None, None), method="highs", options=HIGHS
+    )
     if optimum.status != 0:
-        raise SolverError("the linear program of a largest ball inside was not solved: is the set unbounded?")
+        raise SolverError(
+            "the linear program of a largest ball inside was not solved: is the set unbounded?"
+        )
     return optimum.x[:-1], float(optimum.x[-1]) * minimum
 
 
 def triangle_of(columns: Floats) -> tuple[Floats, Integers]:
-    """Return the triangle and the order of columns of a QR factorization; the sizes of the rows may differ much."""
+    """Return the triangle and the order of columns of a QR factorization; the sizes of the rows may
+    differ much.
+    """
     order = np.argsort(-np.abs(columns).max(axis=1))
     triangle, pivots = qr(columns[order], mode="r", pivoting=True)
     return triangle[: columns.shape[1]], pivots
 
 
 def orthonormal(columns: Floats, rows: Floats) -> tuple[Floats, Floats]:
-    """Return an orthonormal basis of the span of columns, shape (n, d), and linear functions for its coefficients.
+    """Return an orthonormal basis of the span of columns, shape (n, d), and linear functions for
+    its coefficients.
 
-    `rows`, shape (k, d), are such functions for the coefficients of the columns. Each row of the basis is exact to
-    rounding of itself: the sizes of the rows may differ much.
+    `rows`, shape (k, d), are such functions for the coefficients of the columns. Each row of the
+    basis is exact to rounding of itself: the sizes of the rows may differ much.
     """
     if columns.shape[1]:
         for _ in range(2):  # the second pass corrects angles
             triangle, pivots = triangle_of(columns)
-            columns, rows = (solve_triangular(triangle.T, part[:, pivots].T, lower=True).T for part in (columns, rows))
+            columns, rows = (
+                solve_triangular(triangle.T, part[:, pivots].T, lower=True).T
+                for part in (columns, rows)
+            )
     return columns, rows

@@ -1,4 +1,6 @@
-"""The arrays of a polytope: vertices, facets and their incidence, in scaled coordinates, and what follows from them."""
+"""The arrays of a polytope: vertices, facets and their incidence, in scaled coordinates, and what
+follows from them.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,9 @@ from infoset.geometry.tolerances import UNSURE
 
 @dataclass(frozen=True, eq=False)
 class PolytopeArrays:
-    """The arrays of a polytope; see `Polytope`. Functions of the module `construction` compute them."""
+    """The arrays of a polytope; see `Polytope`. Functions of the module `construction` compute
+    them.
+    """
 
     points: Floats
     facets: Floats
@@ -28,7 +32,9 @@ class PolytopeArrays:
     centre: Floats
     scale: Floats
     exact: Polyhedron | None = None
-    """The set in exact integers if it is unbounded; its other arrays are this one, rounded, with `scale` one."""
+    """The set in exact integers if it is unbounded; its other arrays are this one, rounded, with
+    `scale` one.
+    """
 
     @property
     def space(self) -> int:
@@ -52,7 +58,8 @@ class PolytopeArrays:
 
     @cached_property
     def directions(self) -> Floats:
-        """Directions of unit length in which the set is unbounded, shape (r, n): those of its recession cone.
+        """Directions of unit length in which the set is unbounded, shape (r, n): those of its
+        recession cone.
 
         A set that contains lines has `lines` too, and one direction for each ray between them.
         """
@@ -60,7 +67,9 @@ class PolytopeArrays:
 
     @cached_property
     def lines(self) -> Floats:
-        """Directions of unit length of lines that the set contains, shape (l, n), linearly independent."""
+        """Directions of unit length of lines that the set contains, shape (l, n), linearly
+        independent.
+        """
         return rounded_directions(self.exact.lines if self.exact else (), self.space)
 
     @cached_property
@@ -70,7 +79,9 @@ class PolytopeArrays:
 
     @cached_property
     def normals(self) -> Floats:
-        """Normals of the facets, shape (f, n), of unit length, in the directions of the affine hull."""
+        """Normals of the facets, shape (f, n), of unit length, in the directions of the affine
+        hull.
+        """
         if self.is_empty:
             return np.zeros((1, self.space))
         rows = self.facets[:, :-1] / self.scale
@@ -95,16 +106,22 @@ class PolytopeArrays:
     @cached_property
     def across(self) -> Floats:
         """Orthonormal normals of the affine hull, shape (n - dimension, n)."""
-        return orthonormal((self.equations[:, :-1] / self.scale).T, np.zeros((0, len(self.equations))))[0].T
+        return orthonormal(
+            (self.equations[:, :-1] / self.scale).T, np.zeros((0, len(self.equations)))
+        )[0].T
 
     @cached_property
     def levels(self) -> Floats:
         """Levels of the affine hull, shape (n - dimension,): across x = levels."""
-        return 0.5 * supports(self.vertices, self.across) - 0.5 * supports(self.vertices, -self.across)
+        return 0.5 * supports(self.vertices, self.across) - 0.5 * supports(
+            self.vertices, -self.across
+        )
 
     @cached_property
     def _steps(self) -> Floats:
-        """A basis of the directions of the affine hull, shape (n, d): changes of d coordinates by their scales."""
+        """A basis of the directions of the affine hull, shape (n, d): changes of d coordinates by
+        their scales.
+        """
         own, others = own_and_others(self.equations)
         steps = np.zeros((self.space, self.dimension))
         steps[own] = np.eye(len(own))
@@ -112,7 +129,8 @@ class PolytopeArrays:
         return self.scale[:, None] * steps
 
     def constraints(self) -> tuple[Floats, Floats]:
-        """Return normals, shape (k, n), of unit length, and offsets, shape (k,): the set is normals x <= offsets.
+        """Return normals, shape (k, n), of unit length, and offsets, shape (k,): the set is normals
+        x <= offsets.
 
         An equation of a flat set gives two rows; an empty set is 0 x <= -1.
         """
@@ -144,7 +162,8 @@ class PolytopeArrays:
         return self
 
     def bounding_box(self) -> tuple[Floats, Floats]:
-        """Return the minimum and the maximum coordinates, each of shape (n,), infinite where the set is unbounded.
+        """Return the minimum and the maximum coordinates, each of shape (n,), infinite where the
+        set is unbounded.
 
         O(v n), exact.
         """
@@ -171,10 +190,13 @@ def half_spaces(one: PolytopeArrays, origin: Floats | float = 0.0) -> tuple[Floa
 
 
 def own_and_others(equations: Floats) -> tuple[Integers, Integers]:
-    """Return d coordinates of which the others are functions, and the others, in the order of their equations.
+    """Return d coordinates of which the others are functions, and the others, in the order of their
+    equations.
 
     `equations` has the shape (n - d, n + 1); its columns of the others are those of the identity.
     """
     bound = equations[:, :-1]
-    others = np.array([(unit == bound.T).all(axis=1).argmax() for unit in np.eye(len(bound))], np.int64)
+    others = np.array(
+        [(unit == bound.T).all(axis=1).argmax() for unit in np.eye(len(bound))], np.int64
+    )
     return np.delete(np.arange(bound.shape[1]), others), others

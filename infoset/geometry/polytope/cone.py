@@ -1,13 +1,15 @@
 """Extreme rays of a polyhedral cone in integers: rounding decides nothing.
 
-A set {x: a . x <= b} is the cone {(x, t): b t - a . x >= 0, t >= 0}, where rows (a, b) are floats times powers of two.
-Its extreme rays with t > 0 are the vertices, those with t = 0 directions; the lines that it contains are apart. Empty,
-flat and unbounded sets are results like others. It takes ten to fifty times as long as `double_description`, which
-rounds: this judges where the rounded answer is that a set is empty, flat or unbounded, and finds its box.
+A set {x: a . x <= b} is the cone {(x, t): b t - a . x >= 0, t >= 0}, where rows (a, b) are floats
+times powers of two. Its extreme rays with t > 0 are the vertices, those with t = 0 directions; the
+lines that it contains are apart. Empty, flat and unbounded sets are results like others. It takes
+ten to fifty times as long as `double_description`, which rounds: this judges where the rounded
+answer is that a set is empty, flat or unbounded, and finds its box.
 
 References
 ----------
-K. Fukuda and A. Prodon, Double description method revisited, in Combinatorics and Computer Science (1996).
+K. Fukuda and A. Prodon, Double description method revisited, in Combinatorics and Computer Science
+(1996).
 """
 
 from __future__ import annotations
@@ -32,7 +34,9 @@ _kernels = Kernels()
 
 
 class Cone(NamedTuple):
-    """Extreme rays of a cone {z: rows z >= 0} modulo its lines, which ray is on which row, and a basis of the lines."""
+    """Extreme rays of a cone {z: rows z >= 0} modulo its lines, which ray is on which row, and a
+    basis of the lines.
+    """
 
     rays: list[Row]
     on: Flags
@@ -40,10 +44,11 @@ class Cone(NamedTuple):
 
 
 class Vertices(NamedTuple):
-    """Vertices of a set of half-spaces, and directions and lines along which it is unbounded, as lists of n numbers.
+    """Vertices of a set of half-spaces, and directions and lines along which it is unbounded, as
+    lists of n numbers.
 
-    `on[i, j]` is whether vertex i is on the boundary of half-space j. Without vertices the set is empty, whatever the
-    directions and lines are.
+    `on[i, j]` is whether vertex i is on the boundary of half-space j. Without vertices the set is
+    empty, whatever the directions and lines are.
     """
 
     points: list[Rationals]
@@ -83,19 +88,27 @@ def null_space(matrix: list[Rationals]) -> list[Row]:
         heights = [dot(row, line) for line in basis]
         pivot = next((k for k, height in enumerate(heights) if height), None)
         if pivot is not None:
-            height, line = heights.pop(pivot), basis.pop(pivot)
-            basis = [combined(height, one, -shift, line) for one, shift in zip(basis, heights, strict=True)]
+            height = heights.pop(pivot)
+            line = basis.pop(pivot)
+            basis = [
+                combined(height, one, -shift, line)
+                for one, shift in zip(basis, heights, strict=True)
+            ]
     return basis
 
 
 def product(rows: list[Rationals], matrix: list[Rationals]) -> list[Rationals]:
     """Return the product of two matrices."""
     columns = list(zip(*matrix, strict=True))
-    return [[sum(map(operator.mul, row, column), Fraction(0)) for column in columns] for row in rows]
+    return [
+        [sum(map(operator.mul, row, column), Fraction(0)) for column in columns] for row in rows
+    ]
 
 
 def whole(numbers: Rationals) -> Row:
-    """Return rational numbers times a common positive factor, as integers without a common divisor."""
+    """Return rational numbers times a common positive factor, as integers without a common
+    divisor.
+    """
     divisor = math.lcm(*(number.denominator for number in numbers))
     return shortest([number.numerator * (divisor // number.denominator) for number in numbers])
 
@@ -118,8 +131,9 @@ def _rounded(row: Row) -> list[float]:
 def extreme_rays(rows: list[Row]) -> Cone:
     """Return the extreme rays of {z: rows z >= 0}, one step of the double description for each row.
 
-    It starts with the whole space, which has no ray and as many lines as dimensions. Rows that end lines come first,
-    then always the one that most rays violate: an empty set ends after few of many rows.
+    It starts with the whole space, which has no ray and as many lines as dimensions. Rows that end
+    lines come first, then always the one that most rays violate: an empty set ends after few of
+    many rows.
     """
     size = len(rows[0])
     lines = [[int(i == j) for j in range(size)] for i in range(size)]
@@ -132,11 +146,14 @@ def extreme_rays(rows: list[Row]) -> Cone:
         if pivot is None:
             continue
 
-        # The half of a line that is above the row becomes a ray; all else moves along the line, onto the row.
+        # The half of a line that is above the row becomes a ray; all else moves along the line,
+        # onto the row.
         height = abs(heights.pop(pivot))
         line = lines.pop(pivot)
         above = line if dot(row, line) > 0 else [-entry for entry in line]
-        lines = [combined(height, one, -shift, above) for one, shift in zip(lines, heights, strict=True)]
+        lines = [
+            combined(height, one, -shift, above) for one, shift in zip(lines, heights, strict=True)
+        ]
         rays = [combined(height, ray, -dot(row, ray), above) for ray in rays]
         on[:, number] = True
         rays.append(above)
@@ -161,7 +178,9 @@ def _inserted(rows: list[Row], rays: list[Row], on: Flags, done: Flags, lines: l
 
 
 def _cut(rays: list[Row], on: Flags, row: Row, number: int, least: int) -> tuple[list[Row], Flags]:
-    """Return the rays above a row, which has a `number`, and those where edges cross it, and their rows."""
+    """Return the rays above a row, which has a `number`, and those where edges cross it, and their
+    rows.
+    """
     heights = [dot(row, ray) for ray in rays]
     on[:, number] = [height == 0 for height in heights]
     if min(heights, default=0) >= 0:
@@ -182,9 +201,12 @@ def edges_across(bits: Bits, signs: Integers, least: int) -> Integers:
 
     An edge lies on at least `least` rows, and no third ray lies on all of them.
     """
-    columns, count = np.ascontiguousarray(bits.T), len(bits)
-    shared, near = np.empty(count, np.int64), np.empty(count, np.int64)
-    pairs, made = np.empty((count, 2), np.int64), 0
+    columns = np.ascontiguousarray(bits.T)
+    count = len(bits)
+    shared = np.empty(count, np.int64)
+    near = np.empty(count, np.int64)
+    pairs = np.empty((count, 2), np.int64)
+    made = 0
     for p in np.flatnonzero(signs > 0):
         common(bits[p], columns, shared)
         found = 0
@@ -200,7 +222,8 @@ def edges_across(bits: Bits, signs: Integers, least: int) -> Integers:
             if is_edge:
                 if made == len(pairs):
                     pairs = np.concatenate((pairs, pairs))
-                pairs[made, 0], pairs[made, 1] = p, q
+                pairs[made, 0] = p
+                pairs[made, 1] = q
                 made += 1
     return pairs[:made]
 

@@ -1,15 +1,17 @@
 """Construction of polytopes: hulls of points, intersections of half-spaces, and cuts.
 
-Each set is computed in three steps. The double description finds vertices or facets with rounded numbers. What it finds
-is *settled* (`settled`): what is redundant goes, and the rest is kept only if it proves to be all
-(`incidence.is_closed`), with the incidence of the double description or with that of all points within SNAP of a
-facet. Otherwise the set is computed again with integers (`cone`), which round nothing.
+Each set is computed in three steps. The double description finds vertices or facets with rounded
+numbers. What it finds is *settled* (`settled`): what is redundant goes, and the rest is kept only
+if it proves to be all (`incidence.is_closed`), with the incidence of the double description or with
+that of all points within SNAP of a facet. Otherwise the set is computed again with integers
+(`cone`), which round nothing.
 
-Whether half-spaces have an empty, flat or unbounded intersection is decided by integers. A cut of a set that exists is
-decided to ON of its size if it is empty, and to SNAP if it is flat.
+Whether half-spaces have an empty, flat or unbounded intersection is decided by integers. A cut of a
+set that exists is decided to ON of its size if it is empty, and to SNAP if it is flat.
 
-New vertices move to the outer sides of their facets. If no vertex is missing, the hull of the vertices then contains
-the set of the half-spaces: each face of the hull is on the outer side of its facet.
+New vertices move to the outer sides of their facets. If no vertex is missing, the hull of the
+vertices then contains the set of the half-spaces: each face of the hull is on the outer side of its
+facet.
 """
 
 from __future__ import annotations
@@ -46,28 +48,45 @@ from infoset.geometry.tolerances import ON, REDUCED, SNAP, UNSURE
 Ends = tuple[Floats, Floats]
 """Minimum and maximum coordinates, each of shape (n,)."""
 FINE = 2.0**14
-"""Ratio of widths from which a part of a set is computed in its own coordinates: its vertices are known to ON of the
-whole, which would be SNAP of a part 2000 times smaller than this."""
+"""Ratio of widths from which a part of a set is computed in its own coordinates: its vertices are
+known to ON of the whole, which would be SNAP of a part 2000 times smaller than this."""
 _GOOD_WIDTH_RATIO = 2.0**6
-"""Ratio of widths up to which coordinates are as good as those of the set itself: two digits are lost."""
+"""Ratio of widths up to which coordinates are as good as those of the set itself: two digits are
+lost.
+"""
 _LEAST_WIDTH = 64.0 * UNSURE / SNAP
-"""Scale of an axis, relative to the coordinates from which limits were computed, in which their rounding is flat."""
+"""Scale of an axis, relative to the coordinates from which limits were computed, in which their
+rounding is flat.
+"""
 _PIVOT_GROWTH = 64.0
 """Growth of distances from a plane in the pivots of a flat set."""
 _SAME_VERTEX = 64.0 * SNAP
-"""Distance of points that are the same vertex: within SNAP of its facets, unless these are at a small angle."""
+"""Distance of points that are the same vertex: within SNAP of its facets, unless these are at a
+small angle.
+"""
 _MEETING = 16.0 * SNAP
-"""Distance from a vertex of computed facets that meet in it; up to 6 SNAP were measured in observers of four states."""
+"""Distance from a vertex of computed facets that meet in it; up to 6 SNAP were measured in
+observers of four states.
+"""
 
 
 def empty(space: int) -> PolytopeArrays:
     """Return the empty set of R^n, n = `space`."""
     nothing = np.zeros((0, space + 1))
-    return PolytopeArrays(nothing[:, 1:], nothing, nothing, np.zeros((0, 0), np.bool_), np.zeros(space), np.ones(space))
+    return PolytopeArrays(
+        nothing[:, 1:],
+        nothing,
+        nothing,
+        np.zeros((0, 0), np.bool_),
+        np.zeros(space),
+        np.ones(space),
+    )
 
 
 def box(lower: Floats, upper: Floats) -> PolytopeArrays:
-    """Return {x: lower <= x <= upper} for bounds of shape (n,); flat along axes whose bounds are equal. Exact."""
+    """Return {x: lower <= x <= upper} for bounds of shape (n,); flat along axes whose bounds are
+    equal. Exact.
+    """
     space = len(lower)
     centre, scale = coordinates(lower.copy(), upper.copy(), np.zeros(space), 0.0)
     least = (lower - centre) / scale
@@ -81,17 +100,23 @@ def box(lower: Floats, upper: Floats) -> PolytopeArrays:
     offsets = np.concatenate([most[is_wide], -least[is_wide]])
     incidence = points @ normals.T == offsets
     equations = np.column_stack([unit[~is_wide], most[~is_wide]])
-    return PolytopeArrays(points, np.column_stack([normals, offsets]), equations, incidence, centre, scale)
+    return PolytopeArrays(
+        points, np.column_stack([normals, offsets]), equations, incidence, centre, scale
+    )
 
 
 def of_polyhedron(found: Polyhedron) -> PolytopeArrays:
-    """Return an exact set; its numbers are rounded to nearest, and once more in what is computed from them."""
+    """Return an exact set; its numbers are rounded to nearest, and once more in what is computed
+    from them.
+    """
     if not found.points:
         return empty(found.space)
     points = rounded_points(found.points, found.space)
     if found.is_bounded:
         return hull_of(points)
-    on = np.array([[holds_with_equality(facet, point) for facet in found.facets] for point in found.points])
+    on = np.array(
+        [[holds_with_equality(facet, point) for facet in found.facets] for point in found.points]
+    )
     return PolytopeArrays(
         points,
         rounded_rows(found.facets, found.space),
@@ -103,20 +128,24 @@ def of_polyhedron(found: Polyhedron) -> PolytopeArrays:
     )
 
 
-# Hulls of points ------------------------------------------------------------------------------------------------------
+# Hulls of points
+# --------------------------------------------------------------------------------------------------
 
 
 def hull_of(points: Floats, flat: float = SNAP) -> PolytopeArrays:
     """Return the convex hull of points, shape (m, n), at least one; see `hull`."""
-    centre, scale = coordinates(points.min(axis=0), points.max(axis=0), np.zeros(points.shape[1]), SNAP)
+    centre, scale = coordinates(
+        points.min(axis=0), points.max(axis=0), np.zeros(points.shape[1]), SNAP
+    )
     return hull((points - centre) / scale, centre, scale, flat)
 
 
 def hull(points: Floats, centre: Floats, scale: Floats, flat: float = SNAP) -> PolytopeArrays:
-    """Return the convex hull of points in scaled coordinates; it is flat if it is thinner than `flat`.
+    """Return the convex hull of points in scaled coordinates; it is flat if it is thinner than
+    `flat`.
 
-    Points that span no more than d dimensions differ in d coordinates, found by complete pivoting. The hull is computed
-    in these; the other coordinates are functions of them.
+    Points that span no more than d dimensions differ in d coordinates, found by complete pivoting.
+    The hull is computed in these; the other coordinates are functions of them.
     """
     space = points.shape[1]
     start = np.column_stack([points, np.ones(len(points))])
@@ -128,11 +157,15 @@ def hull(points: Floats, centre: Floats, scale: Floats, flat: float = SNAP) -> P
     equations[:, own] = -slopes[:, :-1]
     equations[:, -1] = slopes[:, -1]
     if not len(own):
-        return PolytopeArrays(points[:1].copy(), equations[:0], equations, np.zeros((1, 0), np.bool_), centre, scale)
+        return PolytopeArrays(
+            points[:1].copy(), equations[:0], equations, np.zeros((1, 0), np.bool_), centre, scale
+        )
 
     if len(rest):
         # The two sides of a flat set are the same points, to its thickness.
-        points = points[np.sort(np.unique(np.rint(points[:, own] / SNAP), axis=0, return_index=True)[1])]
+        points = points[
+            np.sort(np.unique(np.rint(points[:, own] / SNAP), axis=0, return_index=True)[1])
+        ]
     inner = np.ascontiguousarray(points[:, own])
     used, normals, incidence = _facets_of(inner)
     facets = np.zeros((len(normals), space + 1))
@@ -148,16 +181,21 @@ def _spans_less(points: Floats, flat: float) -> bool:
 
 
 def _facets_of(points: Floats) -> tuple[Integers, Floats, Flags]:
-    """Return the numbers of the vertices, the normals of the facets and the incidence of a hull with an interior."""
+    """Return the numbers of the vertices, the normals of the facets and the incidence of a hull
+    with an interior.
+    """
     dimension = points.shape[1]
     rays, on = dd.extreme_rays(np.column_stack([-points, np.ones(len(points))]), False, 0.0)
     for is_exact in (False, True):
         if is_exact:
-            rows = [cone.whole([*(-x for x in point), Fraction(1)]) for point in cone.rationals(points)]
+            rows = [
+                cone.whole([*(-x for x in point), Fraction(1)]) for point in cone.rationals(points)
+            ]
             exact = cone.extreme_rays(rows)
             rays = np.array([cone.rounded(ray) for ray in exact.rays])
             on = exact.on
-        # Rounding can divide a facet in two rays, each on some of its points: on all of them, they are one.
+        # Rounding can divide a facet in two rays, each on some of its points: on all of them, they
+        # are one.
         snapped, is_consistent = touching(points, rays, on.T.copy(), 0, 1.0, SNAP)
         for one in (on.T.copy(), snapped):
             used, sides, incidence = without_redundant(one, dimension)
@@ -169,7 +207,8 @@ def _facets_of(points: Floats) -> tuple[Integers, Floats, Flags]:
     return used, rays[sides, :-1].copy(), incidence
 
 
-# Half-spaces ----------------------------------------------------------------------------------------------------------
+# Half-spaces
+# --------------------------------------------------------------------------------------------------
 
 
 def of_half_spaces(
@@ -183,12 +222,12 @@ def of_half_spaces(
 ) -> PolytopeArrays:
     """Return {x: rows (x - origin) <= limits}; limits may be infinite.
 
-    If the set is known to be about in a box, its `ends` save time. If it certainly `is_inside`, and unbounded because
-    of rounding, it is clipped to the box.
+    If the set is known to be about in a box, its `ends` save time. If it certainly `is_inside`, and
+    unbounded because of rounding, it is clipped to the box.
 
-    `sizes`, shape (n,), are those of the coordinates from which limits were computed. Integers would be exact about the
-    wrong set, often an empty one: where they decide, the half-spaces are larger by the rounding of such limits, and
-    what is thinner is flat.
+    `sizes`, shape (n,), are those of the coordinates from which limits were computed. Integers
+    would be exact about the wrong set, often an empty one: where they decide, the half-spaces are
+    larger by the rounding of such limits, and what is thinner is flat.
     """
     space = rows.shape[1]
     if np.isneginf(limits).any():
@@ -217,7 +256,9 @@ def of_half_spaces(
         return found
     sides = np.vstack([rows, np.eye(space), -np.eye(space)])
     ends_of_box = np.concatenate([ends[1] - start, start - ends[0]])
-    return _with_integers(sides, np.append(limits, ends_of_box), start, np.zeros(space) if sizes is None else sizes)
+    return _with_integers(
+        sides, np.append(limits, ends_of_box), start, np.zeros(space) if sizes is None else sizes
+    )
 
 
 def _frame_of(lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
@@ -226,8 +267,11 @@ def _frame_of(lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
     return found
 
 
-def _rounded(rows: Floats, limits: Floats, origin: Floats, centre: Floats, scale: Floats) -> PolytopeArrays | None:
-    """Return {x: rows (x - origin) <= limits} by the double description, or None if integers must decide.
+def _rounded(
+    rows: Floats, limits: Floats, origin: Floats, centre: Floats, scale: Floats
+) -> PolytopeArrays | None:
+    """Return {x: rows (x - origin) <= limits} by the double description, or None if integers must
+    decide.
 
     They decide unless the set is bounded, closed, and thicker than REDUCED in these coordinates.
     """
@@ -236,7 +280,9 @@ def _rounded(rows: Floats, limits: Floats, origin: Floats, centre: Floats, scale
     if _is_short(scaled[:, :-1]).any() or not len(scaled):
         return None
     scaled = dd.in_units(scaled)
-    table = np.vstack([np.eye(space + 1)[-1:], scaled * ([-1.0] * space + [1.0])])  # the first row is t >= 0
+    table = np.vstack(
+        [np.eye(space + 1)[-1:], scaled * ([-1.0] * space + [1.0])]
+    )  # the first row is t >= 0
     rays, on = dd.extreme_rays(table, True, ON)
     if not len(rays) or not (rays[:, -1] == 1.0).all():
         return None
@@ -260,7 +306,9 @@ def _with_integers(rows: Floats, limits: Floats, origin: Floats, sizes: Floats) 
     rows = rows[~is_noise]
     centre, scale = exact_coordinates(exact.box())
     scale = np.maximum(scale, np.ldexp(1.0, np.frexp(_LEAST_WIDTH * sizes)[1] - 1) * (sizes > 0.0))
-    facets = dd.in_units(np.column_stack([rows * scale, moved_limits(rows, limits[~is_noise], centre - origin)]))
+    facets = dd.in_units(
+        np.column_stack([rows * scale, moved_limits(rows, limits[~is_noise], centre - origin)])
+    )
     points = scaled_points(exact.points, centre, scale)
     if _is_flat(exact.on, rows.shape[1]):
         return hull(points, centre, scale)
@@ -284,7 +332,9 @@ def _unbounded(exact: cone.Vertices) -> Polyhedron:
 
 
 def _is_short(rows: Floats) -> Flags:
-    """Return which rows are shorter than the longest one by a factor, or zero: the rounding of a sum that is zero."""
+    """Return which rows are shorter than the longest one by a factor, or zero: the rounding of a
+    sum that is zero.
+    """
     sizes = np.abs(rows).max(axis=1)
     return np.asarray(sizes <= UNSURE * sizes.max(initial=0.0))
 
@@ -297,8 +347,8 @@ def _holds_without_direction(limits: Floats, which: Flags) -> bool:
 def _noise(rows: Floats, limits: Floats, origin: Floats) -> tuple[Flags, cone.Vertices]:
     """Return which rows are rounding, and the exact vertices of the others.
 
-    A row is rounding if it is far shorter than the longest one, also in units of the box of the rows that are not: a
-    set that needs it to be bounded has no such box.
+    A row is rounding if it is far shorter than the longest one, also in units of the box of the
+    rows that are not: a set that needs it to be bounded has no such box.
     """
     is_short = _is_short(rows)
     exact = _exact_vertices(rows[~is_short], limits[~is_short], origin)
@@ -313,26 +363,36 @@ def _noise(rows: Floats, limits: Floats, origin: Floats) -> tuple[Flags, cone.Ve
 
 
 def _exact_vertices(rows: Floats, limits: Floats, origin: Floats) -> cone.Vertices:
-    """Return the exact vertices of {x: rows (x - origin) <= limits}; without rows, those of the whole space."""
+    """Return the exact vertices of {x: rows (x - origin) <= limits}; without rows, those of the
+    whole space.
+    """
     if not len(rows):
         rows = np.zeros((1, rows.shape[1]))
         limits = np.zeros(1)
     normals = cone.rationals(rows)
     shifts = cone.product(normals, cone.rationals(origin[:, None]))
-    ends = [Fraction(limit) + shift for limit, (shift,) in zip(limits.tolist(), shifts, strict=True)]
+    ends = [
+        Fraction(limit) + shift for limit, (shift,) in zip(limits.tolist(), shifts, strict=True)
+    ]
     return cone.vertices_of(normals, ends)
 
 
-# Cuts -----------------------------------------------------------------------------------------------------------------
+# Cuts
+# --------------------------------------------------------------------------------------------------
 
 
-def cut(whole: PolytopeArrays, rows: Floats, limits: Floats, origin: Floats | float = 0.0) -> PolytopeArrays:
+def cut(
+    whole: PolytopeArrays, rows: Floats, limits: Floats, origin: Floats | float = 0.0
+) -> PolytopeArrays:
     """Return the part of a bounded set where rows (x - origin) <= limits, or the set itself.
 
-    A half-space from which the set sticks out by less than ON of its size does not cut it. A part that is much smaller
-    than the set is computed again, in its own coordinates, from the half-spaces that are near it.
+    A half-space from which the set sticks out by less than ON of its size does not cut it. A part
+    that is much smaller than the set is computed again, in its own coordinates, from the
+    half-spaces that are near it.
     """
-    scaled = np.column_stack([rows * whole.scale, moved_limits(rows, limits, whole.centre - origin)])
+    scaled = np.column_stack(
+        [rows * whole.scale, moved_limits(rows, limits, whole.centre - origin)]
+    )
     if len(whole.equations):
         scaled = _within(scaled, whole.equations)
     is_zero = np.asarray(~scaled[:, :-1].any(axis=1))
@@ -353,7 +413,9 @@ def cut(whole: PolytopeArrays, rows: Floats, limits: Floats, origin: Floats | fl
     table = cuts * ([-1.0] * whole.space + [1.0])
     # An edge lies on one facet less than the set has dimensions.
     rays, on = dd.insert_rows(rays, on, table, numbers, whole.dimension - 1, True)
-    part = replace(whole, points=rays[:, :-1].copy(), facets=np.vstack([whole.facets, cuts]), incidence=on)
+    part = replace(
+        whole, points=rays[:, :-1].copy(), facets=np.vstack([whole.facets, cuts]), incidence=on
+    )
     if not len(rays):
         return of_half_spaces(*half_spaces(part, whole.centre), whole.centre, whole.bounding_box())
     found = settled(part, len(whole.facets))
@@ -370,7 +432,9 @@ def cut(whole: PolytopeArrays, rows: Floats, limits: Floats, origin: Floats | fl
 
 
 def _computed_again(part: PolytopeArrays, whole: PolytopeArrays) -> PolytopeArrays:
-    """Return a part of a set from its half-spaces alone: those that are near it, or if these are not enough, all."""
+    """Return a part of a set from its half-spaces alone: those that are near it, or if these are
+    not enough, all.
+    """
     few = _of_near_half_spaces(part)
     if few is not None:
         return few
@@ -378,15 +442,19 @@ def _computed_again(part: PolytopeArrays, whole: PolytopeArrays) -> PolytopeArra
 
 
 def _of_near_half_spaces(part: PolytopeArrays) -> PolytopeArrays | None:
-    """Return a part from its half-spaces that are within SNAP of its points, or None if others cut what they leave.
+    """Return a part from its half-spaces that are within SNAP of its points, or None if others cut
+    what they leave.
 
-    The points need not be right: if all half-spaces hold where these few hold, the others are redundant.
+    The points need not be right: if all half-spaces hold where these few hold, the others are
+    redundant.
     """
     near = SNAP * max(1.0, float(np.abs(part.points).max()))
     gaps = part.facets[:, -1] - (part.points @ part.facets[:, :-1].T).max(axis=0)
     few = replace(part, facets=part.facets[gaps <= near])
     lower, upper = part.bounding_box()
-    found = of_half_spaces(*half_spaces(few, part.centre), part.centre, (lower, upper), is_inside=False)
+    found = of_half_spaces(
+        *half_spaces(few, part.centre), part.centre, (lower, upper), is_inside=False
+    )
     if not found.is_bounded:
         return None
     points = (found.vertices - part.centre) / part.scale
@@ -397,7 +465,8 @@ def _of_near_half_spaces(part: PolytopeArrays) -> PolytopeArrays | None:
 def _within(rows: Floats, equations: Floats) -> Floats:
     """Return rows (a, b) in the own coordinates of a flat set: the others are functions of them.
 
-    Entries that are the rounding of a difference are zero; a row without others holds to this rounding.
+    Entries that are the rounding of a difference are zero; a row without others holds to this
+    rounding.
     """
     _, others = own_and_others(equations)
     factors = rows[:, others]
@@ -422,20 +491,25 @@ def _is_small_part(part: PolytopeArrays, whole: PolytopeArrays) -> bool:
 def settled(rough: PolytopeArrays, known: int) -> PolytopeArrays | None:
     """Return a set without what is redundant, or None if vertices and facets are not certainly all.
 
-    The first `known` facets are those of a set that was settled before. Vertices on others were computed: they are
-    compared with all facets, and move to the outer sides of their own. 0 means that all were computed.
+    The first `known` facets are those of a set that was settled before. Vertices on others were
+    computed: they are compared with all facets, and move to the outer sides of their own. 0 means
+    that all were computed.
 
-    Facets that were themselves computed need not meet in one point. If a vertex is not within SNAP of its facets, the
-    vertices are computed again from them, and may then be _MEETING away.
+    Facets that were themselves computed need not meet in one point. If a vertex is not within SNAP
+    of its facets, the vertices are computed again from them, and may then be _MEETING away.
 
-    Points within SNAP of a facet are on it where the result is not closed otherwise: vertices nearer to each other are
-    one. Facets on which all vertices lie are equations of a set of lower dimension: the hull of its vertices.
+    Points within SNAP of a facet are on it where the result is not closed otherwise: vertices
+    nearer to each other are one. Facets on which all vertices lie are equations of a set of lower
+    dimension: the hull of its vertices.
     """
     size = max(1.0, float(np.abs(rough.points).max()))
     far = SNAP * size
     on, is_consistent = touching(rough.points, rough.facets, rough.incidence, known, size, far)
     if not is_consistent:
-        rough = replace(rough, points=refined(rough.points, rough.facets, rough.equations, rough.incidence, known))
+        rough = replace(
+            rough,
+            points=refined(rough.points, rough.facets, rough.equations, rough.incidence, known),
+        )
         far = _MEETING * size
         on, is_consistent = touching(rough.points, rough.facets, rough.incidence, known, size, far)
     if not is_consistent:
@@ -443,7 +517,8 @@ def settled(rough: PolytopeArrays, known: int) -> PolytopeArrays | None:
     if _is_flat(on, rough.dimension):
         return _flat_part(replace(rough, incidence=on), known)
 
-    # What is on which by the steps of the double description is finer than by distances, if it is all.
+    # What is on which by the steps of the double description is finer than by distances, if it is
+    # all.
     for incidence in (rough.incidence, on):
         used, sides, kept = without_redundant(incidence, rough.dimension)
         if loses_points(rough.points, used, incidence, rough.dimension, _SAME_VERTEX * size):
@@ -454,7 +529,9 @@ def settled(rough: PolytopeArrays, known: int) -> PolytopeArrays | None:
 
 
 def _flat_part(whole: PolytopeArrays, known: int) -> PolytopeArrays | None:
-    """Return the hull of points that are all on a facet; None if it is not flat, or if the set of the facets is not."""
+    """Return the hull of points that are all on a facet; None if it is not flat, or if the set of
+    the facets is not.
+    """
     if _has_interior(whole):
         return None
     near = SNAP * max(1.0, float(np.abs(whole.points).max()))
@@ -480,7 +557,9 @@ def _has_interior(whole: PolytopeArrays) -> bool:
 
 
 def _is_flat(on: Flags, dimension: int) -> bool:
-    """Whether points, with `on` for which is on which half-space, are too few for an interior or all on a boundary."""
+    """Whether points, with `on` for which is on which half-space, are too few for an interior or
+    all on a boundary.
+    """
     return len(on) <= dimension or bool(on.all(axis=0).any())
 
 
@@ -497,6 +576,8 @@ def _reduced(
 
 
 def enlarged(one: PolytopeArrays, by: Floats) -> PolytopeArrays:
-    """Return a set that contains {y + e: |e_i| <= by_i}, in scaled coordinates, `by` of shape (n,)."""
+    """Return a set that contains {y + e: |e_i| <= by_i}, in scaled coordinates, `by` of shape
+    (n,).
+    """
     points, facets = around(one.points, one.facets, one.incidence, by, len(one.equations) > 0)
     return replace(one, points=points, facets=facets)

@@ -1,14 +1,18 @@
-"""Double description: the extreme rays of a polyhedral cone from its rows, one row after the other, compiled.
+"""Double description: the extreme rays of a polyhedral cone from its rows, one row after the other,
+compiled.
 
-A polytope {y: a . y <= b} is the cone {(y, t): b t - a . y >= 0, t >= 0}; its vertices are the extreme rays with t = 1
-(`affine`). In the dual, points y are the rows (-y, 1) of a cone whose extreme rays are the facets (a, b). Bit i of a
-ray is set if it lies on row i. A row's longest entry is about one.
+A polytope {y: a . y <= b} is the cone {(y, t): b t - a . y >= 0, t >= 0}; its vertices are the
+extreme rays with t = 1 (`affine`). In the dual, points y are the rows (-y, 1) of a cone whose
+extreme rays are the facets (a, b). Bit i of a ray is set if it lies on row i. A row's longest entry
+is about one.
 
-Numbers are rounded here, so that a result may be wrong: `construction` proves it or computes it with integers (`cone`).
+Numbers are rounded here, so that a result may be wrong: `construction` proves it or computes it
+with integers (`cone`).
 
 References
 ----------
-K. Fukuda and A. Prodon, Double description method revisited, in Combinatorics and Computer Science (1996).
+K. Fukuda and A. Prodon, Double description method revisited, in Combinatorics and Computer Science
+(1996).
 """
 
 from __future__ import annotations
@@ -61,7 +65,9 @@ def _is_edge(bits: Bits, others: Integers, p: Any, q: Any) -> bool:
 
 @_kernels.allocation_free
 def _combine(p: Floats, q: Floats, alpha: float, beta: float, affine: Any, result: Floats) -> None:
-    """Write the ray alpha q + beta p; with t = 1 if it is a point. Coordinates that both points share stay exact."""
+    """Write the ray alpha q + beta p; with t = 1 if it is a point. Coordinates that both points
+    share stay exact.
+    """
     last = len(p) - 1
     total = alpha * q[last] + beta * p[last] if affine else 0.0
     if total > 0.0:
@@ -85,12 +91,24 @@ def sides(rays: Floats, row: Floats) -> Floats:
 
 
 @_kernels.allocation_free
-def _cross(one: Any, rays: Floats, bits: Bits, heights: Floats, least: int, affine: Any, work: tuple[Any, ...]) -> int:
-    """Write the rays, and their bits, in which edges of one ray cross the row, see `crossings`; return their number."""
+def _cross(
+    one: Any,
+    rays: Floats,
+    bits: Bits,
+    heights: Floats,
+    least: int,
+    affine: Any,
+    work: tuple[Any, ...],
+) -> int:
+    """Write the rays, and their bits, in which edges of one ray cross the row, see `crossings`;
+    return their number.
+    """
     columns, shared, near, result, marks = work
     common(bits[one], columns, shared)
     found = 0
-    for third in range(len(rays)):  # only rays with enough common rows can be the other end, or forbid an edge
+    for third in range(
+        len(rays)
+    ):  # only rays with enough common rows can be the other end, or forbid an edge
         near[found] = third
         found += shared[third] >= least
 
@@ -106,11 +124,13 @@ def _cross(one: Any, rays: Floats, bits: Bits, heights: Floats, least: int, affi
 
 
 @_kernels.compiled
-def crossings(rays: Floats, bits: Bits, heights: Floats, least: int, affine: Any) -> tuple[Floats, Bits]:
+def crossings(
+    rays: Floats, bits: Bits, heights: Floats, least: int, affine: Any
+) -> tuple[Floats, Bits]:
     """Return the rays in which edges cross a row, and the common bits of the ends of the edges.
 
-    `heights` are those of `sides`, and `least` is the minimum number of rows on which an edge lies. O(k words) for each
-    ray on the smaller side and each pair with as many rows.
+    `heights` are those of `sides`, and `least` is the minimum number of rows on which an edge lies.
+    O(k words) for each ray on the smaller side and each pair with as many rows.
     """
     k, size = rays.shape
     columns = np.ascontiguousarray(bits.T)
@@ -130,11 +150,14 @@ def crossings(rays: Floats, bits: Bits, heights: Floats, least: int, affine: Any
 
 
 @_kernels.compiled
-def insert(rays: Floats, bits: Bits, row: Floats, number: int, least: int, affine: Any) -> tuple[Floats, Bits]:
-    """Return the rays with row . z >= 0, shape (k, D), and their bits, shape (k, words), for one more row.
+def insert(
+    rays: Floats, bits: Bits, row: Floats, number: int, least: int, affine: Any
+) -> tuple[Floats, Bits]:
+    """Return the rays with row . z >= 0, shape (k, D), and their bits, shape (k, words), for one
+    more row.
 
-    One step of the double description: rays on the wrong side go; each edge that crosses the row gives a ray. `number`
-    is the bit of the row; see `sides` and `crossings`.
+    One step of the double description: rays on the wrong side go; each edge that crosses the row
+    gives a ray. `number` is the bit of the row; see `sides` and `crossings`.
     """
     heights = sides(rays, row)
     new, marks = crossings(rays, bits, heights, least, affine)
@@ -156,7 +179,9 @@ def insert(rays: Floats, bits: Bits, row: Floats, number: int, least: int, affin
 def insert_rows(
     rays: Floats, on: Flags, rows: Floats, numbers: Integers, least: int, affine: Any
 ) -> tuple[Floats, Flags]:
-    """Return the rays with row . z >= 0 for rows with some `numbers`, and which ray is on which row; see `insert`."""
+    """Return the rays with row . z >= 0 for rows with some `numbers`, and which ray is on which
+    row; see `insert`.
+    """
     bits = packed(on)
     for k in range(len(rows)):
         rays, bits = insert(rays, bits, rows[k], numbers[k], least, affine)
@@ -167,7 +192,8 @@ def insert_rows(
 def pivots(rows: Floats, tolerance: float, first: Any) -> tuple[Integers, Integers]:
     """Return rows and columns of a regular part of a matrix, shapes (r,), by complete pivoting.
 
-    A pivot up to `tolerance` ends it. If `first` >= 0, the first pivot is the last entry of that row.
+    A pivot up to `tolerance` ends it. If `first` >= 0, the first pivot is the last entry of that
+    row.
     """
     k, size = rows.shape
     table = rows.copy()
@@ -190,8 +216,9 @@ def pivots(rows: Floats, tolerance: float, first: Any) -> tuple[Integers, Intege
 def extreme_rays(rows: Floats, affine: bool, tolerance: float) -> tuple[Floats, Flags]:
     """Return the extreme rays, shape (k, D), of {z: rows z >= 0}, and which ray is on which row.
 
-    If `affine`, the first row is t >= 0, and rays with t > 0 have t = 1. It starts with the simplicial cone of D rows
-    and inserts the others in their order. If the rank of the rows is below D to a `tolerance`, it returns no rays.
+    If `affine`, the first row is t >= 0, and rays with t > 0 have t = 1. It starts with the
+    simplicial cone of D rows and inserts the others in their order. If the rank of the rows is
+    below D to a `tolerance`, it returns no rays.
     """
     m, size = rows.shape
     chosen, _ = pivots(rows, tolerance, 0 if affine else -1)

@@ -12,7 +12,9 @@ class EmptyPolytopeError(ValueError):
 
 
 class UnboundedPolytopeError(ValueError):
-    """An unbounded set has no answer; `direction`, shape (n,), of unit length, is one in which it is unbounded."""
+    """An unbounded set has no answer; `direction`, shape (n,), of unit length, is one in which it
+    is unbounded.
+    """
 
     def __init__(self, direction: Floats) -> None:
         direction = direction / np.abs(direction).max()

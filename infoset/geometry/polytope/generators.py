@@ -1,7 +1,9 @@
-"""Vertices and facets of zonotopes: the sets of centre + t_1 g_1 + ... + t_m g_m with all -1 <= t_i <= 1.
+"""Vertices and facets of zonotopes: the sets of centre + t_1 g_1 + ... + t_m g_m with all -1 <= t_i
+<= 1.
 
-A facet of a zonotope of R^3 is parallel to two generators; all the others are at their ends, t = 1 or -1, on the side
-of the facet. Signs of determinants are therefore enough: nothing is enlarged step by step.
+A facet of a zonotope of R^3 is parallel to two generators; all the others are at their ends, t = 1
+or -1, on the side of the facet. Signs of determinants are therefore enough: nothing is enlarged
+step by step.
 
 References
 ----------
@@ -27,18 +29,25 @@ from infoset.kernels import Kernels
 
 _kernels = Kernels()
 PARALLEL = SNAP
-"""Sine of the angle between two generators that count as parallel: what differs is flat, relative to them."""
+"""Sine of the angle between two generators that count as parallel: what differs is flat, relative
+to them.
+"""
 _NEARLY_PARALLEL = 1.0 - 1e-6
 """Cosine from which the angle is computed: it does not show one of 1e-11."""
 COPLANAR = 128.0 * UNSURE
 """Determinant of three generators of length one that count as coplanar: 500 roundings.
 
-It is far below that of two generators that are nearly parallel and a third one that is not in a plane with them.
+It is far below that of two generators that are nearly parallel and a third one that is not in a
+plane with them.
 """
 _BLUNT = 0.1
-"""Cosine of the angles between a mean normal and normals, down to which a vertex moves by at most ten roundings."""
+"""Cosine of the angles between a mean normal and normals, down to which a vertex moves by at most
+ten roundings.
+"""
 SHORT = ON
-"""Sum of the sizes of generators, in scaled coordinates, that only move facets and vertices outward."""
+"""Sum of the sizes of generators, in scaled coordinates, that only move facets and vertices
+outward.
+"""
 
 
 class Span:
@@ -53,7 +62,8 @@ class Span:
     generators : ndarray, shape (m, n)
         In scaled coordinates.
     own, others : ndarray of int, shapes (d,) and (n - d,)
-        Numbers of coordinates that are independent in the set, and of those that are functions of them.
+        Numbers of coordinates that are independent in the set, and of those that are functions of
+        them.
     rows : ndarray, shape (m, d)
         The generators in the own scaled coordinates.
     basis : ndarray of int, shape (d,)
@@ -83,9 +93,11 @@ class Span:
 
     @cached_property
     def coefficients(self) -> Floats:
-        """Generators as combinations of those of the base, shape (m, d): in these coordinates no set is thin.
+        """Generators as combinations of those of the base, shape (m, d): in these coordinates no
+        set is thin.
 
-        The residuals of two corrections have doubled digits, so that they are exact to rounding also if the set is.
+        The residuals of two corrections have doubled digits, so that they are exact to rounding
+        also if the set is.
         """
         space = len(self.own)
         equations = np.hstack([self.base.T, -np.eye(space)])
@@ -113,7 +125,9 @@ class Distinct(NamedTuple):
     coefficients: Floats
     """As combinations of those of the base, shape (k, d)."""
     missed: Floats
-    """Half-widths of a box, shape (d,): the zonotope is inside that of the rows, enlarged by the box."""
+    """Half-widths of a box, shape (d,): the zonotope is inside that of the rows, enlarged by the
+    box.
+    """
 
 
 class Faces(NamedTuple):
@@ -138,10 +152,11 @@ class Faces(NamedTuple):
 
 
 def polytope_of(kind: Any, centre: Floats, generators: Floats) -> Any:
-    """Return a zonotope as a polytope of a class `kind`, which contains it and exceeds it by rounding.
+    """Return a zonotope as a polytope of a class `kind`, which contains it and exceeds it by
+    rounding.
 
-    In up to three dimensions all facets and vertices follow from signs. In more, or where rounding decides which
-    generators are coplanar, it is a sum of segments.
+    In up to three dimensions all facets and vertices follow from signs. In more, or where rounding
+    decides which generators are coplanar, it is a sum of segments.
     """
     span = Span(centre, generators)
     if not len(span.own):
@@ -150,7 +165,9 @@ def polytope_of(kind: Any, centre: Floats, generators: Floats) -> Any:
     faces = faces_of(kept.coefficients) if len(span.own) <= 3 else None
     if faces is None:
         scale = span.scale[span.own]
-        inner = _sum_of_segments(kind, centre[span.own], kept.rows * scale).enlarged(kept.missed * scale)
+        inner = _sum_of_segments(kind, centre[span.own], kept.rows * scale).enlarged(
+            kept.missed * scale
+        )
     else:
         inner = _of_faces(kind, faces, span, kept)
     return inner if inner.space == len(centre) else _lifted(kind, inner, span, centre)
@@ -159,7 +176,8 @@ def polytope_of(kind: Any, centre: Floats, generators: Floats) -> Any:
 def _independent(generators: Floats) -> tuple[Integers, Integers]:
     """Return independent coordinates and generators of a zonotope, shapes (d,), by elimination.
 
-    In each step the coordinate goes in which the rest of the set is widest, until no rest is wider than `FLAT`.
+    In each step the coordinate goes in which the rest of the set is widest, until no rest is wider
+    than `FLAT`.
     """
     rest = generators.copy()
     columns: list[int] = []
@@ -179,7 +197,9 @@ def _independent(generators: Floats) -> tuple[Integers, Integers]:
 
 
 def exact_determinant(matrix: Floats) -> float:
-    """Return the determinant of a regular matrix, shape (d, d), rounded once: by elimination in fractions."""
+    """Return the determinant of a regular matrix, shape (d, d), rounded once: by elimination in
+    fractions.
+    """
     rows = [[Fraction(entry) for entry in row] for row in matrix.tolist()]
     determinant = Fraction(1)
     for k in range(len(rows)):
@@ -190,14 +210,17 @@ def exact_determinant(matrix: Floats) -> float:
         determinant *= rows[k][k]
         for i in range(k + 1, len(rows)):
             factor = rows[i][k] / rows[k][k]
-            rows[i] = [entry - factor * above for entry, above in zip(rows[i], rows[k], strict=True)]
+            rows[i] = [
+                entry - factor * above for entry, above in zip(rows[i], rows[k], strict=True)
+            ]
     return float(determinant)
 
 
 def without_parallel(span: Span) -> Distinct:
     """Return generators of which no two are parallel.
 
-    Parallel generators are summed, and the shortest ones left out (`SHORT`). O(m k) for m generators.
+    Parallel generators are summed, and the shortest ones left out (`SHORT`). O(m k) for m
+    generators.
     """
     lengths = np.linalg.norm(span.rows, axis=1)
     order = np.argsort(lengths, kind="stable")
@@ -237,14 +260,17 @@ def without_parallel(span: Span) -> Distinct:
 
 
 def faces_of(generators: Floats) -> Faces | None:
-    """Return the faces of a zonotope in one to three dimensions without parallel generators, shape (m, d).
+    """Return the faces of a zonotope in one to three dimensions without parallel generators, shape
+    (m, d).
 
     It is None if rounding decides which generators are coplanar.
     """
     if generators.shape[1] == 1:
         ends = np.array([1.0, -1.0])
         numbers = np.arange(2)
-        return Faces(np.zeros((2, 0), np.int64), ends, np.sign(generators) * ends[:, None], numbers, numbers)
+        return Faces(
+            np.zeros((2, 0), np.int64), ends, np.sign(generators) * ends[:, None], numbers, numbers
+        )
     return _sides(generators) if generators.shape[1] == 2 else _facets(generators)
 
 
@@ -265,10 +291,11 @@ def _normals(faces: Faces, rows: Floats) -> Floats:
 
 
 def _corners(generators: Floats) -> tuple[Floats, Integers]:
-    """Return the factors of generators of the plane at the corners of their zonogon, shape (2 m, m).
+    """Return the factors of generators of the plane at the corners of their zonogon, shape (2 m,
+    m).
 
-    The corners are counter-clockwise from the lowest one; the side after corner i is parallel to generator i of the
-    returned order, shape (m,), and so is the side after corner m + i. O(m^2).
+    The corners are counter-clockwise from the lowest one; the side after corner i is parallel to
+    generator i of the returned order, shape (m,), and so is the side after corner m + i. O(m^2).
     """
     is_up = (generators[:, 1] > 0.0) | ((generators[:, 1] == 0.0) & (generators[:, 0] > 0.0))
     up = np.where(is_up, 1.0, -1.0)
@@ -288,7 +315,11 @@ def _sides(generators: Floats) -> Faces:
     corners = np.arange(2 * count)
     sides = np.column_stack([corners - 1, corners]) % (2 * count)
     return Faces(
-        np.tile(order, 2)[:, None], np.concatenate([turns, -turns]), signs, np.repeat(corners, 2), sides.reshape(-1)
+        np.tile(order, 2)[:, None],
+        np.concatenate([turns, -turns]),
+        signs,
+        np.repeat(corners, 2),
+        sides.reshape(-1),
     )
 
 
@@ -349,7 +380,9 @@ def _facets(generators: Floats) -> Faces | None:
 
 
 def _in_plane(rows: Floats, normal: Floats) -> Floats:
-    """Return coordinates in the plane across a normal, counter-clockwise seen from its end, shape (k, 2)."""
+    """Return coordinates in the plane across a normal, counter-clockwise seen from its end, shape
+    (k, 2).
+    """
     one = rows[0] / np.linalg.norm(rows[0])
     two = np.cross(normal / np.linalg.norm(normal), one)
     return np.column_stack([rows @ one, rows @ two])
@@ -369,12 +402,16 @@ def _different(signs: Floats) -> tuple[Floats, Integers]:
 
 @_kernels.compiled
 def _cross_products(rows: Floats, first: Integers, second: Integers) -> Floats:
-    """Return the cross products of pairs of rows, shape (p, 3), each entry exact to rounding of itself."""
+    """Return the cross products of pairs of rows, shape (p, 3), each entry exact to rounding of
+    itself.
+    """
     result = np.empty((len(first), 3))
     for k in range(len(first)):
-        a, b = rows[first[k]], rows[second[k]]
+        a = rows[first[k]]
+        b = rows[second[k]]
         for i in range(3):
-            j, m = (i + 1) % 3, (i + 2) % 3
+            j = (i + 1) % 3
+            m = (i + 2) % 3
             one, one_low = two_product(a[j], b[m])
             two, two_low = two_product(a[m], b[j])
             total, low = two_sum(one, -two)
@@ -385,15 +422,17 @@ def _cross_products(rows: Floats, first: Integers, second: Integers) -> Floats:
 def _of_faces(kind: Any, faces: Faces, span: Span, kept: Distinct) -> Any:
     """Return the polytope of faces in the own coordinates of a zonotope.
 
-    The offset of a facet is the support function of all generators, rounded up, so that the facets contain the
-    zonotope; vertices move to the outer sides of their facets.
+    The offset of a facet is the support function of all generators, rounded up, so that the facets
+    contain the zonotope; vertices move to the outer sides of their facets.
     """
     rows = span.rows
     start = span.start[span.own]
     normals = _normals(faces, kept.rows)
     products, rounded = affine_image(rows, normals, np.zeros(len(normals)))
     levels, away = affine_image(start[None], normals, np.zeros(len(normals)))
-    sums, lost = affine_image(np.ones((1, len(rows))), np.ascontiguousarray(np.abs(products).T), levels[0])
+    sums, lost = affine_image(
+        np.ones((1, len(rows))), np.ascontiguousarray(np.abs(products).T), levels[0]
+    )
     unsure = lost + away + len(rows) * rounded
     offsets = np.where(unsure > 0.0, np.nextafter(sums[0] + unsure, np.inf), sums[0])
     facets = dd.in_units(np.column_stack([normals, offsets]))
@@ -406,16 +445,25 @@ def _of_faces(kind: Any, faces: Faces, span: Span, kept: Distinct) -> Any:
     if not is_ahead.all():
         most = ON + 32.0 * kept.missed.max()
         points = push_out(points, facets, incidence, np.int64(0), False, most)
-    return kind(points, facets, facets[:0], incidence, span.middle[span.own].copy(), span.scale[span.own].copy())
+    return kind(
+        points,
+        facets,
+        facets[:0],
+        incidence,
+        span.middle[span.own].copy(),
+        span.scale[span.own].copy(),
+    )
 
 
 def _ahead(points: Floats, facets: Floats, faces: Faces) -> tuple[Floats, Flags]:
-    """Return vertices, shape (v, d), and which are now beyond their facets: those at blunt corners moved.
+    """Return vertices, shape (v, d), and which are now beyond their facets: those at blunt corners
+    moved.
 
-    They move along the mean normal of their facets. `push_out` moves the others; at a blunt corner it would move a
-    vertex farther than this.
+    They move along the mean normal of their facets. `push_out` moves the others; at a blunt corner
+    it would move a vertex farther than this.
     """
-    vertex, facet = faces.vertex, faces.facet
+    vertex = faces.vertex
+    facet = faces.facet
     first = np.flatnonzero(np.diff(vertex, prepend=-1))
     lengths = np.linalg.norm(facets[:, :-1], axis=1)
     units = (facets[:, :-1] / lengths[:, None])[facet]
@@ -433,9 +481,13 @@ def _ahead(points: Floats, facets: Floats, faces: Faces) -> tuple[Floats, Flags]
 
 
 def _sum_of_segments(kind: Any, centre: Floats, generators: Floats) -> Any:
-    """Return a zonotope as the sum of a parallelepiped and segments, one `add_segment` after the other."""
+    """Return a zonotope as the sum of a parallelepiped and segments, one `add_segment` after the
+    other.
+    """
     _, basis = _independent(generators)
-    found = kind.from_box(-np.ones(len(basis)), np.ones(len(basis))).affine_map(generators[basis].T, centre)
+    found = kind.from_box(-np.ones(len(basis)), np.ones(len(basis))).affine_map(
+        generators[basis].T, centre
+    )
     for row in np.delete(generators, basis, axis=0):
         found = found.add_segment(row)
     return found
@@ -443,7 +495,8 @@ def _sum_of_segments(kind: Any, centre: Floats, generators: Floats) -> Any:
 
 def _lifted(kind: Any, inner: PolytopeArrays, span: Span, centre: Floats) -> Any:
     """Return a flat zonotope in all coordinates, from the polytope of its own coordinates."""
-    own, others = span.own, span.others
+    own = span.own
+    others = span.others
     scale = span.scale[own]
     matrix = span.slopes * (inner.scale / scale)
     away = (inner.centre - centre[own]) / scale

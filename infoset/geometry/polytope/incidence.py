@@ -1,12 +1,13 @@
-"""Which vertex is on which facet, as bits: redundant vertices and facets, edges, and the proof that nothing is missing.
+"""Which vertex is on which facet, as bits: redundant vertices and facets, edges, and the proof that
+nothing is missing.
 
-A set of bits has the shape (words,): bit i is set if a vertex lies on facet i. All of this is combinatorial: no number
-is rounded here. See `is_closed` for the proof.
+A set of bits has the shape (words,): bit i is set if a vertex lies on facet i. All of this is
+combinatorial: no number is rounded here. See `is_closed` for the proof.
 
 References
 ----------
-K. Mehlhorn, S. Naeher, M. Seel, R. Seidel, T. Schilz, S. Schirra and C. Uhrig, Checking geometric programs or
-verification of geometric structures, Computational Geometry 12 (1999).
+K. Mehlhorn, S. Naeher, M. Seel, R. Seidel, T. Schilz, S. Schirra and C. Uhrig, Checking geometric
+programs or verification of geometric structures, Computational Geometry 12 (1999).
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ _kernels = Kernels()
 
 @_kernels.inlined
 def _ones(word: Any) -> int:
-    """Return the number of bits of a word: LLVM makes one instruction of the loop, or one for several words."""
+    """Return the number of bits of a word: LLVM makes one instruction of the loop, or one for
+    several words.
+    """
     count = 0
     while word:
         word &= word - np.uint64(1)
@@ -35,7 +38,9 @@ def _ones(word: Any) -> int:
 
 @_kernels.allocation_free
 def common(one: Bits, others: Bits, counts: Integers) -> None:
-    """Write the numbers of common bits of a set, shape (words,), and of others, shape (words, k)."""
+    """Write the numbers of common bits of a set, shape (words,), and of others, shape (words,
+    k).
+    """
     counts[:] = 0
     for word in range(len(one)):
         for k in range(len(counts)):
@@ -74,7 +79,9 @@ def unpacked(bits: Bits, count: int) -> Flags:
 
 @_kernels.compiled
 def _maximal(bits: Bits, least: int) -> Flags:
-    """Return which sets have at least `least` bits and are in no other set, of equal ones the first."""
+    """Return which sets have at least `least` bits and are in no other set, of equal ones the
+    first.
+    """
     columns = np.ascontiguousarray(bits.T)
     shared = np.empty(len(bits), np.int64)
     counts = np.empty(len(bits), np.int64)
@@ -90,10 +97,11 @@ def _maximal(bits: Bits, least: int) -> Flags:
 
 @_kernels.compiled
 def without_redundant(on: Flags, dimension: int) -> tuple[Integers, Integers, Flags]:
-    """Return the numbers of the points and the rows that are not redundant, and which of these are on which.
+    """Return the numbers of the points and the rows that are not redundant, and which of these are
+    on which.
 
-    `on` has the shape (points, rows). A point is redundant if it is on fewer than `dimension` rows, or on no other rows
-    than another point, and a row likewise.
+    `on` has the shape (points, rows). A point is redundant if it is on fewer than `dimension` rows,
+    or on no other rows than another point, and a row likewise.
     """
     points = np.arange(on.shape[0])
     rows = np.arange(on.shape[1])
@@ -110,11 +118,14 @@ def without_redundant(on: Flags, dimension: int) -> tuple[Integers, Integers, Fl
 
 
 @_kernels.allocation_free
-def _edges(bits: Bits, one: int, shared: Integers, least: int, near: Integers, others: Integers) -> int:
-    """Write the vertices that span an edge with vertex `one`, and return their number; 0 if two span the same edge.
+def _edges(
+    bits: Bits, one: int, shared: Integers, least: int, near: Integers, others: Integers
+) -> int:
+    """Write the vertices that span an edge with vertex `one`, and return their number; 0 if two
+    span the same edge.
 
-    The numbers of common facets are `shared`, shape (k,). An edge lies on at least `least` facets, and no third vertex
-    lies on all of them. `near`, shape (k,), is for work.
+    The numbers of common facets are `shared`, shape (k,). An edge lies on at least `least` facets,
+    and no third vertex lies on all of them. `near`, shape (k,), is for work.
     """
     found = 0
     for k in range(len(bits)):
@@ -156,7 +167,9 @@ def _is_cycle(bits: Bits, one: int, others: Integers) -> bool:
 
 @_kernels.compiled
 def _is_closed(bits: Bits, dimension: Any) -> bool:
-    """Whether vertices are all vertices of a polytope of two or more dimensions; see `is_closed`."""
+    """Whether vertices are all vertices of a polytope of two or more dimensions; see
+    `is_closed`.
+    """
     k, words = bits.shape
     columns = np.ascontiguousarray(bits.T)
     shared = np.empty(k, np.int64)
@@ -172,7 +185,8 @@ def _is_closed(bits: Bits, dimension: Any) -> bool:
         common(bits[one], columns, shared)
         count = _edges(bits, one, shared, dimension - 1, near, others)
         if shared[one] == dimension:
-            # The vertex figure is a simplex if each edge leaves one of its facets: all are different.
+            # The vertex figure is a simplex if each edge leaves one of its facets: all are
+            # different.
             is_right = count == dimension
             for other in others[:count]:
                 is_right &= shared[other] == dimension - 1
@@ -182,7 +196,8 @@ def _is_closed(bits: Bits, dimension: Any) -> bool:
             # The vertex figure is a polygon, whose sides are the facets.
             is_right = count == shared[one] and _is_cycle(bits, one, others[:count])
         else:
-            # The edges are the vertices of the vertex figure, a polytope of one dimension less with the same facets.
+            # The edges are the vertices of the vertex figure, a polytope of one dimension less with
+            # the same facets.
             edges = np.empty((count, words), np.uint64)
             missing = bits[one].copy()
             for i in range(count):
@@ -203,22 +218,31 @@ def _is_closed(bits: Bits, dimension: Any) -> bool:
 
 @_kernels.compiled
 def is_closed(on: Flags, dimension: int) -> bool:
-    """Whether vertices and facets of a polytope are all that it has; `on`, shape (v, f), is which is on which.
+    """Whether vertices and facets of a polytope are all that it has; `on`, shape (v, f), is which
+    is on which.
 
-    Given: every vertex satisfies all half-spaces of the facets, and is on those of its bits and strictly inside of the
-    others. Bits alone are not enough: those of a torus are closed too. Each is a vertex of the intersection of the
-    half-spaces, as the neighbour along each edge is strictly inside a facet that the others are on. All neighbours of a
-    vertex are known if its edges are all vertices of its vertex figure, a polytope of one dimension less, which is the
-    same question; in a simple vertex, on as many facets as dimensions, the figure is a simplex. The graph of a polytope
-    is connected: a list of vertices that has all the neighbours of its members has all vertices.
+    Given: every vertex satisfies all half-spaces of the facets, and is on those of its bits and
+    strictly inside of the others. Bits alone are not enough: those of a torus are closed too. Each
+    is a vertex of the intersection of the half-spaces, as the neighbour along each edge is strictly
+    inside a facet that the others are on. All neighbours of a vertex are known if its edges are all
+    vertices of its vertex figure, a polytope of one dimension less, which is the same question; in
+    a simple vertex, on as many facets as dimensions, the figure is a simplex. The graph of a
+    polytope is connected: a list of vertices that has all the neighbours of its members has all
+    vertices.
 
-    The same holds for facets, with ridges instead of edges, in the hull of the vertices. The more numerous of the two
-    are asked: each is on fewer of the others. O(k^2 words) for k of them, if most are simple.
+    The same holds for facets, with ridges instead of edges, in the hull of the vertices. The more
+    numerous of the two are asked: each is on fewer of the others. O(k^2 words) for k of them, if
+    most are simple.
     """
     if min(on.shape) <= dimension:
         return False
     if dimension == 1:
-        return on.shape == (2, 2) and on[0, 0] != on[0, 1] and on[1, 0] != on[1, 1] and on[0, 0] != on[1, 0]
+        return (
+            on.shape == (2, 2)
+            and on[0, 0] != on[0, 1]
+            and on[1, 0] != on[1, 1]
+            and on[0, 0] != on[1, 0]
+        )
     if len(on) >= on.shape[1]:
         return _is_closed(packed(on), dimension)
     return _is_closed(packed(on.T), dimension)

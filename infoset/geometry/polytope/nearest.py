@@ -17,15 +17,21 @@ _kernels = Kernels()  # without fast-math: reordered sums would lose the errors
 _MAX_STEPS = 1000
 """Number of vertices that Wolfe's algorithm may add: it ends after a few of each hull."""
 _PRECISION = 64.0 * EPS
-"""Decrease of x . d, relative to the sizes of x and of the hulls, that a step must offer: 64 roundings."""
+"""Decrease of x . d, relative to the sizes of x and of the hulls, that a step must offer: 64
+roundings.
+"""
 _REFINEMENTS = 3
-"""Corrections of the shares, each of which divides their error by 1e16 over the squared condition of the edges."""
+"""Corrections of the shares, each of which divides their error by 1e16 over the squared condition
+of the edges.
+"""
 _SMALL_STEP = 0.5 * EPS
 """Change of the shares that is their rounding."""
 _DEPENDENT = ON
 """Part of an edge, relative to it, that is orthogonal to others, below which it is rounding."""
 _SMALLEST = 1e-90
-"""Size of the hulls, relative to the coordinates, below which they count as points: squares do not overflow."""
+"""Size of the hulls, relative to the coordinates, below which they count as points: squares do not
+overflow.
+"""
 
 
 class NearestPair(NamedTuple):
@@ -39,9 +45,9 @@ class NearestPair(NamedTuple):
 def nearest_pair(one: Floats, two: Floats) -> NearestPair:
     """Return the nearest points of the hulls of two sets of points, shapes (k, n) and (m, n).
 
-    The points are convex combinations of the given ones. Which vertices they combine, and with which shares, follows
-    from differences of vertices of one hull and from products with doubled digits. The rounding is therefore relative
-    to the size of the hulls, not to their distance.
+    The points are convex combinations of the given ones. Which vertices they combine, and with
+    which shares, follows from differences of vertices of one hull and from products with doubled
+    digits. The rounding is therefore relative to the size of the hulls, not to their distance.
 
     References
     ----------
@@ -52,13 +58,17 @@ def nearest_pair(one: Floats, two: Floats) -> NearestPair:
     if extent <= _SMALLEST * largest:
         return NearestPair(one[0], two[0], one[0] - two[0])
     unit = np.ldexp(1.0, np.frexp(extent)[1])
-    i, j, shares = _shares_of_nearest(np.ascontiguousarray(one / unit), np.ascontiguousarray(two / unit))
+    i, j, shares = _shares_of_nearest(
+        np.ascontiguousarray(one / unit), np.ascontiguousarray(two / unit)
+    )
     difference, _ = _combination(shares, one[i], two[j])
     return NearestPair(shares @ one[i], shares @ two[j], difference)
 
 
 def _shares_of_nearest(one: Floats, two: Floats) -> tuple[Integers, Integers, Floats]:
-    """Return pairs of vertices, as their numbers, and shares of them, of the nearest points of hulls of size one."""
+    """Return pairs of vertices, as their numbers, and shares of them, of the nearest points of
+    hulls of size one.
+    """
     i = j = np.zeros(1, np.int64)
     shares = np.ones(1)
     for _ in range(_MAX_STEPS):
@@ -80,23 +90,30 @@ def _shares_of_nearest(one: Floats, two: Floats) -> tuple[Integers, Integers, Fl
             shares = shares + min(1.0, part) * (target - shares)
             shares[below & (shares <= shares[below].min())] = 0.0
             kept = shares > 0.0
-            i, j, shares = i[kept], j[kept], shares[kept] / shares[kept].sum()
+            i = i[kept]
+            j = j[kept]
+            shares = shares[kept] / shares[kept].sum()
     return i, j, shares
 
 
 @_kernels.compiled
-def _next_pair(one: Floats, two: Floats, i: Integers, j: Integers, shares: Floats) -> tuple[int, int, float, bool]:
-    """Return the pair of vertices whose difference is lowest along the present one, x, and what it offers.
+def _next_pair(
+    one: Floats, two: Floats, i: Integers, j: Integers, shares: Floats
+) -> tuple[int, int, float, bool]:
+    """Return the pair of vertices whose difference is lowest along the present one, x, and what it
+    offers.
 
-    The third value is how much lower it is than x, less the minimum for a step; the last one is whether the present
-    pairs have this difference.
+    The third value is how much lower it is than x, less the minimum for a step; the last one is
+    whether the present pairs have this difference.
     """
     x, low = _combination(shares, one[i], two[j])
     heights = _heights(one, one[i[0]], x, low)
     other_heights = _heights(two, two[j[0]], x, low)
-    p, q = int(np.argmin(heights)), int(np.argmax(other_heights))
+    p = int(np.argmin(heights))
+    q = int(np.argmax(other_heights))
 
-    gap, is_known = other_heights[q] - heights[p], False
+    gap = other_heights[q] - heights[p]
+    is_known = False
     for k in range(len(shares)):
         gap += shares[k] * (heights[i[k]] - other_heights[j[k]])
         is_same = True
@@ -111,15 +128,19 @@ def _next_pair(one: Floats, two: Floats, i: Integers, j: Integers, shares: Float
 
 @_kernels.compiled
 def _affine_minimizer(one: Floats, two: Floats, shares: Floats) -> Floats:
-    """Return the coefficients, sum 1, of the shortest combination x of the differences one - two, shape (k, n).
+    """Return the coefficients, sum 1, of the shortest combination x of the differences one - two,
+    shape (k, n).
 
-    Newton steps from `shares`: the derivatives e . x along the edges e are precise, also if x is much longer than they.
-    The edges of length one have a triangular factor; edges that depend on earlier ones keep their shares.
+    Newton steps from `shares`: the derivatives e . x along the edges e are precise, also if x is
+    much longer than they. The edges of length one have a triangular factor; edges that depend on
+    earlier ones keep their shares.
     """
-    count, result = len(shares) - 1, shares.copy()
+    count = len(shares) - 1
+    result = shares.copy()
     if count == 0:
         return result
-    lengths, basis = np.empty(count), (one[1:] - one[0]) - (two[1:] - two[0])
+    lengths = np.empty(count)
+    basis = (one[1:] - one[0]) - (two[1:] - two[0])
     triangle = np.zeros((count, count))
     for k in range(count):
         lengths[k] = math.sqrt(np.square(basis[k]).sum())
@@ -154,9 +175,12 @@ def _affine_minimizer(one: Floats, two: Floats, shares: Floats) -> Floats:
 
 @_kernels.compiled
 def _combination(shares: Floats, one: Floats, two: Floats) -> tuple[Floats, Floats]:
-    """Return the sum of shares times differences of points, shapes (k,) and (k, n), as a sum of two numbers each."""
+    """Return the sum of shares times differences of points, shapes (k,) and (k, n), as a sum of two
+    numbers each.
+    """
     size = one.shape[1]
-    high, low = np.zeros(size), np.zeros(size)
+    high = np.zeros(size)
+    low = np.zeros(size)
     for axis in range(size):
         for k in range(len(shares)):
             for sign, value in ((1.0, one[k, axis]), (-1.0, two[k, axis])):
@@ -169,7 +193,9 @@ def _combination(shares: Floats, one: Floats, two: Floats) -> tuple[Floats, Floa
 
 @_kernels.compiled
 def _heights(points: Floats, base: Floats, high: Floats, low: Floats) -> Floats:
-    """Return (point - base) . (high + low) of points, shape (k, n), each rounded once: differences are exact."""
+    """Return (point - base) . (high + low) of points, shape (k, n), each rounded once: differences
+    are exact.
+    """
     heights = np.empty(len(points))
     for k in range(len(points)):
         total, rest = 0.0, 0.0

@@ -18,17 +18,22 @@ _FLAT = 4.0 * REDUCED
 
 
 def polytope_from_support(
-    furthest: Callable[[Floats], Floats], space: int, tolerance: float = 1e-9, max_facets: int = 10_000
+    furthest: Callable[[Floats], Floats],
+    space: int,
+    tolerance: float = 1e-9,
+    max_facets: int = 10_000,
 ) -> Polytope:
-    """Return a polytope from its support vectors: a projection of a set that is known only by programs over it.
+    """Return a polytope from its support vectors: a projection of a set that is known only by
+    programs over it.
 
-    `furthest` returns a point of the set furthest along a direction, both of shape (space,). `space` is 2 or 3; more
-    works but the cost grows fast. Vertices of the result are points of the set; the set extends beyond its facets, at
-    most `max_facets`, by no more than the relative `tolerance`.
+    `furthest` returns a point of the set furthest along a direction, both of shape (space,).
+    `space` is 2 or 3; more works but the cost grows fast. Vertices of the result are points of the
+    set; the set extends beyond its facets, at most `max_facets`, by no more than the relative
+    `tolerance`.
 
-    The hull of the points known is enlarged: each facet (and each direction across it, where it is flat) beyond which
-    the set extends gives a new point. It ends when none does, after a program a facet and a vertex: exact, for a
-    polytope.
+    The hull of the points known is enlarged: each facet (and each direction across it, where it is
+    flat) beyond which the set extends gives a new point. It ends when none does, after a program a
+    facet and a vertex: exact, for a polytope.
 
     Raises
     ------
@@ -61,7 +66,8 @@ def polytope_from_support(
 
 
 def product(*polytopes: Polytope) -> Polytope:
-    """Return the Cartesian product of `polytopes`, with v1 v2 ... vertices and f1 + f2 + ... facets.
+    """Return the Cartesian product of `polytopes`, with v1 v2 ... vertices and f1 + f2 + ...
+    facets.
 
     Raises
     ------
@@ -78,16 +84,24 @@ def product(*polytopes: Polytope) -> Polytope:
         parts = zip(polytopes, np.split(axes, ends), strict=True)
         cylinders = [factor.preimage(rows) for factor, rows in parts]
         return cylinders[0].intersection(*cylinders[1:])
-    points, on = polytopes[0].points, polytopes[0].incidence
+    points = polytopes[0].points
+    on = polytopes[0].incidence
     for factor in polytopes[1:]:
         count = len(factor.points)
         on = np.hstack([np.repeat(on, count, axis=0), np.tile(factor.incidence, (len(points), 1))])
-        points = np.hstack([np.repeat(points, count, axis=0), np.tile(factor.points, (len(points), 1))])
+        points = np.hstack(
+            [np.repeat(points, count, axis=0), np.tile(factor.points, (len(points), 1))]
+        )
     facets, equations = (
         np.column_stack(
-            [block_diag(*[rows[:, :-1] for rows in tables]), np.concatenate([rows[:, -1] for rows in tables])]
+            [
+                block_diag(*[rows[:, :-1] for rows in tables]),
+                np.concatenate([rows[:, -1] for rows in tables]),
+            ]
         )
         for tables in ([one.facets for one in polytopes], [one.equations for one in polytopes])
     )
-    centre, scale = (np.concatenate([getattr(one, name) for one in polytopes]) for name in ("centre", "scale"))
+    centre, scale = (
+        np.concatenate([getattr(one, name) for one in polytopes]) for name in ("centre", "scale")
+    )
     return Polytope(points, facets, equations, on, centre, scale)

@@ -1,4 +1,5 @@
-"""Images, sums and enlargements of polytopes with vertices and facets that are rounded outward, compiled.
+"""Images, sums and enlargements of polytopes with vertices and facets that are rounded outward,
+compiled.
 
 All arrays are in scaled coordinates; see `Polytope`.
 """
@@ -12,7 +13,14 @@ import numpy as np
 
 from infoset.arrays import Flags, Floats, Integers
 from infoset.geometry.double_words import affine_image, precise_dot, supports, two_sum
-from infoset.geometry.polytope.double_description import crossings, dot, in_units, pivots, sides, size_of
+from infoset.geometry.polytope.double_description import (
+    crossings,
+    dot,
+    in_units,
+    pivots,
+    sides,
+    size_of,
+)
 from infoset.geometry.polytope.incidence import packed, unpacked
 from infoset.geometry.polytope.scaled_coordinates import coordinates
 from infoset.geometry.tolerances import EPS, ON, REDUCED, SNAP
@@ -25,23 +33,28 @@ _kernels = Kernels()
 def image(
     points: Floats, facets: Floats, centre: Floats, scale: Floats, matrix: Floats, offset: Floats
 ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """Return points, facets, centre, scale and rounding errors of the image of a set, in its own coordinates.
+    """Return points, facets, centre, scale and rounding errors of the image of a set, in its own
+    coordinates.
 
-    Facets are none unless the matrix is square with pivots that are certainly not zero. A facet a y <= b is a' y' <= b
-    + a' s under y' = matrix y + s; a' matrix differs from a by rounding. The hull of points may lack a tip: it gives
-    too small supports.
+    Facets are none unless the matrix is square with pivots that are certainly not zero. A facet a y
+    <= b is a' y' <= b + a' s under y' = matrix y + s; a' matrix differs from a by rounding. The
+    hull of points may lack a tip: it gives too small supports.
     """
     (m, n), sizes = matrix.shape, np.array([size_of(column) for column in points.T])
     middle, rounded = affine_image(centre.reshape(1, n), matrix, offset)
     matrix = matrix * scale
     rough = matrix @ points.T + middle.T
-    lower, upper = np.array([row.min() for row in rough]), np.array([row.max() for row in rough])
+    lower = np.array([row.min() for row in rough])
+    upper = np.array([row.max() for row in rough])
     # Of a coordinate that is zero but for rounding, the errors stay small in the new coordinates.
     centre, scale = coordinates(lower, upper, 2.0**-10 * (np.abs(matrix) @ sizes), np.float64(0.0))
-    matrix, shift = matrix / scale.reshape(m, 1), (middle - centre) / scale
+    matrix = matrix / scale.reshape(m, 1)
+    shift = (middle - centre) / scale
     result, errors = affine_image(points, matrix, shift[0])
     errors += rounded / scale
-    units = np.array([size_of(column) for column in matrix.T]) + 1e-300  # its condition does not depend on them
+    units = (
+        np.array([size_of(column) for column in matrix.T]) + 1e-300
+    )  # its condition does not depend on them
     if not m == n == len(pivots(matrix / units, REDUCED, np.int64(-1))[0]):
         return result, facets[:0], centre, scale, errors
     normals = np.ascontiguousarray(facets[:, :n]) @ np.linalg.inv(matrix)
@@ -53,11 +66,15 @@ def image(
 
 
 @_kernels.compiled
-def touching(points: Floats, facets: Floats, on: Flags, known: int, size: float, far: float) -> tuple[Flags, bool]:
-    """Return which points are on which facets, also those within SNAP of them, and whether the points are consistent.
+def touching(
+    points: Floats, facets: Floats, on: Flags, known: int, size: float, far: float
+) -> tuple[Flags, bool]:
+    """Return which points are on which facets, also those within SNAP of them, and whether the
+    points are consistent.
 
-    They are not if a point is outside of a facet, or away from one that it is `on`, shape (v, f), by more than `far`.
-    Only points on facets after the first `known` are looked at. `size` is that of the points.
+    They are not if a point is outside of a facet, or away from one that it is `on`, shape (v, f),
+    by more than `far`. Only points on facets after the first `known` are looked at. `size` is that
+    of the points.
     """
     n = points.shape[1]
     units = np.array([size_of(facet) for facet in facets])
@@ -76,7 +93,8 @@ def touching(points: Floats, facets: Floats, on: Flags, known: int, size: float,
 
 @_kernels.compiled
 def refined(points: Floats, facets: Floats, equations: Floats, on: Flags, known: int) -> Floats:
-    """Return points, those on facets after the first `known` computed again: nearest to where their facets meet.
+    """Return points, those on facets after the first `known` computed again: nearest to where their
+    facets meet.
 
     Cuts of a small part combine points that are far from it, so that their rounding grows.
     """
@@ -93,9 +111,11 @@ def refined(points: Floats, facets: Floats, equations: Floats, on: Flags, known:
 
 @_kernels.compiled
 def loses_points(points: Floats, used: Integers, on: Flags, least: int, distance: float) -> bool:
-    """Whether a point that is not used is on at least `least` facets and farther than a distance from all that are.
+    """Whether a point that is not used is on at least `least` facets and farther than a distance
+    from all that are.
 
-    Between facets at a small angle many points are near both: what is on which does not show which are vertices.
+    Between facets at a small angle many points are near both: what is on which does not show which
+    are vertices.
     """
     is_used = np.zeros(len(points), np.bool_)
     is_used[used] = True
@@ -114,22 +134,31 @@ def loses_points(points: Floats, used: Integers, on: Flags, least: int, distance
 
 
 @_kernels.allocation_free
-def _cross_facets(facets: Floats, mine: Integers, needs: Floats, basis: Floats, step: Floats) -> bool:
-    """Enlarge a step until it moves a point by its needs across its facets, and return whether it does.
+def _cross_facets(
+    facets: Floats, mine: Integers, needs: Floats, basis: Floats, step: Floats
+) -> bool:
+    """Enlarge a step until it moves a point by its needs across its facets, and return whether it
+    does.
 
-    Each move is across the facet that is missed most, and along those of the moves before in its sweep: at sharp
-    corners, longer sweeps would move farther, shorter ones more often; it may fail. `basis`, shape (3, n), is for work.
+    Each move is across the facet that is missed most, and along those of the moves before in its
+    sweep: at sharp corners, longer sweeps would move farther, shorter ones more often; it may fail.
+    `basis`, shape (3, n), is for work.
     """
     size = 0
     for _ in range(60):
-        facet, most = -1, EPS * math.sqrt(dot(step, step))  # far below the rounding of the coordinates
+        facet, most = (
+            -1,
+            EPS * math.sqrt(dot(step, step)),
+        )  # far below the rounding of the coordinates
         for m in range(len(mine)):
             gap = needs[m] - dot(step, facets[mine[m]])
             if gap > most:
-                facet, most = m, gap
+                facet = m
+                most = gap
         if facet < 0:
             return True
-        normal, free = facets[mine[facet]], basis[size]
+        normal = facets[mine[facet]]
+        free = basis[size]
         for j in range(len(free)):
             free[j] = normal[j]
         for k in range(2 * size):  # twice, for rounding
@@ -149,10 +178,23 @@ def _cross_facets(facets: Floats, mine: Integers, needs: Floats, basis: Floats, 
 
 
 @_kernels.allocation_free
-def _push(point: Floats, facets: Floats, mine: Integers, centre: Floats, flat: bool, most: float, work: Any) -> None:
-    """Move a point, in place, to the outer sides of its facets, with the numbers `mine`; see `push_out`."""
+def _push(
+    point: Floats,
+    facets: Floats,
+    mine: Integers,
+    centre: Floats,
+    flat: bool,
+    most: float,
+    work: Any,
+) -> None:
+    """Move a point, in place, to the outer sides of its facets, with the numbers `mine`; see
+    `push_out`.
+    """
     needs, step, basis = work
-    inside, rounding = False, len(point) * EPS * (1.0 + size_of(point))  # that of the new coordinates
+    inside, rounding = (
+        False,
+        len(point) * EPS * (1.0 + size_of(point)),
+    )  # that of the new coordinates
     for m in range(len(mine)):
         height, _ = precise_dot(facets[mine[m]], point, -facets[mine[m], -1])
         inside |= height < 0.0
@@ -175,17 +217,25 @@ def _push(point: Floats, facets: Floats, mine: Integers, centre: Floats, flat: b
 
 
 @_kernels.compiled
-def push_out(points: Floats, facets: Floats, on: Flags, known: Any, flat: bool, most: float) -> Floats:
-    """Return points, shape (v, n), moved so that they are not inside their facets, if `most` allows.
+def push_out(
+    points: Floats, facets: Floats, on: Flags, known: Any, flat: bool, most: float
+) -> Floats:
+    """Return points, shape (v, n), moved so that they are not inside their facets, if `most`
+    allows.
 
-    Points on none but the first `known` facets stay. Then the hull of the points contains the set of the facets: a map
-    of the set to the hull that takes each facet to its outer side covers the set. A point that is exactly on its facets
-    stays. The others move across their facets (`_cross_facets`), or where this fails, at a sharp corner, and in a
-    `flat` set, away from the centre. No point moves by more than `most`: where rounding moves facets more than the
-    vertex, the hull may lack the very tip.
+    Points on none but the first `known` facets stay. Then the hull of the points contains the set
+    of the facets: a map of the set to the hull that takes each facet to its outer side covers the
+    set. A point that is exactly on its facets stays. The others move across their facets
+    (`_cross_facets`), or where this fails, at a sharp corner, and in a `flat` set, away from the
+    centre. No point moves by more than `most`: where rounding moves facets more than the vertex,
+    the hull may lack the very tip.
     """
-    n, f, result, centre = points.shape[1], len(facets), points.copy(), points.sum(axis=0) / len(points)
-    work, mine = (np.empty(f), np.empty(n), np.empty((min(3, n), n))), np.empty(f, np.int64)
+    n = points.shape[1]
+    f = len(facets)
+    result = points.copy()
+    centre = points.sum(axis=0) / len(points)
+    work = (np.empty(f), np.empty(n), np.empty((min(3, n), n)))
+    mine = np.empty(f, np.int64)
     whole = np.array([on[:, k].all() for k in range(f)])  # rows of the affine hull
     for i in range(len(points)):
         if on[i, known:].any():
@@ -198,8 +248,12 @@ def push_out(points: Floats, facets: Floats, on: Flags, known: Any, flat: bool, 
 
 
 @_kernels.compiled
-def around(points: Floats, facets: Floats, on: Flags, by: Floats, flat: bool) -> tuple[Floats, Floats]:
-    """Return points and facets, in units, moved outward to contain {y + e: |e_i| <= by_i}, `by` of shape (n,)."""
+def around(
+    points: Floats, facets: Floats, on: Flags, by: Floats, flat: bool
+) -> tuple[Floats, Floats]:
+    """Return points and facets, in units, moved outward to contain {y + e: |e_i| <= by_i}, `by` of
+    shape (n,).
+    """
     facets = in_units(facets)
     if not by.any():
         return points, facets
@@ -209,21 +263,30 @@ def around(points: Floats, facets: Floats, on: Flags, by: Floats, flat: bool) ->
 
 
 @_kernels.compiled
-def swept(points: Floats, facets: Floats, on: Flags, along: Floats) -> tuple[Floats, Floats, Flags, Floats]:
-    """Return points, facets, incidence and rounding errors of the sum with the segment from -along to along.
+def swept(
+    points: Floats, facets: Floats, on: Flags, along: Floats
+) -> tuple[Floats, Floats, Flags, Floats]:
+    """Return points, facets, incidence and rounding errors of the sum with the segment from -along
+    to along.
 
-    Each facet moves, and each ridge between two facets that face opposite ends of the segment becomes a facet. A vertex
-    moves to an end if it lies on a facet that faces this end.
+    Each facet moves, and each ridge between two facets that face opposite ends of the segment
+    becomes a facet. A vertex moves to an end if it lies on a facet that faces this end.
     """
     heights = sides(facets, np.append(along / size_of(along), 0.0))
     # Numba compiles a kernel again for a Python constant, but not for one of NumPy.
     new, marks = crossings(facets, packed(on.T), heights, len(along) - 1, np.bool_(False))
-    directed = np.array([size_of(row[:-1]) > ON for row in new], np.bool_)  # not of two opposite facets
+    directed = np.array(
+        [size_of(row[:-1]) > ON for row in new], np.bool_
+    )  # not of two opposite facets
     new = new[directed]
-    # Two facets that are nearly opposite give a facet in which rounding is large: it holds all vertices.
+    # Two facets that are nearly opposite give a facet in which rounding is large: it holds all
+    # vertices.
     new[:, -1] = supports(points, np.ascontiguousarray(new[:, :-1]))
-    facets, ridges, count = np.concatenate((facets, new)), unpacked(marks[directed], len(points)), 0
-    result, errors = np.empty((2 * len(points), len(along))), np.zeros(len(along))
+    facets = np.concatenate((facets, new))
+    ridges = unpacked(marks[directed], len(points))
+    count = 0
+    result = np.empty((2 * len(points), len(along)))
+    errors = np.zeros(len(along))
     incidence = np.zeros((len(result), len(facets)), np.bool_)
     for end in (1.0, -1.0):
         for i in range(len(points)):
@@ -238,5 +301,7 @@ def swept(points: Floats, facets: Floats, on: Flags, along: Floats) -> tuple[Flo
                     errors[j] = max(errors[j], abs(low))
                 count += 1
     for k in range(len(facets)):
-        facets[k, -1] += (1.0 + 8.0 * EPS) * abs(dot(along, facets[k])) + 2.0 * EPS * abs(facets[k, -1])
+        facets[k, -1] += (1.0 + 8.0 * EPS) * abs(dot(along, facets[k])) + 2.0 * EPS * abs(
+            facets[k, -1]
+        )
     return result[:count], facets, incidence[:count], errors

@@ -1,9 +1,10 @@
 """Convex polyhedra in exact integers: what polytopes that are unbounded are made of.
 
-A polyhedron is {x: a . x <= b for all facets, a . x = b for all equations}, and the sum of the hull of its points, the
-cone of its directions and the span of its lines. Every list holds rows of n + 1 integers: (a, b) for facets and
-equations, (x t, t) with t > 0 for a point x, (d, 0) for directions and lines. Each representation follows from the
-other by `cone.extreme_rays`, which rounding does not touch: a direction that lies in a facet stays in it.
+A polyhedron is {x: a . x <= b for all facets, a . x = b for all equations}, and the sum of the hull
+of its points, the cone of its directions and the span of its lines. Every list holds rows of n + 1
+integers: (a, b) for facets and equations, (x t, t) with t > 0 for a point x, (d, 0) for directions
+and lines. Each representation follows from the other by `cone.extreme_rays`, which rounding does
+not touch: a direction that lies in a facet stays in it.
 """
 
 from __future__ import annotations
@@ -22,7 +23,9 @@ from infoset.geometry.polytope.cone import Row, combined, dot, extreme_rays, sho
 
 @dataclass(frozen=True, eq=False)
 class Polyhedron:
-    """A convex polyhedron in R^n by both representations, without redundant rows; without points it is empty."""
+    """A convex polyhedron in R^n by both representations, without redundant rows; without points it
+    is empty.
+    """
 
     space: int
     points: tuple[Row, ...]
@@ -60,8 +63,12 @@ def of_half_spaces(space: int, rows: Iterable[Row]) -> Polyhedron:
     return of_generators(space, points, directions, cone.lines)
 
 
-def of_generators(space: int, points: Sequence[Row], directions: Sequence[Row], lines: Sequence[Row]) -> Polyhedron:
-    """Return the sum of the hull of points, at least one, the cone of directions and the span of lines, in R^n."""
+def of_generators(
+    space: int, points: Sequence[Row], directions: Sequence[Row], lines: Sequence[Row]
+) -> Polyhedron:
+    """Return the sum of the hull of points, at least one, the cone of directions and the span of
+    lines, in R^n.
+    """
     along = [_turned(row) for row in (*directions, *lines, *(_negative(line) for line in lines))]
     dual = extreme_rays([*(_turned(point) for point in points), *along])
     equations, pivots = _reduced(dual.lines)
@@ -76,7 +83,12 @@ def of_generators(space: int, points: Sequence[Row], directions: Sequence[Row], 
 
     # What is left of the generators, after those that the others contain.
     primal = extreme_rays(
-        [_unit(space), *map(_turned, facets), *map(_turned, equations), *(_turned(_negative(row)) for row in equations)]
+        [
+            _unit(space),
+            *map(_turned, facets),
+            *map(_turned, equations),
+            *(_turned(_negative(row)) for row in equations),
+        ]
     )
     return Polyhedron(
         space,
@@ -88,21 +100,31 @@ def of_generators(space: int, points: Sequence[Row], directions: Sequence[Row], 
     )
 
 
-def image(one: Polyhedron, matrix: Sequence[Sequence[Fraction]], offset: Sequence[Fraction]) -> Polyhedron:
+def image(
+    one: Polyhedron, matrix: Sequence[Sequence[Fraction]], offset: Sequence[Fraction]
+) -> Polyhedron:
     """Return {matrix x + offset}."""
     moved = []
     for rows in one.generators:
         moved.append([_mapped(row, matrix, offset) for row in rows])
     points, directions, lines = moved
-    return of_generators(len(matrix), points, [d for d in directions if any(d)], [line for line in lines if any(line)])
+    return of_generators(
+        len(matrix),
+        points,
+        [d for d in directions if any(d)],
+        [line for line in lines if any(line)],
+    )
 
 
-def preimage(rows: Iterable[Row], matrix: Sequence[Sequence[Fraction]], offset: Sequence[Fraction]) -> Polyhedron:
+def preimage(
+    rows: Iterable[Row], matrix: Sequence[Sequence[Fraction]], offset: Sequence[Fraction]
+) -> Polyhedron:
     """Return {x: a . (matrix x + offset) <= b for all rows (a, b)}."""
     columns = list(zip(*matrix, strict=True))
     composed = []
     for row in rows:
-        normal, limit = row[:-1], row[-1]
+        normal = row[:-1]
+        limit = row[-1]
         entries = [_product(normal, column) for column in columns]
         composed.append(whole([*entries, limit - _product(normal, offset)]))
     return of_half_spaces(len(columns), composed)
@@ -115,20 +137,26 @@ def total(one: Polyhedron, other: Polyhedron) -> Polyhedron:
         height = x[-1] * y[-1]
         sums = [a * y[-1] + b * x[-1] for a, b in zip(x[:-1], y[:-1], strict=True)]
         points.append(shortest([*sums, height]))
-    return of_generators(one.space, points, [*one.directions, *other.directions], [*one.lines, *other.lines])
+    return of_generators(
+        one.space, points, [*one.directions, *other.directions], [*one.lines, *other.lines]
+    )
 
 
 def moved_outward(rows: Iterable[Row], by: Sequence[Fraction]) -> list[Row]:
     """Return rows of {x + e: |e_i| <= by_i}."""
     larger = []
     for row in rows:
-        reach = sum((abs(entry) * size for entry, size in zip(row[:-1], by, strict=True)), Fraction(0))
+        reach = sum(
+            (abs(entry) * size for entry, size in zip(row[:-1], by, strict=True)), Fraction(0)
+        )
         larger.append(whole([*map(Fraction, row[:-1]), row[-1] + reach]))
     return larger
 
 
 def moved_inward(rows: Iterable[Row], other: Polyhedron) -> list[Row] | None:
-    """Return rows of {x: x + y in the set for all y of the other}; None if no x is, as the other extends too far."""
+    """Return rows of {x: x + y in the set for all y of the other}; None if no x is, as the other
+    extends too far.
+    """
     smaller = []
     for row in rows:
         reach = support(other, row[:-1])
@@ -188,12 +216,16 @@ def rounded_points(rows: Sequence[Row], space: int) -> Floats:
 
 def rounded_directions(rows: Sequence[Row], space: int) -> Floats:
     """Return directions of unit length, shape (k, n)."""
-    vectors = np.array([[entry / max(map(abs, row)) for entry in row[:-1]] for row in rows]).reshape(-1, space)
+    vectors = np.array(
+        [[entry / max(map(abs, row)) for entry in row[:-1]] for row in rows]
+    ).reshape(-1, space)
     return np.asarray(vectors / np.linalg.norm(vectors, axis=1)[:, None])
 
 
 def rounded_rows(rows: Sequence[Row], space: int) -> Floats:
-    """Return rows (a, b), shape (k, n + 1), the largest entry of a from 1/2 to 1; dyadic ones are exact."""
+    """Return rows (a, b), shape (k, n + 1), the largest entry of a from 1/2 to 1; dyadic ones are
+    exact.
+    """
     table = []
     for row in rows:
         unit = Fraction(2) ** -max(map(abs, row[:-1])).bit_length()
@@ -215,7 +247,10 @@ def rounded_equations(rows: Sequence[Row], space: int) -> Floats:
 def _mapped(row: Row, matrix: Sequence[Sequence[Fraction]], offset: Sequence[Fraction]) -> Row:
     """Return the image of a point (x t, t) or a direction (d, 0)."""
     height = row[-1]
-    entries = [_product(row[:-1], line) + height * shift for line, shift in zip(matrix, offset, strict=True)]
+    entries = [
+        _product(row[:-1], line) + height * shift
+        for line, shift in zip(matrix, offset, strict=True)
+    ]
     return whole([*entries, Fraction(height)])
 
 
@@ -224,7 +259,9 @@ def _product(integers: Sequence[int], numbers: Sequence[Fraction]) -> Fraction:
 
 
 def _reduced(rows: Sequence[Row]) -> tuple[list[Row], list[int]]:
-    """Return equations, each with a coordinate that the others do not have and its positive factor, and these axes."""
+    """Return equations, each with a coordinate that the others do not have and its positive factor,
+    and these axes.
+    """
     left = list(rows)
     done: list[Row] = []
     pivots: list[int] = []
@@ -242,7 +279,9 @@ def _reduced(rows: Sequence[Row]) -> tuple[list[Row], list[int]]:
 
 
 def _turned(row: Row) -> Row:
-    """Return the row of the cone {(x, t): b t - a . x >= 0} for (a, b), and of its dual for a generator (x, t)."""
+    """Return the row of the cone {(x, t): b t - a . x >= 0} for (a, b), and of its dual for a
+    generator (x, t).
+    """
     return [*(-entry for entry in row[:-1]), row[-1]]
 
 

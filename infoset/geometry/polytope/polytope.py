@@ -45,41 +45,47 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
 _WIDE = 2.0**6
-"""Size of a sum, in coordinates in which a term is one wide, from which it gets its own: two digits are lost."""
+"""Size of a sum, in coordinates in which a term is one wide, from which it gets its own: two digits
+are lost.
+"""
 
 
 class Polytope(PolytopeArrays, ConvexSet):
     """A convex polytope; it may be flat, a segment, a point, empty, or unbounded.
 
-    It is {x: normals x <= offsets, across x = levels}, and the hull of its `vertices`, shape (v, n), without redundant
-    points. The f normals of the facets have unit length and are in the directions of the affine hull; the n - dimension
-    rows of `across` are orthonormal. The constructors are the methods `from_...`.
+    It is {x: normals x <= offsets, across x = levels}, and the hull of its `vertices`, shape (v,
+    n), without redundant points. The f normals of the facets have unit length and are in the
+    directions of the affine hull; the n - dimension rows of `across` are orthonormal. The
+    constructors are the methods `from_...`.
 
-    One algorithm, the double description, computes all sets; its result is checked, and where the check fails exact
-    integers decide, which takes longer. Vertices and facets that are given are kept; those that are computed are
-    rounded outward, by about 1e-12 of the size. A set that is thinner than 7e-12, in units in which it is one wide
-    along each axis, counts as flat: across it, the exact set may stick out by as much. A set that sticks out by less
-    than 1e-12 of its size from a half-space touches it.
+    One algorithm, the double description, computes all sets; its result is checked, and where the
+    check fails exact integers decide, which takes longer. Vertices and facets that are given are
+    kept; those that are computed are rounded outward, by about 1e-12 of the size. A set that is
+    thinner than 7e-12, in units in which it is one wide along each axis, counts as flat: across it,
+    the exact set may stick out by as much. A set that sticks out by less than 1e-12 of its size
+    from a half-space touches it.
 
-    The arrays are stored in scaled coordinates y, x = `centre` + `scale` y, with powers of two, which round nothing:
-    `points`, shape (v, n), and rows (a, b) of `facets`, a . y <= b, shape (f, n + 1), and of `equations`, a . y = b,
-    shape (n - dimension, n + 1). `incidence[i, j]`, shape (v, f), is whether vertex i is on facet j.
+    The arrays are stored in scaled coordinates y, x = `centre` + `scale` y, with powers of two,
+    which round nothing: `points`, shape (v, n), and rows (a, b) of `facets`, a . y <= b, shape (f,
+    n + 1), and of `equations`, a . y = b, shape (n - dimension, n + 1). `incidence[i, j]`, shape
+    (v, f), is whether vertex i is on facet j.
 
-    An unbounded set is the sum of the hull of its `vertices`, of the cone of its `directions` and of the span of its
-    `lines`; one that contains lines has points of its smallest faces in the place of vertices. It is stored and
-    computed in exact integers (`exact`), which takes longer; a result that is bounded is rounded to nearest. What is
-    infinite is inf; what does not exist, such as a centroid, raises an UnboundedPolytopeError.
+    An unbounded set is the sum of the hull of its `vertices`, of the cone of its `directions` and
+    of the span of its `lines`; one that contains lines has points of its smallest faces in the
+    place of vertices. It is stored and computed in exact integers (`exact`), which takes longer; a
+    result that is bounded is rounded to nearest. What is infinite is inf; what does not exist, such
+    as a centroid, raises an UnboundedPolytopeError.
 
-    Operations on the empty set give the empty set; points such as its centroid do not exist (EmptyPolytopeError). All
-    arguments are checked: numbers are finite (TypeError if they are not real numbers), shapes and spaces fit
-    (ValueError).
+    Operations on the empty set give the empty set; points such as its centroid do not exist
+    (EmptyPolytopeError). All arguments are checked: numbers are finite (TypeError if they are not
+    real numbers), shapes and spaces fit (ValueError).
 
     The other set of an operation may be a single polygon, one of `ConvexPolygons`: it is converted.
 
-    Operators: `P & Q` (intersection), `P + Q` (Minkowski sum), `P + vector` (translation), `A @ P` (linear map),
-    `2 * P`, `-P`, `point in P`, `P <= Q` (subset, to rounding); `ConvexSet` defines them by the methods of these names.
-    `P == Q` compares objects; `equals` compares sets. The vertices are in no order; `plot` and `to_shapely` order those
-    of a set of the plane.
+    Operators: `P & Q` (intersection), `P + Q` (Minkowski sum), `P + vector` (translation), `A @ P`
+    (linear map), `2 * P`, `-P`, `point in P`, `P <= Q` (subset, to rounding); `ConvexSet` defines
+    them by the methods of these names. `P == Q` compares objects; `equals` compares sets. The
+    vertices are in no order; `plot` and `to_shapely` order those of a set of the plane.
     """
 
     def polytope(self) -> Polytope:
@@ -92,7 +98,13 @@ class Polytope(PolytopeArrays, ConvexSet):
         if isinstance(arrays, cls):
             return arrays
         return cls(
-            arrays.points, arrays.facets, arrays.equations, arrays.incidence, arrays.centre, arrays.scale, arrays.exact
+            arrays.points,
+            arrays.facets,
+            arrays.equations,
+            arrays.incidence,
+            arrays.centre,
+            arrays.scale,
+            arrays.exact,
         )
 
     @classmethod
@@ -103,27 +115,40 @@ class Polytope(PolytopeArrays, ConvexSet):
 
     @classmethod
     def from_vertices(cls, points: ArrayLike, flat: float = SNAP) -> Polytope:
-        """Return the convex hull of `points`, shape (m, n), at least one. Its vertices are points, bit for bit.
+        """Return the convex hull of `points`, shape (m, n), at least one. Its vertices are points,
+        bit for bit.
 
-        `flat` is the relative thickness below which a set counts as flat: greater for points that are known to fewer
-        digits. The facets are the rays of a double description: O(m f) for f facets in the plane, O(m f^2) at worst.
+        `flat` is the relative thickness below which a set counts as flat: greater for points that
+        are known to fewer digits. The facets are the rays of a double description: O(m f) for f
+        facets in the plane, O(m f^2) at worst.
         """
-        array = finite_values("points", points, "m", "n").copy()  # in the order for which kernels are compiled
+        array = finite_values(
+            "points", points, "m", "n"
+        ).copy()  # in the order for which kernels are compiled
         return cls._of(construction.hull_of(array, flat))
 
     @classmethod
     def from_constraints(
-        cls, normals: ArrayLike, offsets: ArrayLike, across: ArrayLike | None = None, levels: ArrayLike = ()
+        cls,
+        normals: ArrayLike,
+        offsets: ArrayLike,
+        across: ArrayLike | None = None,
+        levels: ArrayLike = (),
     ) -> Polytope:
-        """Return {x: normals x <= offsets, across x = levels}, with the shapes (m, n), (m,), (k, n) and (k,).
+        """Return {x: normals x <= offsets, across x = levels}, with the shapes (m, n), (m,), (k, n)
+        and (k,).
 
-        It may be empty or unbounded. Infinite offsets are no limit. One step of the double description for each row.
+        It may be empty or unbounded. Infinite offsets are no limit. One step of the double
+        description for each row.
         """
         rows, limits = constraint_values(("normals", "offsets"), normals, offsets, "k", "n")
         if across is not None:
-            flat, heights = constraint_values(("across", "levels"), across, levels, "k", rows.shape[1])
+            flat, heights = constraint_values(
+                ("across", "levels"), across, levels, "k", rows.shape[1]
+            )
             need_finite("levels", heights)
-            rows, limits = np.vstack([rows, flat, -flat]), np.concatenate([limits, heights, -heights])
+            rows = np.vstack([rows, flat, -flat])
+            limits = np.concatenate([limits, heights, -heights])
         return cls._of(construction.of_half_spaces(rows, limits))
 
     @classmethod
@@ -147,10 +172,14 @@ class Polytope(PolytopeArrays, ConvexSet):
         return cls.from_constraints(row[None], [offset])
 
     @classmethod
-    def from_rays(cls, points: ArrayLike, directions: ArrayLike = (), lines: ArrayLike = ()) -> Polytope:
-        """Return the hull of `points` and of the rays from them along `directions`, and along both ends of `lines`.
+    def from_rays(
+        cls, points: ArrayLike, directions: ArrayLike = (), lines: ArrayLike = ()
+    ) -> Polytope:
+        """Return the hull of `points` and of the rays from them along `directions`, and along both
+        ends of `lines`.
 
-        The shapes are (m, n), m at least 1, (k, n) and (l, n). Without directions and lines it is `from_vertices`.
+        The shapes are (m, n), m at least 1, (k, n) and (l, n). Without directions and lines it is
+        `from_vertices`.
         """
         array = finite_values("points", points, "m", "n")
         space = array.shape[1]
@@ -163,7 +192,9 @@ class Polytope(PolytopeArrays, ConvexSet):
 
     @classmethod
     def from_box(cls, lower: ArrayLike, upper: ArrayLike) -> Polytope:
-        """Return {x: lower <= x <= upper} for bounds of shape (n,); flat along axes whose bounds are equal. Exact."""
+        """Return {x: lower <= x <= upper} for bounds of shape (n,); flat along axes whose bounds
+        are equal. Exact.
+        """
         minimum, most = box_ends(lower, upper, "n")
         return cls._of(construction.box(minimum, most))
 
@@ -171,60 +202,81 @@ class Polytope(PolytopeArrays, ConvexSet):
     def from_ball(cls, centre: ArrayLike, radius: float, *, outer: bool = True) -> Polytope:
         """Return a polytope around the ball with `centre`, shape (n,), and `radius`, or in it.
 
-        Its facets, or its vertices if not `outer`, are in the 3^n - 1 directions whose components are in ratios of -1,
-        0 and 1; it has 2^n n! vertices, or facets: 3840 in R^5. It extends beyond the ball, or stays inside it, by the
-        factor 1.09 in two dimensions, 1.13 in three and 1.19 in five at most.
+        Its facets, or its vertices if not `outer`, are in the 3^n - 1 directions whose components
+        are in ratios of -1, 0 and 1; it has 2^n n! vertices, or facets: 3840 in R^5. It extends
+        beyond the ball, or stays inside it, by the factor 1.09 in two dimensions, 1.13 in three and
+        1.19 in five at most.
         """
-        middle, size = finite_values("centre", centre, "n"), float(radius_values(radius))
-        rows = np.array([row for row in itertools.product((-1.0, 0.0, 1.0), repeat=len(middle)) if any(row)])
+        middle = finite_values("centre", centre, "n")
+        size = float(radius_values(radius))
+        rows = np.array(
+            [row for row in itertools.product((-1.0, 0.0, 1.0), repeat=len(middle)) if any(row)]
+        )
         rows /= np.linalg.norm(rows, axis=1)[:, None]
         if outer and size > ON * np.abs(middle).max():  # rounding of the coordinates is smaller
             ends = middle - size, middle + size
-            return cls._of(construction.of_half_spaces(rows, np.full(len(rows), size), middle, ends))
+            return cls._of(
+                construction.of_half_spaces(rows, np.full(len(rows), size), middle, ends)
+            )
         return cls.from_vertices(middle + size * rows)
 
     @classmethod
     def from_shapely(cls, geometry: BaseGeometry) -> Polytope:
-        """Return a convex shapely Point, LineString or Polygon as a set of R^2; see `ConvexPolygons.from_shapely`."""
+        """Return a convex shapely Point, LineString or Polygon as a set of R^2; see
+        `ConvexPolygons.from_shapely`.
+        """
         ring = conversion.ring_of_geometry(geometry)
         return cls.from_vertices(ring) if len(ring) else cls.empty(2)
 
     def to_shapely(self) -> BaseGeometry:
-        """Return a set of R^2 as a shapely Point, LineString or Polygon; the empty set is an empty Polygon."""
+        """Return a set of R^2 as a shapely Point, LineString or Polygon; the empty set is an empty
+        Polygon.
+        """
         return conversion.geometry_of_ring(self._polygon())
 
     def _polygon(self) -> Floats:
         """Return the vertices of a set of R^2, shape (v, 2), counter-clockwise."""
         if self.space != 2:
-            raise ValueError(f"a set of R^2 is needed: project this one, of R^{self.space}, on two axes first")
+            raise ValueError(
+                f"a set of R^2 is needed: project this one, of R^{self.space}, on two axes first"
+            )
         return conversion.ring_of_points(self.bounded().vertices)
 
     @classmethod
     def from_zonotope(cls, zonotope: ZonotopeArrays) -> Polytope:
-        """Return a `Zonotope` as a polytope, which contains it and exceeds it by about 1e-12 of its size.
+        """Return a `Zonotope` as a polytope, which contains it and exceeds it by about 1e-12 of its
+        size.
 
-        Parallel generators are summed first. In up to three dimensions of the affine hull, all facets and vertices of
-        the g generators follow from signs of determinants: O(g^2) facets, O(g^3). In more, or where rounding decides
-        which generators are coplanar, it is a chain of `add_segment`.
+        Parallel generators are summed first. In up to three dimensions of the affine hull, all
+        facets and vertices of the g generators follow from signs of determinants: O(g^2) facets,
+        O(g^3). In more, or where rounding decides which generators are coplanar, it is a chain of
+        `add_segment`.
         """
         given = need_zonotope("zonotope", zonotope)
         found: Polytope = polytope_of(cls, given.centre, given.generators)
         return found
 
     def affine_map(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> Polytope:
-        """Return {matrix x + offset}, with a matrix of shape (m, n), singular or not, and an offset of shape (m,) or 0.
+        """Return {matrix x + offset}, with a matrix of shape (m, n), singular or not, and an offset
+        of shape (m,) or 0.
 
-        Vertices are rounded once. Under a regular matrix facets and incidence are mapped; otherwise it is a hull, which
-        may take long.
+        Vertices are rounded once. Under a regular matrix facets and incidence are mapped; otherwise
+        it is a hull, which may take long.
         """
-        rows = finite_values("matrix", matrix, "m", self.space).copy()  # kernels are compiled once, for such arrays
+        rows = finite_values(
+            "matrix", matrix, "m", self.space
+        ).copy()  # kernels are compiled once, for such arrays
         moved = offset_values(offset, len(rows)).copy()
         if self.is_empty:
             return self.empty(len(rows))
         if self.exact is not None:
-            mapped = polyhedron.image(self.exact, cone.rationals(rows), cone.rationals(moved[None])[0])
+            mapped = polyhedron.image(
+                self.exact, cone.rationals(rows), cone.rationals(moved[None])[0]
+            )
             return self._of(construction.of_polyhedron(mapped))
-        points, facets, centre, scale, errors = image(self.points, self.facets, self.centre, self.scale, rows, moved)
+        points, facets, centre, scale, errors = image(
+            self.points, self.facets, self.centre, self.scale, rows, moved
+        )
         mapped_set = replace(self, points=points, facets=facets, centre=centre, scale=scale)
         if self.dimension < self.space or not len(facets):
             return self._of(construction.enlarged(construction.hull(points, centre, scale), errors))
@@ -233,17 +285,21 @@ class Polytope(PolytopeArrays, ConvexSet):
     def preimage(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> Polytope:
         """Return {x in R^m: matrix x + offset in the set}, with a matrix of shape (n, m).
 
-        A step of the double description for each facet. If the matrix has a null space, the preimage is unbounded or
-        empty; it is computed in exact integers from the facets of the set.
+        A step of the double description for each facet. If the matrix has a null space, the
+        preimage is unbounded or empty; it is computed in exact integers from the facets of the set.
         """
-        factor, moved = finite_values("matrix", matrix, self.space, "m"), offset_values(offset, self.space)
+        factor = finite_values("matrix", matrix, self.space, "m")
+        moved = offset_values(offset, self.space)
         if self.is_empty:
             return self.empty(factor.shape[1])
         if self.exact is not None or _has_null_space(factor):
             return self._exact_preimage(factor, moved)
         rows, limits = half_spaces(self, moved)
-        mapped, rounded = affine_image(rows, np.ascontiguousarray(factor.T), np.zeros(factor.shape[1]))
-        # Along the image of the matrix an equation of this set may be zero, to the rounding of its own entries.
+        mapped, rounded = affine_image(
+            rows, np.ascontiguousarray(factor.T), np.zeros(factor.shape[1])
+        )
+        # Along the image of the matrix an equation of this set may be zero, to the rounding of its
+        # own entries.
         is_zero = np.abs(mapped) <= UNSURE * (self.space + 2) * (np.abs(rows) @ np.abs(factor))
         mapped[is_zero.all(axis=1)] = 0.0
         found = self._of(construction.of_half_spaces(mapped, limits))
@@ -254,51 +310,69 @@ class Polytope(PolytopeArrays, ConvexSet):
     def _exact_preimage(self, matrix: Floats, offset: Floats) -> Polytope:
         """Return {x: matrix x + offset in the set} in exact integers.
 
-        Facets and equations are rounded: where they leave nothing, they are relaxed by the rounding of n + 2
-        operations.
+        Facets and equations are rounded: where they leave nothing, they are relaxed by the rounding
+        of n + 2 operations.
         """
         factor, (shift,) = cone.rationals(matrix), cone.rationals(offset[None])
         found = polyhedron.preimage(self._polyhedron.half_spaces, factor, shift)
         if not found.points and self.exact is None:
             rows, limits = half_spaces(self, offset)
-            terms = np.abs(rows) @ (np.abs(self.vertices).max(axis=0) + np.abs(offset) + np.abs(self.centre))
+            terms = np.abs(rows) @ (
+                np.abs(self.vertices).max(axis=0) + np.abs(offset) + np.abs(self.centre)
+            )
             relaxed = polyhedron.as_half_spaces(rows, limits + (self.space + 2) * UNSURE * terms)
             found = polyhedron.preimage(relaxed, factor, [Fraction(0)] * self.space)
         return self._of(construction.of_polyhedron(found))
 
     def minkowski_sum(self, other: ConvexSet) -> Polytope:
-        """Return {x + y: x in the set, y in the other}, the hull of all v1 v2 sums of two vertices."""
+        """Return {x + y: x in the set, y in the other}, the hull of all v1 v2 sums of two
+        vertices.
+        """
         two = self._need_other(other)
         if self.is_empty or two.is_empty:
             return self if self.is_empty else two
         if self._any_is_unbounded(two):
-            return self._of(construction.of_polyhedron(polyhedron.total(self._polyhedron, two._polyhedron)))
-        pairs = [np.repeat(self.points, len(two.points), axis=0), np.tile(two.points, (len(self.points), 1))]
-        centre, scale = np.append(self.centre, two.centre), np.append(self.scale, two.scale)
+            return self._of(
+                construction.of_polyhedron(polyhedron.total(self._polyhedron, two._polyhedron))
+            )
+        pairs = [
+            np.repeat(self.points, len(two.points), axis=0),
+            np.tile(two.points, (len(self.points), 1)),
+        ]
+        centre = np.append(self.centre, two.centre)
+        scale = np.append(self.scale, two.scale)
         product = replace(self, points=np.hstack(pairs), centre=centre, scale=scale)
         return product.affine_map(np.tile(np.eye(self.space), 2))
 
     def add_segment(self, half: ArrayLike) -> Polytope:
         """Return the Minkowski sum with the segment from -half to +half, shape (n,).
 
-        Each facet moves, and each ridge between two facets that face opposite ends of the segment becomes a facet.
-        Where rounding decides which ridges do, the sum is a hull of points, which may take long.
+        Each facet moves, and each ridge between two facets that face opposite ends of the segment
+        becomes a facet. Where rounding decides which ridges do, the sum is a hull of points, which
+        may take long.
         """
         along = finite_values("half", half, self.space)
         if self.is_empty or not (along / self.scale).any():
             return self
         if self.dimension < self.space or self.exact is not None:
             return self.minkowski_sum(self.from_vertices([-along, along]))
-        points, facets, incidence, errors = swept(self.points, self.facets, self.incidence, along / self.scale)
-        rough = construction.enlarged(replace(self, points=points, facets=facets, incidence=incidence), errors)
+        points, facets, incidence, errors = swept(
+            self.points, self.facets, self.incidence, along / self.scale
+        )
+        rough = construction.enlarged(
+            replace(self, points=points, facets=facets, incidence=incidence), errors
+        )
         found = construction.settled(rough, len(facets))
         if found is None:
-            return self._of(construction.enlarged(construction.hull(points, self.centre, self.scale), errors))
+            return self._of(
+                construction.enlarged(construction.hull(points, self.centre, self.scale), errors)
+            )
         whole = self._of(found)
         return whole if np.abs(points).max() < _WIDE else whole.affine_map(np.eye(self.space))
 
     def enlarged(self, by: ArrayLike) -> Polytope:
-        """Return a set that contains {x + e: |e_i| <= by_i}, shape (n,): each facet moves outward by as much.
+        """Return a set that contains {x + e: |e_i| <= by_i}, shape (n,): each facet moves outward
+        by as much.
 
         A flat set becomes 3e-8 of its coordinates thick. O((v + f) n) for a set with an interior.
         """
@@ -307,8 +381,12 @@ class Polytope(PolytopeArrays, ConvexSet):
         if self.is_empty or not margin.any():
             return self
         if self.exact is not None:
-            outward = polyhedron.moved_outward(self.exact.half_spaces, cone.rationals(margin[None])[0])
-            return self._of(construction.of_polyhedron(polyhedron.of_half_spaces(self.space, outward)))
+            outward = polyhedron.moved_outward(
+                self.exact.half_spaces, cone.rationals(margin[None])[0]
+            )
+            return self._of(
+                construction.of_polyhedron(polyhedron.of_half_spaces(self.space, outward))
+            )
         solid = self if self.dimension == self.space else self._layer(margin)
         return self._of(construction.enlarged(solid, margin / solid.scale))
 
@@ -319,18 +397,24 @@ class Polytope(PolytopeArrays, ConvexSet):
         """
         sizes = np.maximum(margin, REDUCED * np.abs(self.vertices).max(axis=0))
         rows = self.equations[:, :-1] / self.scale
-        # Rounding does not lose a layer that is REDUCED thick in the coordinates in which the set is one wide.
+        # Rounding does not lose a layer that is REDUCED thick in the coordinates in which the set
+        # is one wide.
         heights = np.maximum(np.abs(rows) @ sizes, REDUCED)
         ends = np.vstack([self.equations, -self.equations])
         ends[:, -1] += np.tile(heights, 2)
 
-        open_set = replace(self, facets=np.vstack([self.facets, ends]), equations=self.equations[:0])
+        open_set = replace(
+            self, facets=np.vstack([self.facets, ends]), equations=self.equations[:0]
+        )
         sides, limits = half_spaces(open_set, self.centre)
         lower, upper = self.bounding_box()
-        return self._of(construction.of_half_spaces(sides, limits, self.centre, (lower - sizes, upper + sizes)))
+        return self._of(
+            construction.of_half_spaces(sides, limits, self.centre, (lower - sizes, upper + sizes))
+        )
 
     def minkowski_difference(self, other: ConvexSet) -> Polytope:
-        """Return the Pontryagin difference {x: x + y in the set for all y in the other}: each facet moves inward.
+        """Return the Pontryagin difference {x: x + y in the set for all y in the other}: each facet
+        moves inward.
 
         If the difference is flat, rounding decides whether it is empty.
 
@@ -348,10 +432,13 @@ class Polytope(PolytopeArrays, ConvexSet):
             inward = polyhedron.moved_inward(self._polyhedron.half_spaces, two._polyhedron)
             if inward is None:
                 return self.empty(self.space)
-            return self._of(construction.of_polyhedron(polyhedron.of_half_spaces(self.space, inward)))
+            return self._of(
+                construction.of_polyhedron(polyhedron.of_half_spaces(self.space, inward))
+            )
         rows, limits = half_spaces(self, self.centre)
         if self.dimension < self.space:
-            # The difference plus a point of the other set is a part of this one: it cannot leave the affine hull.
+            # The difference plus a point of the other set is a part of this one: it cannot leave
+            # the affine hull.
             start = two.vertices[0]
             less = _less(limits, supports(two.vertices - start, rows))
             return self._of(construction.cut(self, rows, less, self.centre)).translate(-start)
@@ -362,7 +449,8 @@ class Polytope(PolytopeArrays, ConvexSet):
         return self._of(construction.of_half_spaces(rows, less, self.centre, ends, sizes))
 
     def intersection(self, *others: ConvexSet) -> Polytope:
-        """Return the intersection with one or more polytopes: one step of the double description for each facet.
+        """Return the intersection with one or more polytopes: one step of the double description
+        for each facet.
 
         If one of them is unbounded, it is computed with integers.
         """
@@ -372,7 +460,8 @@ class Polytope(PolytopeArrays, ConvexSet):
                 return self.empty(self.space)
             rows = [row for one in every for row in one._polyhedron.half_spaces]
             return self._of(construction.of_polyhedron(polyhedron.of_half_spaces(self.space, rows)))
-        # A flat set first: cuts of it stay in its affine hull. Then one with many facets: those are not inserted again.
+        # A flat set first: cuts of it stay in its affine hull. Then one with many facets: those are
+        # not inserted again.
         sets = sorted(every, key=lambda one: (one.dimension, -len(one.facets)))
         found = sets[0]
         for one in sets[1:]:
@@ -383,8 +472,9 @@ class Polytope(PolytopeArrays, ConvexSet):
     def _cut_by(self, other: Polytope) -> Polytope:
         """Return the intersection with another bounded set.
 
-        One that is much smaller than this set is computed from all half-spaces together, in its own coordinates. `cut`
-        asks the same of its result: boxes that overlap do not show how small it is.
+        One that is much smaller than this set is computed from all half-spaces together, in its own
+        coordinates. `cut` asks the same of its result: boxes that overlap do not show how small it
+        is.
         """
         ends = np.array([self.bounding_box(), other.bounding_box()])
         lower = ends[:, 0].max(axis=0)
@@ -401,10 +491,14 @@ class Polytope(PolytopeArrays, ConvexSet):
         return self._of(construction.cut(self, rows, limits, other.centre))
 
     def convex_hull(self, *others: ConvexSet) -> Polytope:
-        """Return the convex hull of the union with one or more polytopes; its closure if one is unbounded."""
+        """Return the convex hull of the union with one or more polytopes; its closure if one is
+        unbounded.
+        """
         sets = [one for one in (self, *map(self._need_other, others)) if not one.is_empty]
         if self._any_is_unbounded(*sets):
-            return self._of(construction.of_polyhedron(polyhedron.hull([one._polyhedron for one in sets])))
+            return self._of(
+                construction.of_polyhedron(polyhedron.hull([one._polyhedron for one in sets]))
+            )
         return self.from_vertices(np.vstack([one.vertices for one in sets])) if sets else self
 
     def cut(
@@ -415,50 +509,65 @@ class Polytope(PolytopeArrays, ConvexSet):
         *,
         slack_ulp: float = 0.0,
     ) -> Polytope:
-        """Return the part in one or more strips lower <= normals x <= upper, or the set itself if they contain it.
+        """Return the part in one or more strips lower <= normals x <= upper, or the set itself if
+        they contain it.
 
-        `normals`, shape (n,) or (m, n), have any length. The bounds have the shape () or (m,); infinite ones give
-        half-spaces. Each strip is wider on both sides by `slack_ulp` ulp of the products in normals x: a point that
-        satisfies the bounds up to rounding is not lost.
+        `normals`, shape (n,) or (m, n), have any length. The bounds have the shape () or (m,);
+        infinite ones give half-spaces. Each strip is wider on both sides by `slack_ulp` ulp of the
+        products in normals x: a point that satisfies the bounds up to rounding is not lost.
         """
         rows = real_values("normals", normals)
         rows = np.atleast_2d(finite_values("normals", rows, *["m"] * (rows.ndim > 1), self.space))
-        minimum, most = bound_values("lower", lower, (), (len(rows),)), bound_values("upper", upper, (), (len(rows),))
+        minimum = bound_values("lower", lower, (), (len(rows),))
+        most = bound_values("upper", upper, (), (len(rows),))
         sizes = np.abs(self.vertices).max(axis=0, initial=0.0)
         wider = not_negative("slack_ulp", slack_ulp) * EPS * (np.abs(rows) @ sizes)
         if self.is_empty:
             return self
-        rows, limits = np.vstack([rows, -rows]), np.concatenate([most + wider, wider - minimum])
+        rows = np.vstack([rows, -rows])
+        limits = np.concatenate([most + wider, wider - minimum])
         if np.isneginf(limits).any() or (minimum > most + 2.0 * wider).any():
             return self.empty(self.space)
-        rows, limits = rows[limits < np.inf], limits[limits < np.inf]
+        rows = rows[limits < np.inf]
+        limits = limits[limits < np.inf]
         if self.exact is not None:
             sides = [*self.exact.half_spaces, *polyhedron.as_half_spaces(rows, limits)]
-            return self._of(construction.of_polyhedron(polyhedron.of_half_spaces(self.space, sides)))
+            return self._of(
+                construction.of_polyhedron(polyhedron.of_half_spaces(self.space, sides))
+            )
         return self._of(construction.cut(self, rows, limits))
 
     def project(self, axes: ArrayLike) -> Polytope:
-        """Return the projection on `axes`, an integer or a sequence of integers, as a set of as many dimensions."""
+        """Return the projection on `axes`, an integer or a sequence of integers, as a set of as
+        many dimensions.
+        """
         return self.affine_map(np.eye(self.space)[axis_numbers(axes, self.space, self.space)])
 
     def slice(self, axes: ArrayLike, values: ArrayLike) -> Polytope:
-        """Return the set of the other coordinates where the coordinates `axes`, not all, have some `values`.
+        """Return the set of the other coordinates where the coordinates `axes`, not all, have some
+        `values`.
 
         `values` is a number, or an array with one for each of the axes.
         """
         numbers = axis_numbers(axes, self.space, self.space - 1)
         fixed = finite_values("values", values, *[len(numbers)] * min(np.ndim(values), 1))
-        return self.cut(np.eye(self.space)[numbers], fixed, fixed).project(np.delete(np.arange(self.space), numbers))
+        return self.cut(np.eye(self.space)[numbers], fixed, fixed).project(
+            np.delete(np.arange(self.space), numbers)
+        )
 
     def reduce_outward(self, cap: int, max_vertices: int = 10**9) -> Polytope:
-        """Return a polytope with at most `cap` (>= 2n) facets, and `max_vertices` (>= 2^n), that contains the set.
+        """Return a polytope with at most `cap` (>= 2n) facets, and `max_vertices` (>= 2^n), that
+        contains the set.
 
-        It starts with the bounding box. Then it is cut by the facet with the greatest excess, relative to the width of
-        the set along its normal, until it has `cap` facets. A flat set becomes 3e-8 of its coordinates thick.
+        It starts with the bounding box. Then it is cut by the facet with the greatest excess,
+        relative to the width of the set along its normal, until it has `cap` facets. A flat set
+        becomes 3e-8 of its coordinates thick.
         """
         Limits(minimum=2 * self.space, whole=True).need("cap", cap)
         self.bounded()
-        if self.is_empty or (len(self.facets) + 2 * len(self.equations) <= cap and len(self.points) <= max_vertices):
+        if self.is_empty or (
+            len(self.facets) + 2 * len(self.equations) <= cap and len(self.points) <= max_vertices
+        ):
             return self
         solid = self if self.dimension == self.space else self._layer(np.zeros(self.space))
         return self._of(reduced_outward(solid, cap, max_vertices))
@@ -471,7 +580,9 @@ class Polytope(PolytopeArrays, ConvexSet):
         return polytope
 
     def _any_is_unbounded(self, *others: Polytope) -> bool:
-        """Whether an operation on some sets is computed in exact integers: one of them is unbounded."""
+        """Whether an operation on some sets is computed in exact integers: one of them is
+        unbounded.
+        """
         return not all(one.is_bounded for one in (self, *others))
 
     @cached_property
@@ -482,26 +593,36 @@ class Polytope(PolytopeArrays, ConvexSet):
         centre, scale = (cone.rationals(each[None])[0] for each in (self.centre, self.scale))
         points = []
         for point in cone.rationals(self.points):
-            moved = [middle + unit * entry for middle, unit, entry in zip(centre, scale, point, strict=True)]
+            moved = [
+                middle + unit * entry
+                for middle, unit, entry in zip(centre, scale, point, strict=True)
+            ]
             points.append(cone.whole([*moved, Fraction(1)]))
         tables = []
         for rows in (self.facets, self.equations):
             table = []
             for row in cone.rationals(rows):
                 normal = [entry / unit for entry, unit in zip(row[:-1], scale, strict=True)]
-                shift = sum((entry * middle for entry, middle in zip(normal, centre, strict=True)), Fraction(0))
+                shift = sum(
+                    (entry * middle for entry, middle in zip(normal, centre, strict=True)),
+                    Fraction(0),
+                )
                 table.append(cone.whole([*normal, row[-1] + shift]))
             tables.append(tuple(table))
         return polyhedron.Polyhedron(self.space, tuple(points), (), (), *tables)
 
     def recession(self) -> Polytope:
-        """Return the cone of the directions in which the set is unbounded: the origin if it is bounded."""
+        """Return the cone of the directions in which the set is unbounded: the origin if it is
+        bounded.
+        """
         return self._of(construction.of_polyhedron(polyhedron.recession(self.needed()._polyhedron)))
 
     def support_function(self, directions: ArrayLike) -> Floats:
-        """Return max direction . x, shape (...), for `directions`, shape (..., n); -inf for the empty set. O(v n).
+        """Return max direction . x, shape (...), for `directions`, shape (..., n); -inf for the
+        empty set. O(v n).
 
-        It is inf where the set is unbounded. A product of two directions that is zero to rounding counts as zero.
+        It is inf where the set is unbounded. A product of two directions that is zero to rounding
+        counts as zero.
         """
         rows = finite_values("directions", directions, "...", self.space)
         heights = np.asarray((rows @ self.vertices.T).max(axis=-1, initial=-np.inf))
@@ -510,7 +631,9 @@ class Polytope(PolytopeArrays, ConvexSet):
         return heights
 
     def _rises(self, rows: Floats) -> Flags:
-        """Whether the set is unbounded along `rows`, shape (..., n), beyond the rounding of scalar products."""
+        """Whether the set is unbounded along `rows`, shape (..., n), beyond the rounding of scalar
+        products.
+        """
         along = np.vstack([self.directions, self.lines, -self.lines])
         rounding = 2.0 * (self.space + 2) * EPS * (np.abs(rows) @ np.abs(along).T)
         return np.asarray((rows @ along.T > rounding).any(axis=-1))
@@ -524,7 +647,9 @@ class Polytope(PolytopeArrays, ConvexSet):
 
     @cached_property
     def _outer_rows(self) -> tuple[Floats, Floats]:
-        """The rows of `constraints`, with offsets that no vertex exceeds because of the rounding of these rows."""
+        """The rows of `constraints`, with offsets that no vertex exceeds because of the rounding of
+        these rows.
+        """
         rows, limits = self.constraints()
         # Points within a few tolerances of the double description count as in the affine hull.
         near = SNAP * (np.abs(rows) @ np.abs(self.vertices).max(axis=0))
@@ -532,25 +657,32 @@ class Polytope(PolytopeArrays, ConvexSet):
         return rows, np.maximum(limits, self.support_function(rows)) + near
 
     def margin(self, points: ArrayLike) -> Floats:
-        """Return the minimum distance of `points`, shape (..., n), from the facets, positive inside, shape (...).
+        """Return the minimum distance of `points`, shape (..., n), from the facets, positive
+        inside, shape (...).
 
-        In a flat set it is at most minus the distance from the affine hull, in the empty set -inf. It is not negative
-        at the vertices: the rounding of a scalar product, and of the representation (distances of vertices beyond
-        facets), is added. Outside, -`margin` is at most the `distance`.
+        In a flat set it is at most minus the distance from the affine hull, in the empty set -inf.
+        It is not negative at the vertices: the rounding of a scalar product, and of the
+        representation (distances of vertices beyond facets), is added. Outside, -`margin` is at
+        most the `distance`.
         """
         x = finite_values("points", points, "...", self.space)
         if self.is_empty:
             return np.full(x.shape[:-1], -np.inf)
         rows, limits = self._outer_rows
         rounding = (self.space + 2) * EPS * np.maximum(np.abs(x), np.abs(self.vertices).max(axis=0))
-        return np.asarray((limits + rounding @ np.abs(rows).T - x @ rows.T).min(axis=-1, initial=np.inf))
+        return np.asarray(
+            (limits + rounding @ np.abs(rows).T - x @ rows.T).min(axis=-1, initial=np.inf)
+        )
 
     def contains(self, points: ArrayLike, tolerance: float = 0.0) -> Flags:
-        """Return whether `points`, shape (..., n), are in the set, to rounding or within a `tolerance` (`margin`)."""
+        """Return whether `points`, shape (..., n), are in the set, to rounding or within a
+        `tolerance` (`margin`).
+        """
         return np.asarray(self.margin(points) >= -not_negative("tolerance", tolerance))
 
     def is_subset(self, other: ConvexSet, tolerance: float = 0.0) -> bool:
-        """Return whether all vertices are in the other set, to rounding, or within a `tolerance` of its facets.
+        """Return whether all vertices are in the other set, to rounding, or within a `tolerance` of
+        its facets.
 
         Of an unbounded set, also whether the other one is unbounded in the same directions.
         """
@@ -562,18 +694,23 @@ class Polytope(PolytopeArrays, ConvexSet):
         return not self._rises(rows).any()
 
     def volume(self) -> float:
-        """Return the volume within the affine hull, of its dimension; 1 for a point, 0 for the empty set."""
+        """Return the volume within the affine hull, of its dimension; 1 for a point, 0 for the
+        empty set.
+        """
         if self.is_empty:
             return 0.0
         if self.exact is not None:
             return float("inf")
-        # Along each column of the triangle of `_steps` scaled coordinates are turned and stretched by its diagonal.
+        # Along each column of the triangle of `_steps` scaled coordinates are turned and stretched
+        # by its diagonal.
         stretch = np.prod(np.abs(np.diag(triangle_of(self._steps)[0]))) if self.dimension else 1.0
         return float(self._simplices[1].sum() * stretch / factorial(self.dimension))
 
     @cached_property
     def _simplices(self) -> tuple[Integers, Floats]:
-        """Vertices of simplices that divide the set, shape (k, d + 1), and their determinants in d coordinates."""
+        """Vertices of simplices that divide the set, shape (k, d + 1), and their determinants in d
+        coordinates.
+        """
         if not self.dimension:
             return np.zeros((1, 1), np.int64), np.ones(1)
         corners = simplices_of(self.incidence.T, self.dimension)
@@ -581,26 +718,37 @@ class Polytope(PolytopeArrays, ConvexSet):
         return corners, np.abs(np.linalg.det(inner[corners[:, 1:]] - inner[corners[:, :1]]))
 
     def area(self) -> float:
-        """Return the area of a set of R^2; 0 for a segment or a point. `volume` is for any space."""
+        """Return the area of a set of R^2; 0 for a segment or a point. `volume` is for any
+        space.
+        """
         if self.exact is not None and self.space == 2:
             return float("inf") if self.dimension == self.space else 0.0
         return self.volume() if len(self._polygon()) > 2 else 0.0
 
     def centroid(self) -> Floats:
-        """Return the centroid within the affine hull, shape (n,), from a division into simplices."""
+        """Return the centroid within the affine hull, shape (n,), from a division into
+        simplices.
+        """
         corners, sizes = self.needed().bounded()._simplices
-        return np.asarray(self.centre + self.scale * (sizes / sizes.sum() @ self.points[corners].mean(axis=1)))
+        return np.asarray(
+            self.centre + self.scale * (sizes / sizes.sum() @ self.points[corners].mean(axis=1))
+        )
 
     def sample(self, count: int, seed: int | np.random.Generator = 0) -> Floats:
-        """Return points distributed uniformly over the set, shape (count, n), from a division into simplices."""
+        """Return points distributed uniformly over the set, shape (count, n), from a division into
+        simplices.
+        """
         random = np.random.default_rng(seed)
         corners, sizes = self.needed().bounded()._simplices
         weights = random.dirichlet(np.ones(corners.shape[1]), count)
         chosen = corners[random.choice(len(sizes), count, p=sizes / sizes.sum())]
-        return np.asarray(self.centre + self.scale * np.einsum("ij,ijk->ik", weights, self.points[chosen]))
+        return np.asarray(
+            self.centre + self.scale * np.einsum("ij,ijk->ik", weights, self.points[chosen])
+        )
 
     def chebyshev_centre(self) -> tuple[Floats, float]:
-        """Return the centre, shape (n,), and radius of a largest ball in the set, within its affine hull (HiGHS).
+        """Return the centre, shape (n,), and radius of a largest ball in the set, within its affine
+        hull (HiGHS).
 
         An UnboundedPolytopeError is raised if the set has balls of any size.
         """
@@ -609,20 +757,25 @@ class Polytope(PolytopeArrays, ConvexSet):
             self.bounded()
         if not self.dimension:
             return middle, 0.0
-        inner, radius = largest_ball(self.normals @ self._steps, self.offsets - self.normals @ middle)
+        inner, radius = largest_ball(
+            self.normals @ self._steps, self.offsets - self.normals @ middle
+        )
         return middle + self._steps @ inner, max(0.0, radius)
 
     def diameter(self) -> float:
-        """Return the maximum distance between two vertices; 0 for the empty set, inf for an unbounded one. O(v^2 n)."""
+        """Return the maximum distance between two vertices; 0 for the empty set, inf for an
+        unbounded one. O(v^2 n).
+        """
         if self.exact is not None:
             return float("inf")
         return float(cdist(self.vertices, self.vertices).max(initial=0.0))
 
     def closest_point(self, point: ArrayLike) -> Floats:
-        """Return the point of the set nearest to a `point`, both of shape (n,), within 1e-12 of the size of the set.
+        """Return the point of the set nearest to a `point`, both of shape (n,), within 1e-12 of the
+        size of the set.
 
-        Wolfe's algorithm: a least-squares problem of at most n + 1 points in each of a few steps. The point may be far
-        away: rounding is relative to the set and its coordinates.
+        Wolfe's algorithm: a least-squares problem of at most n + 1 points in each of a few steps.
+        The point may be far away: rounding is relative to the set and its coordinates.
         """
         x = finite_values("point", point, self.space)
         if x in self:
@@ -632,7 +785,9 @@ class Polytope(PolytopeArrays, ConvexSet):
         return nearest_pair(self.needed().vertices, x[None]).point
 
     def distance(self, other: ConvexSet | ArrayLike) -> float:
-        """Return the distance from a set or point `other`, shape (n,); inf if one is empty. As `closest_point`."""
+        """Return the distance from a set or point `other`, shape (n,); inf if one is empty. As
+        `closest_point`.
+        """
         if not isinstance(other, ConvexSet):
             other = self.from_vertices(finite_values("other", other, self.space)[None])
         two = self._need_other(other)
@@ -641,10 +796,13 @@ class Polytope(PolytopeArrays, ConvexSet):
         return float(np.linalg.norm(self._nearest_difference(two)))
 
     def _nearest_difference(self, other: Polytope) -> Floats:
-        """Return the difference x - y of nearest points x of this set and y of the other, shape (n,)."""
+        """Return the difference x - y of nearest points x of this set and y of the other, shape
+        (n,).
+        """
         if not self._any_is_unbounded(other):
             return nearest_pair(self.vertices, other.vertices).difference
-        # The nearest difference is at most as long as the one of two points, so that it is in a box of this size.
+        # The nearest difference is at most as long as the one of two points, so that it is in a box
+        # of this size.
         differences = self + -other
         some = differences.vertices[0]
         size = float(np.ldexp(1.0, np.frexp(np.linalg.norm(some))[1]))
@@ -657,9 +815,11 @@ class Polytope(PolytopeArrays, ConvexSet):
         return self.is_empty or two.is_empty or self.separating_direction(two) is not None
 
     def separating_direction(self, other: ConvexSet) -> Floats | None:
-        """Return a witness that two sets are disjoint; None if they meet, to rounding, or one is empty.
+        """Return a witness that two sets are disjoint; None if they meet, to rounding, or one is
+        empty.
 
-        It is a direction d, shape (n,), of unit length, with d . x < d . y for all x of this set and y of the other.
+        It is a direction d, shape (n,), of unit length, with d . x < d . y for all x of this set
+        and y of the other.
         """
         two = self._need_other(other)
         if self.is_empty or two.is_empty:
@@ -667,28 +827,39 @@ class Polytope(PolytopeArrays, ConvexSet):
         between = two._nearest_difference(self)
         length = float(np.linalg.norm(between))
         direction = np.asarray(between / (length or 1.0))
-        return direction if self.support_function(direction) < -two.support_function(-direction) else None
+        return (
+            direction
+            if self.support_function(direction) < -two.support_function(-direction)
+            else None
+        )
 
     def hausdorff_distance(self, other: ConvexSet) -> float:
-        """Return the Hausdorff distance; inf between an empty and a nonempty set. One `distance` for each vertex.
+        """Return the Hausdorff distance; inf between an empty and a nonempty set. One `distance`
+        for each vertex.
 
         It is inf if the sets are not unbounded in the same directions.
         """
         two = self._need_other(other)
         have_points = not (self.is_empty or two.is_empty)
-        if have_points and self._any_is_unbounded(two) and not self.recession().equals(two.recession()):
+        if (
+            have_points
+            and self._any_is_unbounded(two)
+            and not self.recession().equals(two.recession())
+        ):
             return float("inf")
         from_this = [two.distance(vertex) for vertex in self.vertices]
         from_other = [self.distance(vertex) for vertex in two.vertices]
         return max(from_this + from_other, default=0.0)
 
     def plot(self, ax: Any = None, **style: Any) -> list[Any]:
-        """Draw a set of R^2 or R^3 on matplotlib axes, and return the artists: one, or none for the empty set.
+        """Draw a set of R^2 or R^3 on matplotlib axes, and return the artists: one, or none for the
+        empty set.
 
-        Without axes the present ones of pyplot are used, or new ones if these have not as many dimensions as the set.
-        `style` has the options of matplotlib's `fill` in the plane and `Poly3DCollection` in space, and of `scatter`
-        for a point. Facets in space are transparent. Segments and thin sets are visible by their edges. Of an unbounded
-        set the part within the limits of the axes is drawn: set them before.
+        Without axes the present ones of pyplot are used, or new ones if these have not as many
+        dimensions as the set. `style` has the options of matplotlib's `fill` in the plane and
+        `Poly3DCollection` in space, and of `scatter` for a point. Facets in space are transparent.
+        Segments and thin sets are visible by their edges. Of an unbounded set the part within the
+        limits of the axes is drawn: set them before.
 
         Raises
         ------
@@ -702,11 +873,19 @@ class Polytope(PolytopeArrays, ConvexSet):
             return draw_polygons(ax, [self._polygon()], style)
         if self.space == 3:
             return draw_facets(ax, self._facet_rings(), style)
-        instead = "project it on two or three axes first" if self.space > 3 else "it is the interval of bounding_box()"
-        raise ValueError(f"sets of R^2 and R^3 are drawn, and this one is of R^{self.space}: {instead}")
+        instead = (
+            "project it on two or three axes first"
+            if self.space > 3
+            else "it is the interval of bounding_box()"
+        )
+        raise ValueError(
+            f"sets of R^2 and R^3 are drawn, and this one is of R^{self.space}: {instead}"
+        )
 
     def _facet_rings(self) -> list[Floats]:
-        """Return the vertices of each facet of a set of R^3 in their order around it; of a flat set, all vertices."""
+        """Return the vertices of each facet of a set of R^3 in their order around it; of a flat
+        set, all vertices.
+        """
         if self.is_empty:
             return []
         faces = self.incidence.T
@@ -723,7 +902,9 @@ def _less(limits: Floats, widths: Floats) -> Floats:
 
 
 def _has_null_space(matrix: Floats) -> bool:
-    """Whether matrix x = 0 has solutions other than zero, exactly decided; the matrix has the shape (n, m)."""
+    """Whether matrix x = 0 has solutions other than zero, exactly decided; the matrix has the shape
+    (n, m).
+    """
     units = dd.in_units(np.ascontiguousarray(matrix.T))
     if len(dd.pivots(units, REDUCED, -1)[0]) == matrix.shape[1]:
         return False

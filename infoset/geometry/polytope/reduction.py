@@ -18,10 +18,11 @@ _kernels = Kernels("contract", "nnan", "nsz")
 
 
 def reduced_outward(polytope: PolytopeArrays, cap: int, max_vertices: int) -> PolytopeArrays:
-    """Return a set that contains a polytope with an interior, with at most `cap` facets and `max_vertices` vertices.
+    """Return a set that contains a polytope with an interior, with at most `cap` facets and
+    `max_vertices` vertices.
 
-    It starts with the bounding box, so that all widths are exact, and is cut by the facet beyond which it extends most,
-    relative to the width along its normal.
+    It starts with the bounding box, so that all widths are exact, and is cut by the facet beyond
+    which it extends most, relative to the width along its normal.
     """
     points, facets, incidence = _cut_by_worst(polytope.points, polytope.facets, cap, max_vertices)
     outer = replace(polytope, points=points, facets=facets, incidence=incidence)
@@ -32,15 +33,20 @@ def reduced_outward(polytope: PolytopeArrays, cap: int, max_vertices: int) -> Po
 
 
 @_kernels.compiled
-def _cut_by_worst(points: Floats, facets: Floats, cap: int, max_vertices: int) -> tuple[Floats, Floats, Flags]:
-    """Return points, facets and incidence of a box around a set, cut to at most `cap` sides and so many vertices.
+def _cut_by_worst(
+    points: Floats, facets: Floats, cap: int, max_vertices: int
+) -> tuple[Floats, Floats, Flags]:
+    """Return points, facets and incidence of a box around a set, cut to at most `cap` sides and so
+    many vertices.
 
-    The excess of a facet only decreases, so that one of an earlier round is an upper bound: only the greatest one is
-    computed again.
+    The excess of a facet only decreases, so that one of an earlier round is an upper bound: only
+    the greatest one is computed again.
     """
     (f, n), number = (len(facets), points.shape[1]), 2 * points.shape[1]  # of sides
-    sides, row = np.zeros((number + min(f, cap), n + 1)), np.empty(n + 1)
-    rays, bits = np.ones((2**n, n + 1)), np.zeros((2**n, len(sides) // 64 + 1), np.uint64)
+    sides = np.zeros((number + min(f, cap), n + 1))
+    row = np.empty(n + 1)
+    rays = np.ones((2**n, n + 1))
+    bits = np.zeros((2**n, len(sides) // 64 + 1), np.uint64)
     for j in range(n):
         sides[j, j], sides[j, n] = 1.0, points[:, j].max()
         sides[n + j, j], sides[n + j, n] = -1.0, -points[:, j].min()
@@ -48,9 +54,11 @@ def _cut_by_worst(points: Floats, facets: Floats, cap: int, max_vertices: int) -
             side = j + n * (k >> j & 1)
             rays[k, j] = sides[side, j] * sides[side, n]
             bits[k, 0] |= np.uint64(1) << np.uint64(side)
-    columns, turned = np.ascontiguousarray(rays.T), np.ascontiguousarray(-points.T)
+    columns = np.ascontiguousarray(rays.T)
+    turned = np.ascontiguousarray(-points.T)
     widths = np.array([max(facets[i, n] + _highest(turned, facets[i]), ON) for i in range(f)])
-    excess, round_of = np.full(f, np.inf), np.zeros(f, np.int64)
+    excess = np.full(f, np.inf)
+    round_of = np.zeros(f, np.int64)
     while number < len(sides):
         worst = int(np.argmax(excess))
         facet = facets[worst]
@@ -62,9 +70,13 @@ def _cut_by_worst(points: Floats, facets: Floats, cap: int, max_vertices: int) -
             break
         row[:n], row[n] = -facet[:n], facet[n]
         cut, cut_bits = dd.insert(rays, bits, row, number, n - 1, np.bool_(True))
-        if len(cut) > max_vertices or (number >= cap and _count_sides(cut_bits, number + 1, n) > cap):
+        if len(cut) > max_vertices or (
+            number >= cap and _count_sides(cut_bits, number + 1, n) > cap
+        ):
             break
-        rays, bits, columns = cut, cut_bits, np.ascontiguousarray(cut.T)
+        rays = cut
+        bits = cut_bits
+        columns = np.ascontiguousarray(cut.T)
         sides[number], excess[worst] = facet, -np.inf
         number += 1
     return rays[:, :n].copy(), sides[:number], unpacked(bits, number)

@@ -1,6 +1,8 @@
-"""Scaled coordinates y of a set, x = centre + scale y, in which it is about one wide along each axis.
+"""Scaled coordinates y of a set, x = centre + scale y, in which it is about one wide along each
+axis.
 
-The scales are powers of two, which round nothing; a centre is used only where the set is far from the origin.
+The scales are powers of two, which round nothing; a centre is used only where the set is far from
+the origin.
 """
 
 from __future__ import annotations
@@ -18,12 +20,17 @@ from infoset.kernels import Kernels
 
 _kernels = Kernels()
 _FAR = 16.0
-"""Coordinates, in scales, from which a centre is used: nearer to the origin four digits more are lost at most."""
+"""Coordinates, in scales, from which a centre is used: nearer to the origin four digits more are
+lost at most.
+"""
 
 
 @_kernels.compiled
-def coordinates(lower: Floats, upper: Floats, minimum: Floats, share: float) -> tuple[Floats, Floats]:
-    """Return a centre and scales, powers of two, for a set between two points, or as wide as `minimum`, each (n,).
+def coordinates(
+    lower: Floats, upper: Floats, minimum: Floats, share: float
+) -> tuple[Floats, Floats]:
+    """Return a centre and scales, powers of two, for a set between two points, or as wide as
+    `minimum`, each (n,).
 
     A scale is at least a `share` of the coordinates. Differences from a centre far away are exact.
     """
@@ -60,7 +67,9 @@ def scaled_points(points: list[list[Fraction]], centre: Floats, scale: Floats) -
     scaled = []
     for point in points:
         entries = zip(point, frame, strict=True)
-        scaled.append([float((x - Fraction(middle)) / Fraction(unit)) for x, (middle, unit) in entries])
+        scaled.append(
+            [float((x - Fraction(middle)) / Fraction(unit)) for x, (middle, unit) in entries]
+        )
     return np.array(scaled)
 
 

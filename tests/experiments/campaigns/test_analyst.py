@@ -25,7 +25,9 @@ MORE = 50
 
 def command(page: str) -> list[str]:
     """Return the arguments of the sweep on a page."""
-    match = re.search(r"^infoset sweep (?:.*\\\n)*.*", (ROOT / page).read_text(encoding="utf-8"), re.MULTILINE)
+    match = re.search(
+        r"^infoset sweep (?:.*\\\n)*.*", (ROOT / page).read_text(encoding="utf-8"), re.MULTILINE
+    )
     assert match is not None
     return shlex.split(match[0].replace("\\\n", ""))[1:]
 
@@ -39,14 +41,18 @@ def test_the_readme_asks_what_the_page_answers() -> None:
 
 @pytest.mark.thorough
 @pytest.mark.skipif(not (ROOT / "docs").is_dir(), reason="the wheel has no pages")
-def test_the_answer_is_the_same_with_more_runs_in_each_cell(infoset: Infoset, tmp_path: Path) -> None:
+def test_the_answer_is_the_same_with_more_runs_in_each_cell(
+    infoset: Infoset, tmp_path: Path
+) -> None:
     asked = command("docs/requirements.md")
     code, out, _ = infoset(*asked, "--json", "-")
     assert code == 0
     report: Any = json.loads(out)
     folder = CampaignFolder.read(tmp_path / "requirement")
     scenario = folder.manifest.scenario
-    axes = sweep_axes(",".join(after for name, after in itertools.pairwise(asked) if name == "--vary"), scenario)
+    axes = sweep_axes(
+        ",".join(after for name, after in itertools.pairwise(asked) if name == "--vary"), scenario
+    )
     assert folder.manifest.axes == axes
     required = HitRequirement(0.95)
     assert folder.manifest.until == str(required)

@@ -37,9 +37,24 @@ def stored_runs(folder: Path) -> pd.DataFrame:
     return folder_read.runs()
 
 
-def test_a_campaign_into_a_folder(infoset: Infoset, brief: Scenario, file: Path, tmp_path: Path) -> None:
+def test_a_campaign_into_a_folder(
+    infoset: Infoset, brief: Scenario, file: Path, tmp_path: Path
+) -> None:
     folder = tmp_path / "runs"
-    asked = ("campaign", file, "--runs", 150, "--noise", "mixed", "--seed", 4, "--model", "paper", "--out", folder)
+    asked = (
+        "campaign",
+        file,
+        "--runs",
+        150,
+        "--noise",
+        "mixed",
+        "--seed",
+        4,
+        "--model",
+        "paper",
+        "--out",
+        folder,
+    )
     code, out, err = infoset(*asked)
     assert code == 0
     assert err.endswith(f"wrote shards, scenario.toml, summary.json in {folder}\n")
@@ -47,7 +62,11 @@ def test_a_campaign_into_a_folder(infoset: Infoset, brief: Scenario, file: Path,
         *(".lock", "manifest.json", "scenario.toml", "shards", "summary.json")
     }
     runs = stored_runs(folder)
-    assert runs.equals(Campaign(brief, 150, tmp_path / "api", seed=4, noise=CampaignNoise.MIXED).run(workers=1).runs())
+    assert runs.equals(
+        Campaign(brief, 150, tmp_path / "api", seed=4, noise=CampaignNoise.MIXED)
+        .run(workers=1)
+        .runs()
+    )
     assert load_scenario(folder / "scenario.toml") == brief
     found = json.loads((folder / "summary.json").read_text())
     assert found["versions"] == versions()
@@ -60,14 +79,21 @@ def test_a_campaign_into_a_folder(infoset: Infoset, brief: Scenario, file: Path,
         assert sample["miss_m_p50"] == own[37]
         assert sample["miss_m_p50_lower"] in own
         assert sample["miss_m_p99.9_upper"] is None
-        assert sum(sample[name] for name in ("arrived", "set_empty", "budget_spent", "diverged")) == 75
+        assert (
+            sum(sample[name] for name in ("arrived", "set_empty", "budget_spent", "diverged")) == 75
+        )
     code, out, err = infoset(*asked, "--resume", "--json", "-")
     assert code == 0
     assert json.loads(out)["runs"] == 150
     assert "miss, m" not in err
     assert infoset(*asked, "--resume", "--quiet", "--csv", "table.csv") == (0, "", "")
-    assert pd.read_csv("table.csv")["miss_m_p50"].tolist() == [sample["miss_m_p50"] for sample in found["samples"]]
-    what = f"<campaign of brief in {folder}: symmetric-miss, mixed noise, seed 4, 150 of 150 runs stored>"
+    assert pd.read_csv("table.csv")["miss_m_p50"].tolist() == [
+        sample["miss_m_p50"] for sample in found["samples"]
+    ]
+    what = (
+        f"<campaign of brief in {folder}: symmetric-miss, mixed noise, seed 4, 150 of 150 runs "
+        "stored>"
+    )
     assert repr(CampaignFolder.read(folder)) == what
     code, _, err = infoset(*asked)
     assert code == 2
@@ -77,15 +103,40 @@ def test_a_campaign_into_a_folder(infoset: Infoset, brief: Scenario, file: Path,
     assert "  seed: 4 in the folder, 3 now" in err
 
 
-def test_the_options_are_those_of_the_engagements(infoset: Infoset, file: Path, tmp_path: Path) -> None:
-    options = ("--noise", "game", "--strategy", "patient", "--model", "guaranteed", "--set", "tie=lower")
-    asked = ("campaign", file, "--runs", 8, "--out", tmp_path / "runs", "-q", "--no-range-sensor", *options)
+def test_the_options_are_those_of_the_engagements(
+    infoset: Infoset, file: Path, tmp_path: Path
+) -> None:
+    options = (
+        "--noise",
+        "game",
+        "--strategy",
+        "patient",
+        "--model",
+        "guaranteed",
+        "--set",
+        "tie=lower",
+    )
+    asked = (
+        "campaign",
+        file,
+        "--runs",
+        8,
+        "--out",
+        tmp_path / "runs",
+        "-q",
+        "--no-range-sensor",
+        *options,
+    )
     assert infoset(*asked)[0] == 0
     runs = stored_runs(tmp_path / "runs")
     assert set(runs["noise"]) == {"game"}
     assert runs["guaranteed_miss_m"].notna().all()
     scenario = load_scenario(tmp_path / "runs" / "scenario.toml")
-    assert (scenario.strategy, scenario.noise, scenario.tie.value) == ("patient", NoiseKind.GAME, "lower")
+    assert (scenario.strategy, scenario.noise, scenario.tie.value) == (
+        "patient",
+        NoiseKind.GAME,
+        "lower",
+    )
     assert scenario.range_sensor is None
     assert runs["miss_m"][3] == fly_one(scenario, 3).result.miss_m[0]
     found = json.loads((tmp_path / "runs" / "summary.json").read_text())
@@ -114,7 +165,9 @@ def test_a_strategy_of_a_file_in_threads_and_processes(
     assert infoset(*asked, "--out", "processes", "--workers", 2) == (0, "", "")
     assert stored_runs(Path("threads")).equals(stored_runs(Path("processes")))
     digest = hashlib.sha256(OWN.encode()).hexdigest()[:16]
-    assert CampaignFolder.read(Path("threads")).manifest.strategy == f"halved.py:Half sha256:{digest}"
+    assert (
+        CampaignFolder.read(Path("threads")).manifest.strategy == f"halved.py:Half sha256:{digest}"
+    )
     worst = json.loads(infoset("report", "threads", "--json", "-")[1])["worst"][0]
     _, *arguments = shlex.split(worst["replay"])
     assert json.loads(infoset(*arguments, "--json", "-")[1])["miss_m"] == worst["miss_m"]
@@ -126,11 +179,24 @@ def test_a_strategy_of_a_file_in_threads_and_processes(
     del sys.modules["halved"]  # the next command reads the changed file, as in a new process
     code, _, err = infoset(*asked, "--out", "threads", "--resume")
     assert code == 2
-    assert f'strategy: "halved.py:Half sha256:{digest}" in the folder, "halved.py:Half sha256:' in err
+    assert (
+        f'strategy: "halved.py:Half sha256:{digest}" in the folder, "halved.py:Half sha256:' in err
+    )
 
 
 def test_until_stops_and_goes_on(infoset: Infoset, file: Path, tmp_path: Path) -> None:
-    asked = ("campaign", file, "--runs", 400, "--chunk", 16, "--out", tmp_path / "runs", "--until", "miss_m p50 ci<1")
+    asked = (
+        "campaign",
+        file,
+        "--runs",
+        400,
+        "--chunk",
+        16,
+        "--out",
+        tmp_path / "runs",
+        "--until",
+        "miss_m p50 ci<1",
+    )
     code, out, _ = infoset(*asked)
     assert code == 0
     runs = CampaignFolder.read(tmp_path / "runs").finished_runs
@@ -139,7 +205,10 @@ def test_until_stops_and_goes_on(infoset: Infoset, file: Path, tmp_path: Path) -
     code, out, _ = infoset(*asked[:-1], "miss_m p50 ci<1e-9", "--resume")
     assert code == 0
     assert CampaignFolder.read(tmp_path / "runs").finished_runs == 400
-    assert "the rule miss_m p50 ci<1e-09 is not met; continue with --resume and a greater --runs" in out
+    assert (
+        "the rule miss_m p50 ci<1e-09 is not met; continue with --resume and a greater --runs"
+        in out
+    )
 
 
 @pytest.mark.parametrize(
@@ -162,7 +231,9 @@ def test_what_is_wrong_is_said_before_the_work(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("infoset.sim.parallel.simulate_task", lambda *_: pytest.fail("began to work"))
+    monkeypatch.setattr(
+        "infoset.sim.parallel.simulate_task", lambda *_: pytest.fail("began to work")
+    )
     code, out, err = infoset("campaign", file, "--runs", 10, "--out", "runs", *arguments)
     assert (code, out) == (2, "")
     assert err.count("error: ") == 1
@@ -171,7 +242,8 @@ def test_what_is_wrong_is_said_before_the_work(
 
 
 @pytest.mark.parametrize(
-    ("library", "extra"), [("pyarrow", "campaign"), ("pandas", "campaign"), ("distributed", "distributed")]
+    ("library", "extra"),
+    [("pyarrow", "campaign"), ("pandas", "campaign"), ("distributed", "distributed")],
 )
 def test_without_an_extra_it_says_which(
     library: str, extra: str, infoset: Infoset, file: Path, monkeypatch: pytest.MonkeyPatch
@@ -189,12 +261,28 @@ def test_without_an_extra_it_says_which(
     options = ("--dask", "tcp://127.0.0.1:1") if library == "distributed" else ()
     code, out, err = infoset("campaign", file, "--runs", 8, "--out", "runs", *options)
     assert (code, out) == (2, "")
-    assert err.splitlines()[-1] == f"error: {library} is not installed: install infoset with the extra [{extra}]"
+    assert (
+        err.splitlines()[-1]
+        == f"error: {library} is not installed: install infoset with the extra [{extra}]"
+    )
 
 
 def command(file: Path, folder: Path, runs: int, *options: object) -> list[str]:
     """The command that begins or resumes a campaign in a process."""
-    asked = ("campaign", file, "--runs", runs, "--chunk", 8, "--noise", "mixed", "--out", folder, "--resume", "-q")
+    asked = (
+        "campaign",
+        file,
+        "--runs",
+        runs,
+        "--chunk",
+        8,
+        "--noise",
+        "mixed",
+        "--out",
+        folder,
+        "--resume",
+        "-q",
+    )
     return [sys.executable, "-m", "infoset", *map(str, (*asked, *options))]
 
 
@@ -209,8 +297,12 @@ def wait_for_shards(process: subprocess.Popen[bytes], folder: Path, number: int)
 
 @pytest.mark.thorough
 @needs_kill
-@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="this system does not list its processes")
-def test_processes_give_the_same_bits_and_end_with_their_parent(brief: Scenario, file: Path, tmp_path: Path) -> None:
+@pytest.mark.skipif(
+    not Path("/proc/self/stat").exists(), reason="this system does not list its processes"
+)
+def test_processes_give_the_same_bits_and_end_with_their_parent(
+    brief: Scenario, file: Path, tmp_path: Path
+) -> None:
     folder = tmp_path / "runs"
     asked = command(file, folder, 4000, "--workers", 2)
     with subprocess.Popen(asked) as process:
@@ -224,7 +316,9 @@ def test_processes_give_the_same_bits_and_end_with_their_parent(brief: Scenario,
     assert not children & processes()
     assert 80 <= CampaignFolder.read(folder).finished_runs < 4000
     subprocess.run(asked, check=True)
-    expected = Campaign(with_model(brief, Model.GUARANTEED), 4000, tmp_path / "whole", noise=CampaignNoise.MIXED).run()
+    expected = Campaign(
+        with_model(brief, Model.GUARANTEED), 4000, tmp_path / "whole", noise=CampaignNoise.MIXED
+    ).run()
     assert stored_runs(folder).equals(expected.runs())
 
 
@@ -235,6 +329,8 @@ def processes() -> set[int]:
 def parent(process: int) -> int:
     """The parent of a process; 0 if it has ended."""
     try:
-        return int((Path("/proc") / str(process) / "stat").read_text().rpartition(")")[2].split()[1])
+        return int(
+            (Path("/proc") / str(process) / "stat").read_text().rpartition(")")[2].split()[1]
+        )
     except OSError:
         return 0

@@ -22,9 +22,24 @@ SWEPT = "uncertainty.y_km.max=0.1:0.2:2,angle_sensor.error_at_zero_range_y_rad=0
 
 
 def test_a_campaign_in_space_is_resumed_and_reported(space_file: Path, infoset: Command) -> None:
-    assert infoset("campaign", space_file, "--runs", 8, "--noise", "mixed", "--out", "runs", "--seed", 3)[0] == 0
+    assert (
+        infoset(
+            "campaign", space_file, "--runs", 8, "--noise", "mixed", "--out", "runs", "--seed", 3
+        )[0]
+        == 0
+    )
     code, _, _ = infoset(
-        "campaign", space_file, "--runs", 12, "--noise", "mixed", "--out", "runs", "--seed", 3, "--resume"
+        "campaign",
+        space_file,
+        "--runs",
+        12,
+        "--noise",
+        "mixed",
+        "--out",
+        "runs",
+        "--seed",
+        3,
+        "--resume",
     )
     assert code == 0
     table = CampaignFolder.read(Path("runs")).runs()
@@ -45,21 +60,28 @@ def test_a_campaign_in_space_is_resumed_and_reported(space_file: Path, infoset: 
     assert flown["miss_y_m"] in table["miss_y_m"].tolist()
 
 
-def test_a_sweep_over_keys_of_space_is_resumed_and_reported(space_file: Path, infoset: Command) -> None:
+def test_a_sweep_over_keys_of_space_is_resumed_and_reported(
+    space_file: Path, infoset: Command
+) -> None:
     sweep = ["sweep", space_file, "--vary", SWEPT, "--noise", "random", "--out", "cells"]
     assert infoset(*sweep, "--runs", 3)[0] == 0
     assert infoset(*sweep, "--runs", 5, "--resume")[0] == 0
     scenario = with_model(load_scenario(str(space_file)), Model.GUARANTEED)
-    model, sensor = scenario.set_model, scenario.set_model.angle_sensor
+    model = scenario.set_model
+    sensor = scenario.set_model.angle_sensor
     last = replace(
         model,
         bounds=replace(model.bounds, y_m=(-100.0, 200.0)),
         angle_sensor=replace(linear(sensor), error_at_zero_range_y_rad=0.0004),
     )
     table = CampaignFolder.read(Path("cells")).runs(["miss_m", "miss_y_m"], 3)
-    flown = simulate(replace(scenario, **of_model(last), noise=NoiseKind.RANDOM, tie=scenario.tie), 5)
+    flown = simulate(
+        replace(scenario, **of_model(last), noise=NoiseKind.RANDOM, tie=scenario.tie), 5
+    )
     assert table["miss_m"].tolist() == flown.miss_m.tolist()
     assert table["miss_y_m"].tolist() == flown.lateral_miss_m[:, 0].tolist()
     report = infoset.json("report", "cells", "--quiet")
-    assert [axis["key"] for axis in report["axes"]] == [part.split("=")[0] for part in SWEPT.split(",")]
+    assert [axis["key"] for axis in report["axes"]] == [
+        part.split("=")[0] for part in SWEPT.split(",")
+    ]
     assert report["runs"] == 20

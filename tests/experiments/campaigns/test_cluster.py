@@ -33,11 +33,17 @@ def test_no_scheduler_is_one_message_and_an_open_one_is_warned_of(
     notes: list[str] = []
     monkeypatch.setattr("infoset.experiments.campaigns.cluster.PATIENCE_S", 0.5)
     with (
-        pytest.raises(InputError, match=f"no Dask scheduler answers at {address} .*start one with: dask scheduler"),
+        pytest.raises(
+            InputError,
+            match=f"no Dask scheduler answers at {address} .*start one with: dask scheduler",
+        ),
         cluster(address, notes.append),
     ):
         pytest.fail("there is no cluster")
-    assert any("everyone who reaches that address can run programs there" in note for note in notes) == is_open
+    assert (
+        any("everyone who reaches that address can run programs there" in note for note in notes)
+        == is_open
+    )
 
 
 class Processes:
@@ -65,8 +71,12 @@ class Processes:
 
     def start(self, what: str, *arguments: str, **environment: str) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-m", "dask", what, *arguments, "--no-dashboard"]
-        log = self.stack.enter_context((self.folder / f"{what}-{time.monotonic_ns()}.log").open("wb"))
-        process = subprocess.Popen(command, stdout=log, stderr=log, env={**os.environ, **environment}, cwd=self.folder)
+        log = self.stack.enter_context(
+            (self.folder / f"{what}-{time.monotonic_ns()}.log").open("wb")
+        )
+        process = subprocess.Popen(
+            command, stdout=log, stderr=log, env={**os.environ, **environment}, cwd=self.folder
+        )
         self.stack.callback(process.wait)
         self.stack.callback(process.kill)
         return process
@@ -123,7 +133,11 @@ def test_two_workers_give_the_same_bits_and_one_that_ends_loses_nothing(
     expected = Campaign(brief, 4000, tmp_path / "here", noise=CampaignNoise.MIXED).run().runs()
     assert CampaignFolder.read(tmp_path / "two").runs().equals(expected[:400])
     killer = kill_after(tmp_path / "killed" / "shards", 20, workers[0])
-    assert infoset("campaign", file, *options, "--out", "killed", "--runs", 4000, "-q") == (0, "", "")
+    assert infoset("campaign", file, *options, "--out", "killed", "--runs", 4000, "-q") == (
+        0,
+        "",
+        "",
+    )
     killer.join()
     assert CampaignFolder.read(tmp_path / "killed").runs().equals(expected)
 
@@ -135,10 +149,24 @@ def test_a_scheduler_that_ends_is_one_message_and_the_campaign_goes_on_without(
 ) -> None:
     processes.worker()
     processes.wait_for(1)
-    asked = ["campaign", str(file), "--model", "paper", "--runs", "6000", "--chunk", "16", "--out", "runs", "-q"]
+    asked = [
+        "campaign",
+        str(file),
+        "--model",
+        "paper",
+        "--runs",
+        "6000",
+        "--chunk",
+        "16",
+        "--out",
+        "runs",
+        "-q",
+    ]
     command = [sys.executable, "-m", "infoset", *asked, "--dask", processes.address]
     killer = kill_after(tmp_path / "runs" / "shards", 10, processes.scheduler)
-    done = subprocess.run(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, check=False, timeout=120)
+    done = subprocess.run(
+        command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, check=False, timeout=120
+    )
     killer.join()
     assert done.returncode == 2
     assert done.stderr.startswith("error: ")
@@ -160,7 +188,9 @@ def test_no_workers_and_workers_of_another_version(
     old = tmp_path / "old" / "infoset-0.0.1.dist-info"
     old.mkdir(parents=True)
     (old / "METADATA").write_text("Metadata-Version: 2.1\nName: infoset\nVersion: 0.0.1\n")
-    processes.worker(PYTHONPATH=os.pathsep.join([str(tmp_path / "old"), os.environ.get("PYTHONPATH", "")]))
+    processes.worker(
+        PYTHONPATH=os.pathsep.join([str(tmp_path / "old"), os.environ.get("PYTHONPATH", "")])
+    )
     processes.wait_for(1)
     code, _, err = infoset(*asked)
     assert code == 2

@@ -1,4 +1,6 @@
-"""The limit of the chart of the guaranteed miss is the closed form of the misses that a camera leaves possible."""
+"""The limit of the chart of the guaranteed miss is the closed form of the misses that a camera
+leaves possible.
+"""
 
 from __future__ import annotations
 
@@ -42,20 +44,40 @@ IDEAL = [
 
 @pytest.mark.thorough
 def test_the_limit_of_the_chart_is_the_closed_form(infoset: Command, tmp_path: Path) -> None:
-    """The noise of the game leaves the misses of the closed form possible, and the last impulse centres them."""
+    """The noise of the game leaves the misses of the closed form possible, and the last impulse
+    centres them.
+    """
     file = tmp_path / "ideal.toml"
     file.write_text(to_toml(load_scenario("dart-2022", IDEAL)))
-    axes = ("camera.pixel_error_rad=1e-6:1.7e-5:5", "thruster.last_impulse_s=camera.last_image_s=40:320:8")
+    axes = (
+        "camera.pixel_error_rad=1e-6:1.7e-5:5",
+        "thruster.last_impulse_s=camera.last_image_s=40:320:8",
+    )
     infoset(
-        *("sweep", file, "--vary", axes[0], "--vary", axes[1], "--noise", "game", "--runs", "6", "--quiet"),
+        *(
+            "sweep",
+            file,
+            "--vary",
+            axes[0],
+            "--vary",
+            axes[1],
+            "--noise",
+            "game",
+            "--runs",
+            "6",
+            "--quiet",
+        ),
         *("--require", "guaranteed_miss_m p50<25", "--out", tmp_path / "out"),
     )
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     pixels_rad, cut_offs_s = (np.array(axis["values"]) for axis in summary["axes"])
     met = np.array([cell["requirement"] == "met" for cell in summary["cells"]]).reshape(5, 8)
-    possible_m = np.sqrt(2.0) * possible_miss_m(6140.0, pixels_rad[:, None], 0.0, FIRST_S, cut_offs_s)
+    possible_m = np.sqrt(2.0) * possible_miss_m(
+        6140.0, pixels_rad[:, None], 0.0, FIRST_S, cut_offs_s
+    )
     # The maximum cut-off that meets the requirement, as the number of values up to it.
-    limits, expected = met.sum(axis=1), (possible_m < BOUND_M).sum(axis=1)
+    limits = met.sum(axis=1)
+    expected = (possible_m < BOUND_M).sum(axis=1)
     assert (np.diff(met.astype(int), axis=1) <= 0).all()
     assert (np.abs(limits - expected) <= 1).all(), (limits, expected)
     assert len(set(expected)) > 3

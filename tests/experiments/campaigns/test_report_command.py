@@ -26,7 +26,9 @@ from infoset.sim.storage import CampaignFolder
 from tests.experiments.command_line import Command
 
 FIGURES = [
-    f"figure-{name}.{kind}" for name in ("convergence", "dispersion", "distributions") for kind in ("pdf", "png")
+    f"figure-{name}.{kind}"
+    for name in ("convergence", "dispersion", "distributions")
+    for kind in ("pdf", "png")
 ]
 
 
@@ -39,28 +41,48 @@ def folder(brief: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.usefixtures("unrendered")
-def test_a_report_of_files_alone(infoset: Command, brief: Scenario, folder: Path, tmp_path: Path) -> None:
+def test_a_report_of_files_alone(
+    infoset: Command, brief: Scenario, folder: Path, tmp_path: Path
+) -> None:
     before = sorted(each.name for each in folder.iterdir())
     code, out, _ = infoset("report", folder, "--out", tmp_path / "report", "--csv", "table.csv")
     assert code == 0
     assert sorted(each.name for each in folder.iterdir()) == before
-    assert sorted(each.name for each in (tmp_path / "report").iterdir()) == [*FIGURES, "report.json", "scenario.toml"]
+    assert sorted(each.name for each in (tmp_path / "report").iterdir()) == [
+        *FIGURES,
+        "report.json",
+        "scenario.toml",
+    ]
     assert load_scenario(tmp_path / "report" / "scenario.toml") == brief
     found = json.loads((tmp_path / "report" / "report.json").read_text())
     table = pd.read_csv(tmp_path / "table.csv")
-    for first, (sample, row) in enumerate(zip(found["samples"], table.to_dict("records"), strict=True)):
+    for first, (sample, row) in enumerate(
+        zip(found["samples"], table.to_dict("records"), strict=True)
+    ):
         flown = simulate(replace(brief, noise=NoiseKind(sample["noise"])), range(first, 300, 2))
         assert (sample["noise"], sample["runs"]) == (row["noise"], 150)
         assert sample["miss_m_p90"] == row["miss_m_p90"] == np.quantile(flown.miss_m, 0.9)
         assert sample["phi_known"] == flown.phi_held.count()
         assert sample["impulse_m_s_max"] == flown.impulse_m_s.max()
     worst = found["worst"]
-    assert [row["miss_m"] for row in worst] == sorted((row["miss_m"] for row in worst), reverse=True)
+    assert [row["miss_m"] for row in worst] == sorted(
+        (row["miss_m"] for row in worst), reverse=True
+    )
     scenario = tmp_path / "report" / "scenario.toml"
     for row in worst:
-        assert row["replay"] == f"infoset engage {scenario} --noise {row['noise']} --seed 0 --run {row['run']}"
+        assert (
+            row["replay"]
+            == f"infoset engage {scenario} --noise {row['noise']} --seed 0 --run {row['run']}"
+        )
         assert row["replay"] in out
-    for title in ("correlation of the miss with", "Fisher's z", "|start_z_m|", "spearman", "p99.9", "95 % CI"):
+    for title in (
+        "correlation of the miss with",
+        "Fisher's z",
+        "|start_z_m|",
+        "spearman",
+        "p99.9",
+        "95 % CI",
+    ):
         assert title in out
 
 
@@ -95,12 +117,16 @@ def test_report_does_not_depend_on_the_columns_read_together(
     assert infoset("report", folder, "--json", "-") == together
 
 
-def test_report_reads_only_columns_within_the_memory_limit(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_report_reads_only_columns_within_the_memory_limit(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     stored = CampaignFolder.read(folder)
     read: list[list[str]] = []
     read_chunks = stored.read_chunks
 
-    def recorded(chunks: Iterable[tuple[int, Sequence[int]]], columns: Sequence[str] | None = None) -> pd.DataFrame:
+    def recorded(
+        chunks: Iterable[tuple[int, Sequence[int]]], columns: Sequence[str] | None = None
+    ) -> pd.DataFrame:
         assert columns is not None
         read.append([*columns])
         return read_chunks(chunks, columns)
@@ -113,11 +139,15 @@ def test_report_reads_only_columns_within_the_memory_limit(folder: Path, monkeyp
     assert all(columns[0] == "noise" and len(columns) <= 3 for columns in steps)
 
 
-def test_worst_runs_are_those_of_all_runs_also_with_equal_misses(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_worst_runs_are_those_of_all_runs_also_with_equal_misses(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     stored = CampaignFolder.read(folder)
     read_chunks = stored.read_chunks
 
-    def rounded(chunks: Iterable[tuple[int, Sequence[int]]], columns: Sequence[str] | None = None) -> pd.DataFrame:
+    def rounded(
+        chunks: Iterable[tuple[int, Sequence[int]]], columns: Sequence[str] | None = None
+    ) -> pd.DataFrame:
         runs = read_chunks(chunks, columns)
         return runs.assign(miss_m=runs["miss_m"].round(-1))
 
@@ -145,7 +175,8 @@ def correlated(runs: pd.DataFrame) -> dict[str, dict[str, Any]]:
     """Return the correlations of runs of random noise by component."""
     folder = SimpleNamespace(
         manifest=SimpleNamespace(
-            noise=SimpleNamespace(kinds=[NoiseKind.RANDOM]), scenario=SimpleNamespace(is_spatial=False)
+            noise=SimpleNamespace(kinds=[NoiseKind.RANDOM]),
+            scenario=SimpleNamespace(is_spatial=False),
         ),
         finished_runs=len(runs),
         stored_chunks=lambda: [[(0, range(len(runs)))]],
@@ -157,24 +188,38 @@ def correlated(runs: pd.DataFrame) -> dict[str, dict[str, Any]]:
 
 def test_correlations_by_hand() -> None:
     rising = np.arange(50.0)
-    start = {"start_z_m": rising - 20.0, "start_x_m": rising**3, "start_vz_m_s": -rising, "start_vx_m_s": np.ones(50)}
+    start = {
+        "start_z_m": rising - 20.0,
+        "start_x_m": rising**3,
+        "start_vz_m_s": -rising,
+        "start_vx_m_s": np.ones(50),
+    }
     found = correlated(made_runs("random", 50).assign(miss_m=rising, **start))
     assert [*found] == [*PLANE, "|start_z_m|", "|start_vz_m_s|"]
-    assert [found["start_z_m"][kind] for kind in ("pearson", "spearman")] == pytest.approx([1.0, 1.0])
+    assert [found["start_z_m"][kind] for kind in ("pearson", "spearman")] == pytest.approx(
+        [1.0, 1.0]
+    )
     assert found["start_x_m"]["spearman"] == pytest.approx(1.0)
     assert found["start_x_m"]["pearson"] == pytest.approx(np.corrcoef(rising, rising**3)[0, 1])
     assert found["start_vz_m_s"]["pearson"] == pytest.approx(-1.0)
     assert found["|start_vz_m_s|"]["pearson"] == pytest.approx(1.0)
-    assert np.isnan([found["start_vx_m_s"][kind] for kind in ("pearson", "spearman", "pearson_lower")]).all()
+    assert np.isnan(
+        [found["start_vx_m_s"][kind] for kind in ("pearson", "spearman", "pearson_lower")]
+    ).all()
 
 
 def test_correlations_have_confidence_intervals() -> None:
     runs = made_runs("random", 30)
     found = correlated(runs)["start_z_m"]
     interval = pearsonr(runs["start_z_m"], runs["miss_m"]).confidence_interval()
-    assert (found["pearson_lower"], found["pearson_upper"]) == pytest.approx((interval.low, interval.high))
-    # Fieller, Hartley and Pearson (1957): the variance of the z of Spearman's coefficient is 1.06 / (n - 3).
-    z = np.arctanh(found["spearman"]) + np.array([-1.0, 1.0]) * 1.959963984540054 * np.sqrt(1.06 / 27.0)
+    assert (found["pearson_lower"], found["pearson_upper"]) == pytest.approx(
+        (interval.low, interval.high)
+    )
+    # Fieller, Hartley and Pearson (1957): the variance of the z of Spearman's coefficient is 1.06 /
+    # (n - 3).
+    z = np.arctanh(found["spearman"]) + np.array([-1.0, 1.0]) * 1.959963984540054 * np.sqrt(
+        1.06 / 27.0
+    )
     assert (found["spearman_lower"], found["spearman_upper"]) == pytest.approx(tuple(np.tanh(z)))
     few = correlated(made_runs("random", 3))["start_z_m"]
     assert np.isnan([few["pearson_lower"], few["spearman_upper"]]).all()
@@ -189,9 +234,16 @@ def test_figures_of_few_runs_and_of_many(size: int) -> None:
     both = {noise: made_runs(noise, size) for noise in ("random", "game")}
     figure = draw_convergence(both)
     figure.draw_without_rendering()
-    assert titles(figure) == ["(a) random noise", "(b) random noise", "(c) game noise", "(d) game noise"]
+    assert titles(figure) == [
+        "(a) random noise",
+        "(b) random noise",
+        "(c) game noise",
+        "(d) game noise",
+    ]
     shown = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert shown == [name for name, needed in (("p50", 2), ("p90", 10), ("p99", 100)) if size >= needed]
+    assert shown == [
+        name for name, needed in (("p50", 2), ("p90", 10), ("p99", 100)) if size >= needed
+    ]
     assert ("too few runs for" in figure.legends[0].get_title().get_text()) == (size < 100)
     figure = draw_dispersion(both)
     figure.draw_without_rendering()

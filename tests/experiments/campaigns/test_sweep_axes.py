@@ -25,11 +25,17 @@ def asteroid() -> Scenario:
 def test_the_issues_example(asteroid: Scenario) -> None:
     text = "angle_sensor.error_at_nominal_range_rad=0.5e-4:5e-4:8,thruster.max_impulse_m_s=2:20:7"
     first, second = axes = sweep_axes(text, asteroid)
-    assert (first.key, second.key) == ("angle_sensor.error_at_nominal_range_rad", "thruster.max_impulse_m_s")
+    assert (first.key, second.key) == (
+        "angle_sensor.error_at_nominal_range_rad",
+        "thruster.max_impulse_m_s",
+    )
     assert (first.values[0], first.values[-1], len(first.values)) == (5e-5, 5e-4, 8)
     assert second.values == (2.0, 5.0, 8.0, 11.0, 14.0, 17.0, 20.0)
     cells = sweep_cells(asteroid, axes)
-    found = [(linear(cell.angle_sensor).error_at_nominal_range_rad, cell.thruster.max_impulse_m_s) for cell in cells]
+    found = [
+        (linear(cell.angle_sensor).error_at_nominal_range_rad, cell.thruster.max_impulse_m_s)
+        for cell in cells
+    ]
     assert found == list(itertools.product(first.values, second.values))
     back = {
         replace(
@@ -71,18 +77,29 @@ def test_whole_numbers_and_logarithms(asteroid: Scenario) -> None:
     assert axis.values == pytest.approx((1.0, 10.0, 100.0, 1000.0, 10000.0), rel=1e-11)
 
 
-@given(ends=st.tuples(st.integers(1, 10**6), st.integers(1, 10**6)), count=st.integers(2, 40), log=st.booleans())
+@given(
+    ends=st.tuples(st.integers(1, 10**6), st.integers(1, 10**6)),
+    count=st.integers(2, 40),
+    log=st.booleans(),
+)
 @settings(deadline=None, max_examples=60)
-def test_values_rise_evenly_between_the_ends_as_written(ends: tuple[int, int], count: int, log: bool) -> None:
+def test_values_rise_evenly_between_the_ends_as_written(
+    ends: tuple[int, int], count: int, log: bool
+) -> None:
     asteroid = load_scenario("asteroid-1997")
-    minimum, maximum = min(ends), max(ends) + 1
-    (axis,) = sweep_axes(f"thruster.budget_m_s={'log:' if log else ''}{minimum}e-2:{maximum}e-2:{count}", asteroid)
+    minimum = min(ends)
+    maximum = max(ends) + 1
+    (axis,) = sweep_axes(
+        f"thruster.budget_m_s={'log:' if log else ''}{minimum}e-2:{maximum}e-2:{count}", asteroid
+    )
     assert axis.values[0] == float(f"{minimum}e-2")
     assert axis.values[-1] == float(f"{maximum}e-2")
     assert len(axis.values) == count
     assert list(axis.values) == sorted(set(axis.values))
     spaced = np.geomspace if log else np.linspace
-    np.testing.assert_allclose(axis.values, spaced(minimum / 100.0, maximum / 100.0, count), rtol=1e-11)
+    np.testing.assert_allclose(
+        axis.values, spaced(minimum / 100.0, maximum / 100.0, count), rtol=1e-11
+    )
 
 
 def test_keys_with_the_same_values(asteroid: Scenario) -> None:
@@ -110,7 +127,9 @@ def test_a_factor_of_all_error_bounds_of_a_sensor(asteroid: Scenario) -> None:
         *((7.5e-5, 1.15e-4, 0.05), (7.5e-5, 1.15e-4, 0.15)),
         *((3e-4, 4.6e-4, 0.05), (3e-4, 4.6e-4, 0.15)),
     ]
-    (same,) = sweep_cells(asteroid, (Axis("angle_sensor.scale=range_sensor.scale", (1.0, 1.0)),))[:1]
+    (same,) = sweep_cells(asteroid, (Axis("angle_sensor.scale=range_sensor.scale", (1.0, 1.0)),))[
+        :1
+    ]
     assert same == asteroid
 
 
@@ -121,7 +140,10 @@ RISING = "must go from a smaller to a greater value, with a count from 2 to 1000
 @pytest.mark.parametrize(
     ("text", "part"),
     [
-        ("thruster.budget_m_s=nominal_range_km=1:2:2", "found thruster.budget_m_s in m/s, nominal_range_km in km"),
+        (
+            "thruster.budget_m_s=nominal_range_km=1:2:2",
+            "found thruster.budget_m_s in m/s, nominal_range_km in km",
+        ),
         (
             "angle_sensor.scale=1:2:2,angle_sensor.error_at_zero_range_rad=1e-4:2e-4:2",
             "angle_sensor.scale and angle_sensor.error_at_zero_range_rad vary the same value",
@@ -130,13 +152,25 @@ RISING = "must go from a smaller to a greater value, with a count from 2 to 1000
         ("thruster.budget_m_s=log:0:1:3", "must be greater than 0"),
         ("thruster.budget=1:2:2", "did you mean thruster.budget_m_s?"),
         *((text, FORM) for text in ("", "thruster.budget_m_s")),
-        *((f"thruster.budget_m_s={text}", FORM) for text in ("1:2", "1:2:3:4", "lin:1:2:3", "inf:1:3", "1_0:20:2")),
+        *(
+            (f"thruster.budget_m_s={text}", FORM)
+            for text in ("1:2", "1:2:3:4", "lin:1:2:3", "inf:1:3", "1_0:20:2")
+        ),
         ("thruster.budget_m_s=" + "9" * 5000 + ":2:2", FORM),
-        *((f"thruster.budget_m_s={text}", RISING) for text in ("2:1:3", "1:1:3", "1:2:1", "1:2:1001")),
+        *(
+            (f"thruster.budget_m_s={text}", RISING)
+            for text in ("2:1:3", "1:1:3", "1:2:1", "1:2:1001")
+        ),
         ("thruster.budget_m_s=1:1e99:3", "at most 1e+60"),
         ("information_set.sections=9:10:5", "are not all different"),
-        ("thruster.budget_m_s=1:2:1000,nominal_range_km=5800:5801:1000", "1000000 cells are more than the limit"),
-        ("thruster.max_impulse_m_s=0.1:5:3", "asteroid-1997 with thruster.max_impulse_m_s = 0.1: thruster: "),
+        (
+            "thruster.budget_m_s=1:2:1000,nominal_range_km=5800:5801:1000",
+            "1000000 cells are more than the limit",
+        ),
+        (
+            "thruster.max_impulse_m_s=0.1:5:3",
+            "asteroid-1997 with thruster.max_impulse_m_s = 0.1: thruster: ",
+        ),
     ],
 )
 def test_what_cannot_be_varied(text: str, part: str, asteroid: Scenario) -> None:

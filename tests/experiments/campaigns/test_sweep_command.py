@@ -21,7 +21,15 @@ from tests.experiments.command_line import Command
 pytestmark = pytest.mark.usefixtures("unrendered")
 
 FILES = [
-    *(".lock", "figure-sweep.pdf", "figure-sweep.png", "manifest.json", "scenario.toml", "shards", "summary.json"),
+    *(
+        ".lock",
+        "figure-sweep.pdf",
+        "figure-sweep.png",
+        "manifest.json",
+        "scenario.toml",
+        "shards",
+        "summary.json",
+    ),
     "sweep.parquet",
 ]
 TWO = "angle_sensor.error_at_zero_range_rad=1e-4:4e-4:3,thruster.max_impulse_m_s=log:2:8:2"
@@ -39,14 +47,20 @@ def swept(brief: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.usefixtures("rendered")
 def test_a_sweep_of_two_keys(infoset: Command, file: Path, tmp_path: Path) -> None:
     folder = tmp_path / "sweep"
-    code, out, err = infoset("sweep", file, "--model", "paper", "--vary", TWO, "--runs", 30, "--out", folder)
+    code, out, err = infoset(
+        "sweep", file, "--model", "paper", "--vary", TWO, "--runs", 30, "--out", folder
+    )
     assert code == 0
     assert f"in {folder}" in err
     assert sorted(each.name for each in folder.iterdir()) == FILES
     rows = pd.read_parquet(folder / "sweep.parquet")
     keys = ["angle_sensor.error_at_zero_range_rad", "thruster.max_impulse_m_s"]
     found = json.loads((folder / "summary.json").read_text())
-    assert (found["kind"], found["runs"], [each["unit"] for each in found["axes"]]) == ("sweep", 180, ["rad", "m/s"])
+    assert (found["kind"], found["runs"], [each["unit"] for each in found["axes"]]) == (
+        "sweep",
+        180,
+        ["rad", "m/s"],
+    )
     combinations = list(itertools.product((1e-4, 2.5e-4, 4e-4), (2.0, 8.0)))
     assert [tuple(row) for row in rows[keys].to_numpy()] == combinations
     assert [tuple(cell[key] for key in keys) for cell in found["cells"]] == combinations
@@ -54,7 +68,16 @@ def test_a_sweep_of_two_keys(infoset: Command, file: Path, tmp_path: Path) -> No
 
 
 def test_a_sweep_of_one_key_mixed_and_resumed(infoset: Command, file: Path, tmp_path: Path) -> None:
-    asked = ("sweep", file, "--vary", "thruster.max_impulse_m_s=2:8:4", "--runs", 20, "--noise", "mixed")
+    asked = (
+        "sweep",
+        file,
+        "--vary",
+        "thruster.max_impulse_m_s=2:8:4",
+        "--runs",
+        20,
+        "--noise",
+        "mixed",
+    )
     code, out, _ = infoset(*asked, "--out", tmp_path / "a", "--require", "miss_m p90<3")
     assert code == 0
     assert (tmp_path / "a" / "figure-sweep-game.png").is_file()
@@ -70,18 +93,37 @@ def test_a_sweep_of_one_key_mixed_and_resumed(infoset: Command, file: Path, tmp_
     again = infoset(*asked, "--out", tmp_path / "a", "--require", "miss_m p90<3", "--resume", "-q")
     assert again == (0, "", "")
     assert (tmp_path / "a" / "sweep.parquet").read_bytes() == before
-    code, _, err = infoset(*asked[:3], "thruster.max_impulse_m_s=2:9:4", *asked[4:], "--out", "a", "--resume")
+    code, _, err = infoset(
+        *asked[:3], "thruster.max_impulse_m_s=2:9:4", *asked[4:], "--out", "a", "--resume"
+    )
     assert code == 2
     assert "axes: " in err
 
 
-def test_the_report_of_a_sweep_is_from_its_files_alone(infoset: Command, swept: Path, tmp_path: Path) -> None:
+def test_the_report_of_a_sweep_is_from_its_files_alone(
+    infoset: Command, swept: Path, tmp_path: Path
+) -> None:
     out_folder = tmp_path / "report"
-    report = ("report", swept, "--out", out_folder, "--require", "impulse_m_s p50<60", "--csv", "table.csv")
+    report = (
+        "report",
+        swept,
+        "--out",
+        out_folder,
+        "--require",
+        "impulse_m_s p50<60",
+        "--csv",
+        "table.csv",
+    )
     code, out, _ = infoset(*report)
     assert code == 0
     assert "brief, with range sensor, model paper, strategy symmetric-miss, seed 0\n" in out
-    names = ["figure-sweep.pdf", "figure-sweep.png", "report.json", "scenario.toml", "sweep.parquet"]
+    names = [
+        "figure-sweep.pdf",
+        "figure-sweep.png",
+        "report.json",
+        "scenario.toml",
+        "sweep.parquet",
+    ]
     assert sorted(each.name for each in out_folder.iterdir()) == names
     rows = pd.read_parquet(out_folder / "sweep.parquet")
     pd.testing.assert_frame_equal(pd.read_csv(tmp_path / "table.csv"), rows, check_dtype=False)
@@ -95,34 +137,68 @@ def test_the_report_of_a_sweep_is_from_its_files_alone(infoset: Command, swept: 
     ("arguments", "part"),
     [
         (["--vary", "thruster.budget=1:2:2"], "did you mean thruster.budget_m_s?"),
-        (["--vary", "thruster.max_impulse_m_s=0.01:5:3"], "brief with thruster.max_impulse_m_s = 0.01"),
+        (
+            ["--vary", "thruster.max_impulse_m_s=0.01:5:3"],
+            "brief with thruster.max_impulse_m_s = 0.01",
+        ),
         (["--require", "miss_m 10"], "--require: must be hit>=SHARE, no-CAUSE>=SHARE or QUANTITY"),
         (["--require", "hit>=0.95"], "has no [body] with a radius; give a bound of the miss"),
         (["--max-runs", 30], "--max-runs is the limit of --until; add --until decided"),
     ],
 )
 def test_what_is_wrong_is_said_before_the_work(
-    arguments: list[str], part: str, infoset: Command, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    arguments: list[str],
+    part: str,
+    infoset: Command,
+    file: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("infoset.sim.Campaign.run", lambda *_, **__: pytest.fail("began to work"))
-    given = {"--vary": TWO, "--runs": 10, "--out": "sweep"} | dict(zip(arguments[::2], arguments[1::2], strict=True))
-    assert part in infoset.refused("sweep", file, *[part for pair in given.items() for part in pair])
+    given = {"--vary": TWO, "--runs": 10, "--out": "sweep"} | dict(
+        zip(arguments[::2], arguments[1::2], strict=True)
+    )
+    assert part in infoset.refused(
+        "sweep", file, *[part for pair in given.items() for part in pair]
+    )
     assert [each.name for each in tmp_path.iterdir()] == ["brief.toml"]
 
 
-def test_runs_are_added_until_each_cell_is_decided(infoset: Command, file: Path, tmp_path: Path) -> None:
+def test_runs_are_added_until_each_cell_is_decided(
+    infoset: Command, file: Path, tmp_path: Path
+) -> None:
     key = "angle_sensor.error_at_zero_range_rad"
-    asked = ("sweep", file, "--vary", f"{key}=1e-5:3e-4:4", "--require", "miss_m p80<3", "--out", tmp_path / "sweep")
+    asked = (
+        "sweep",
+        file,
+        "--vary",
+        f"{key}=1e-5:3e-4:4",
+        "--require",
+        "miss_m p80<3",
+        "--out",
+        tmp_path / "sweep",
+    )
     assert infoset(*asked, "--runs", 10)[0] == 0
-    code, out, _ = infoset(*asked, "--runs", 10, "--until", "decided", "--max-runs", 300, "--resume")
+    code, out, _ = infoset(
+        *asked, "--runs", 10, "--until", "decided", "--max-runs", 300, "--resume"
+    )
     assert code == 0
-    assert "the decision in each cell has a confidence of at least 95 % although runs were added;" in out
+    assert (
+        "the decision in each cell has a confidence of at least 95 % although runs were added;"
+        in out
+    )
     summary = json.loads((tmp_path / "sweep" / "summary.json").read_text())
-    assert (summary["complete"], summary["until"], summary["require"]) == (True, "miss_m p80<3", "miss_m p80<3")
+    assert (summary["complete"], summary["until"], summary["require"]) == (
+        True,
+        "miss_m p80<3",
+        "miss_m p80<3",
+    )
     runs = [cell["runs"] for cell in summary["cells"]]
     assert min(runs) == 50
     assert sum(runs) == summary["runs"] == summary["wanted_runs"]
-    assert all(cell["requirement"] != "undecided" or cell["runs"] == 300 for cell in summary["cells"])
+    assert all(
+        cell["requirement"] != "undecided" or cell["runs"] == 300 for cell in summary["cells"]
+    )
     # The report uses the requirement of the sweep, and the test that allows for the added runs.
     report = infoset.json("report", tmp_path / "sweep")
     assert report["require"] == "miss_m p80<3"
@@ -133,9 +209,20 @@ def test_runs_are_added_until_each_cell_is_decided(infoset: Command, file: Path,
 def test_runs_without_a_guarantee_do_not_meet_a_bound_of_it(
     until: tuple[object, ...], infoset: Command, file: Path, tmp_path: Path
 ) -> None:
-    """The sets of most runs become empty: the others alone have bounds, which all meet the requirement."""
+    """The sets of most runs become empty: the others alone have bounds, which all meet the
+    requirement.
+    """
     moving = ("--set", "target.manoeuvre=bang-bang", "--set", "target.acceleration_m_s2=1")
-    asked = ("sweep", file, *moving, "--vary", "target.acceleration_m_s2=1.8:4:2", "--runs", 40, *until)
+    asked = (
+        "sweep",
+        file,
+        *moving,
+        "--vary",
+        "target.acceleration_m_s2=1.8:4:2",
+        "--runs",
+        40,
+        *until,
+    )
     summary = infoset.json(*asked, "--require", "guaranteed_miss_m p50<1e9", "--out", "sweep")
     cells = summary["cells"]
     assert [cell["requirement"] for cell in cells] == ["not-met"] * 2
@@ -150,17 +237,38 @@ def test_runs_without_a_guarantee_do_not_meet_a_bound_of_it(
 
 
 def test_needed_runs_count_those_of_both_noises(infoset: Command, file: Path) -> None:
-    asked = ("sweep", file, "--set", "body.radius_m=5", "--vary", "angle_sensor.scale=0.5:1.125:2", "--noise", "mixed")
+    asked = (
+        "sweep",
+        file,
+        "--set",
+        "body.radius_m=5",
+        "--vary",
+        "angle_sensor.scale=0.5:1.125:2",
+        "--noise",
+        "mixed",
+    )
     summary = infoset.json(*asked, "--runs", 40, "--out", "sweep")
     assert summary["confidence_holds"]["requirement"] == "a fixed number of runs"
-    assert [(cell["runs"], cell["runs_needed"]) for cell in summary["cells"][:2]] == [(20, 210), (20, 210)]
+    assert [(cell["runs"], cell["runs_needed"]) for cell in summary["cells"][:2]] == [
+        (20, 210),
+        (20, 210),
+    ]
 
 
 @pytest.mark.thorough
 def test_runs_that_are_added_by_hand_are_judged_like_those_of_until(
     infoset: Command, file: Path, tmp_path: Path
 ) -> None:
-    asked = ("sweep", file, "--set", "body.radius_m=8", "--vary", "angle_sensor.scale=0.5:3:3", "--out", "sweep")
+    asked = (
+        "sweep",
+        file,
+        "--set",
+        "body.radius_m=8",
+        "--vary",
+        "angle_sensor.scale=0.5:3:3",
+        "--out",
+        "sweep",
+    )
     assert infoset(*asked, "--runs", 60)[0] == 0
     # Runs that are missing, and a repeated command, add no runs.
     next((tmp_path / "sweep" / "shards").glob("*.parquet")).unlink()
@@ -168,43 +276,74 @@ def test_runs_that_are_added_by_hand_are_judged_like_those_of_until(
     assert not read_manifest(tmp_path / "sweep").is_watched
     code, out, _ = infoset(*asked, "--runs", 100, "--resume")
     assert code == 0
-    assert "the decision in each cell has a confidence of at least 95 % although runs were added" in out
+    assert (
+        "the decision in each cell has a confidence of at least 95 % although runs were added"
+        in out
+    )
     assert read_manifest(tmp_path / "sweep").is_watched
     summary = json.loads((tmp_path / "sweep" / "summary.json").read_text())
     fixed = "a fixed number of runs"
-    assert summary["confidence_holds"] == {"requirement": "any number of runs", "hit": fixed, "quantiles": fixed}
+    assert summary["confidence_holds"] == {
+        "requirement": "any number of runs",
+        "hit": fixed,
+        "quantiles": fixed,
+    }
     for cell in summary["cells"]:
         lower, upper = share_interval(cell["hits"], 100)
         # The first run that decides is final: its bound is an end of the interval.
         assert cell["required_lower"] == max(lower, 0.95 if cell["requirement"] == "met" else 0.0)
-        assert cell["required_upper"] == min(upper, 0.95 if cell["requirement"] == "not-met" else 1.0)
+        assert cell["required_upper"] == min(
+            upper, 0.95 if cell["requirement"] == "not-met" else 1.0
+        )
     # A sweep that was watched once stays so.
-    assert infoset(*asked, "--runs", 100, "--resume", "--until", "decided", "--max-runs", 150)[0] == 0
+    assert (
+        infoset(*asked, "--runs", 100, "--resume", "--until", "decided", "--max-runs", 150)[0] == 0
+    )
     assert infoset(*asked, "--runs", 150, "--resume")[0] == 0
     assert read_manifest(tmp_path / "sweep").until is None
     assert read_manifest(tmp_path / "sweep").is_watched
 
 
 def test_a_required_probability_of_a_hit(infoset: Command, file: Path, tmp_path: Path) -> None:
-    asked = ("sweep", file, "--set", "body.radius_m=8", "--vary", "angle_sensor.scale=0.5:3:3", "--runs", 40)
+    asked = (
+        "sweep",
+        file,
+        "--set",
+        "body.radius_m=8",
+        "--vary",
+        "angle_sensor.scale=0.5:3:3",
+        "--runs",
+        40,
+    )
     summary = infoset.json(*asked, "--out", tmp_path / "sweep")
     assert summary["require"] == "hit>=0.95"
     runs = CampaignFolder.read(tmp_path / "sweep").runs(["cell", "miss_m"])
     for cell in summary["cells"]:
-        estimate = estimate_hits(int((runs.loc[runs["cell"] == cell["cell"], "miss_m"] <= 8.0).sum()), 40)
+        estimate = estimate_hits(
+            int((runs.loc[runs["cell"] == cell["cell"], "miss_m"] <= 8.0).sum()), 40
+        )
         shown = (cell["hits"], cell["hit_probability"], cell["hit_lower"], cell["hit_upper"])
         assert shown == (estimate.hits, estimate.probability, estimate.lower, estimate.upper)
-        expected = "met" if estimate.lower >= 0.95 else "not-met" if estimate.upper < 0.95 else "undecided"
+        expected = (
+            "met" if estimate.lower >= 0.95 else "not-met" if estimate.upper < 0.95 else "undecided"
+        )
         assert cell["requirement"] == expected
         assert (cell["required_lower"], cell["required_upper"]) == (estimate.lower, estimate.upper)
-    assert infoset.json("report", tmp_path / "sweep", "--require", "hit > 0.5")["require"] == "hit>=0.5"
+    assert (
+        infoset.json("report", tmp_path / "sweep", "--require", "hit > 0.5")["require"]
+        == "hit>=0.5"
+    )
 
 
-def test_an_unfinished_sweep_is_reported_as_far_as_it_is(infoset: Command, swept: Path, tmp_path: Path) -> None:
+def test_an_unfinished_sweep_is_reported_as_far_as_it_is(
+    infoset: Command, swept: Path, tmp_path: Path
+) -> None:
     shutil.copytree(swept, tmp_path / "two")
     for victim in sorted((tmp_path / "two" / "shards").glob("*.parquet"))[2:]:
         victim.unlink()
-    code, out, err = infoset("report", tmp_path / "two", "--out", tmp_path / "report", "--json", "-")
+    code, out, err = infoset(
+        "report", tmp_path / "two", "--out", tmp_path / "report", "--json", "-"
+    )
     assert code == 0
     found = json.loads(out)
     assert (found["runs"], found["wanted_runs"], found["complete"]) == (40, 120, False)

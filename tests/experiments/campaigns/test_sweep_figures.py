@@ -1,4 +1,6 @@
-"""Figures of sweeps: the decisions, the estimates, and lines where the required quantile equals its bound."""
+"""Figures of sweeps: the decisions, the estimates, and lines where the required quantile equals its
+bound.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +24,12 @@ from infoset.sim.storage import Axis
 REQUIRED = Requirement(QuantileName("miss_m", 0.99), 10.0)
 
 
-def made_table(axes: Sequence[Axis], required: AnyRequirement, value: Callable[..., float]) -> SweepTable:
-    """Return a table whose required quantile is a function of the values of the axes; a fifth of it is undecided."""
+def made_table(
+    axes: Sequence[Axis], required: AnyRequirement, value: Callable[..., float]
+) -> SweepTable:
+    """Return a table whose required quantile is a function of the values of the axes; a fifth of it
+    is undecided.
+    """
     rows = []
     for values in itertools.product(*(axis.values for axis in axes)):
         middle = value(*values)
@@ -32,12 +38,27 @@ def made_table(axes: Sequence[Axis], required: AnyRequirement, value: Callable[.
         bound = 80.0 if isinstance(required, HitRequirement) else required.bound
         distance = math.log(middle / bound)
         decision = "undecided" if abs(distance) < 0.2 else "met" if distance < 0.0 else "not-met"
-        row: dict[str, Any] = dict(zip((tied_keys(axis.key)[0] for axis in axes), values, strict=True))
-        row |= {"noise": "game", "requirement": decision, "limit_quantile": middle, "limit_bound": bound}
-        row |= {"required_value": shown, "required_lower": 0.9 * shown, "required_upper": 1.1 * shown}
+        row: dict[str, Any] = dict(
+            zip((tied_keys(axis.key)[0] for axis in axes), values, strict=True)
+        )
+        row |= {
+            "noise": "game",
+            "requirement": decision,
+            "limit_quantile": middle,
+            "limit_bound": bound,
+        }
+        row |= {
+            "required_value": shown,
+            "required_lower": 0.9 * shown,
+            "required_upper": 1.1 * shown,
+        }
         for quantity, level in itertools.product(("miss_m", "impulse_m_s"), (0.5, 0.99)):
             name = f"{quantity}_p{100 * level:g}"
-            row |= {name: level * middle, f"{name}_lower": 0.8 * level * middle, f"{name}_upper": math.nan}
+            row |= {
+                name: level * middle,
+                f"{name}_lower": 0.8 * level * middle,
+                f"{name}_upper": math.nan,
+            }
         rows.append(row)
     return SweepTable(tuple(axes), ("game",), required, pd.DataFrame(rows))
 
@@ -68,10 +89,13 @@ def test_the_limit_of_two_keys_is_a_line() -> None:
     assert first.get_xlabel() == "camera: pixel error, $10^{-5}$\N{NO-BREAK SPACE}rad"
     assert first.get_title(loc="left") == "(a) guaranteed miss p99 under 25 m"
     assert len(first.texts) == 64
-    drawn, form = (np.asarray(each.get_paths()[0].vertices, dtype=float) for each in first.collections[1:])
+    drawn, form = (
+        np.asarray(each.get_paths()[0].vertices, dtype=float) for each in first.collections[1:]
+    )
     # Positions are numbers of values: products are planes on logarithmic scales.
     error_rad, time_s = (
-        np.exp(np.interp(line, range(8), np.log(axis.values))) for line, axis in zip(drawn.T, axes, strict=True)
+        np.exp(np.interp(line, range(8), np.log(axis.values)))
+        for line, axis in zip(drawn.T, axes, strict=True)
     )
     np.testing.assert_allclose(2e4 * error_rad * time_s, 25.0, rtol=1e-9)
     known = limits(table).dropna()
@@ -81,7 +105,12 @@ def test_the_limit_of_two_keys_is_a_line() -> None:
         assert crossing == pytest.approx(row["interpolated"], rel=1e-6)
     assert form[:, 0].max() < drawn[:, 0].max()
     names = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert names[-2:] == ["limit, interpolated between cells", "closed form: worst errors, no later images"]
+    assert names[-2:] == [
+        "limit, interpolated between cells",
+        "closed form: worst errors, no later images",
+    ]
     table.rows["requirement"] = "undecided"
     few = draw_sweep(table, SHOWN, "game")
-    assert "limit, interpolated between cells" not in [text.get_text() for text in few.legends[0].get_texts()]
+    assert "limit, interpolated between cells" not in [
+        text.get_text() for text in few.legends[0].get_texts()
+    ]

@@ -18,7 +18,13 @@ import pytest
 from infoset import ConvexPolygons, Polytope, experiments
 from infoset.experiments.cli import main
 from infoset.experiments.common import figure_style
-from infoset.experiments.common.figure_style import WIDTH_MM, figure_bytes, legend_below, style, subplots
+from infoset.experiments.common.figure_style import (
+    WIDTH_MM,
+    figure_bytes,
+    legend_below,
+    style,
+    subplots,
+)
 
 
 def test_pdfs_have_truetype_fonts_and_pngs_200_dpi(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -81,7 +87,9 @@ def drawn_with(settings: str, folder: Path) -> str:
     (folder / "matplotlibrc").write_text(settings)
     environment = {**os.environ, "MPLCONFIGDIR": str(folder)}
     command = [sys.executable, "-c", DRAW]
-    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, check=True
+    )
     return done.stdout
 
 
@@ -92,7 +100,9 @@ def test_the_users_matplotlibrc_changes_no_byte_of_a_figure(tmp_path: Path) -> N
 def test_a_command_draws_although_the_backend_of_a_notebook_is_missing(tmp_path: Path) -> None:
     environment = {**os.environ, "MPLBACKEND": "module://no_such_package.backend_inline"}
     command = [sys.executable, "-m", "infoset", "pareto", "--out", "figures", "--quiet"]
-    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+    )
     assert (done.returncode, done.stderr) == (0, "")
     assert (tmp_path / "figures" / "figure-front.png").stat().st_size > 0
 
@@ -119,7 +129,9 @@ FIGURES = [
 
 @pytest.mark.parametrize("name", FIGURES)
 def test_whatever_makes_axes_is_drawn_in_the_style(name: str) -> None:
-    """A function that begins a figure has the decorator of the style; its helpers are called within it."""
+    """A function that begins a figure has the decorator of the style; its helpers are called within
+    it.
+    """
     tree = ast.parse(inspect.getsource(importlib.import_module(name)))
     bare = [
         function.name

@@ -12,7 +12,14 @@ import pytest
 
 from infoset.experiments.common.built_in_files import SCENARIO, built_in_files
 from infoset.experiments.common.errors import InputError
-from infoset.experiments.common.input_file import changed, load_problem, parse, read_file, read_text, to_toml
+from infoset.experiments.common.input_file import (
+    changed,
+    load_problem,
+    parse,
+    read_file,
+    read_text,
+    to_toml,
+)
 from infoset.experiments.interception.scenario_file import load_scenario
 from infoset.sim import Scenario
 from tests.built_in import problem_text, scenario_text
@@ -31,11 +38,18 @@ MISTAKES = {
         "distance_km = -150.0e6",
         "mine.toml: sun.distance_km: must be greater than 0, found -1.500e+8",
     ),
-    "text for a number": ("step_s = 0.5", 'step_s = "0.5"', 'mine.toml: step_s: must be a valid number, found "0.5"'),
+    "text for a number": (
+        "step_s = 0.5",
+        'step_s = "0.5"',
+        'mine.toml: step_s: must be a valid number, found "0.5"',
+    ),
     "reversed pair": (
         "z_km = [-10.0, 10.0]",
         "z_km = [10.0, -10.0]",
-        "mine.toml: uncertainty.z_km: must be a pair [minimum, maximum], and is reversed, found [10.0, -10.0]",
+        (
+            "mine.toml: uncertainty.z_km: must be a pair [minimum, maximum], and is reversed, "
+            "found [10.0, -10.0]"
+        ),
     ),
     "unknown table": (
         "[range_sensor]",
@@ -45,7 +59,10 @@ MISTAKES = {
     "wrong unit": (
         "distance_km",
         "distance_deg",
-        "mine.toml: sun.distance_deg: is not a known key; did you mean distance_m? It can end in m, km, au",
+        (
+            "mine.toml: sun.distance_deg: is not a known key; did you mean distance_m? It can end "
+            "in m, km, au"
+        ),
     ),
     "two units of one key": (
         "direction_deg = 90.0",
@@ -57,8 +74,16 @@ MISTAKES = {
         "direction_deg = 900.0",
         "mine.toml: sun.direction_deg: must be at most 6.28319 (in rad), found 900.0",
     ),
-    "not a number": ("step_s = 0.5", "step_s = nan", "mine.toml: step_s: must be a finite number, found nan"),
-    "bool": ("step_s = 0.5", "step_s = true", "mine.toml: step_s: must be a valid number, found true"),
+    "not a number": (
+        "step_s = 0.5",
+        "step_s = nan",
+        "mine.toml: step_s: must be a finite number, found nan",
+    ),
+    "bool": (
+        "step_s = 0.5",
+        "step_s = true",
+        "mine.toml: step_s: must be a valid number, found true",
+    ),
     "wrong kind of file": (
         TEXT,
         problem_text("service-2"),
@@ -67,7 +92,10 @@ MISTAKES = {
     "not TOML": (
         "step_s = 0.5",
         "step_s 0.5",
-        "mine.toml: is not valid TOML: Expected '=' after a key in a key/value pair (at line 7, column 8)",
+        (
+            "mine.toml: is not valid TOML: Expected '=' after a key in a key/value pair (at line "
+            "7, column 8)"
+        ),
     ),
     "no such choice": (
         'noise = "random"',
@@ -89,12 +117,21 @@ def test_a_mistake_gets_one_message(mistake: str) -> None:
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
-        ("thruster.budgt_m_s=5", 'has no key "thruster.budgt_m_s"; did you mean thruster.budget_m_s?'),
-        ("thruster.budget_m_s", 'must be KEY=VALUE, found "thruster.budget_m_s"; for example --set name=mine'),
+        (
+            "thruster.budgt_m_s=5",
+            'has no key "thruster.budgt_m_s"; did you mean thruster.budget_m_s?',
+        ),
+        (
+            "thruster.budget_m_s",
+            'must be KEY=VALUE, found "thruster.budget_m_s"; for example --set name=mine',
+        ),
         ("step_s.min=1", 'has no key "step_s.min"'),
         ("rate_sensor.period_s=1", "rate_sensor.error_rad_s: is missing"),
         ("uncertainty.x_km.min=[1, 2]", "uncertainty.x_km.min: must be a number, found [1, 2]"),
-        ("dispersion.z_km.max=-5", "dispersion.z_km: must be a pair [minimum, maximum], and is reversed"),
+        (
+            "dispersion.z_km.max=-5",
+            "dispersion.z_km: must be a pair [minimum, maximum], and is reversed",
+        ),
     ],
 )
 def test_a_wrong_setting_gets_one_message(setting: str, message: str) -> None:
@@ -159,23 +196,31 @@ def test_a_key_is_written_in_any_unit_and_rounded_once(key: str, value: str) -> 
 
 
 def test_a_number_is_both_ends_of_an_interval() -> None:
-    assert load_scenario("asteroid-1997", ["uncertainty.x_km=5801.3"]).uncertainty.x_m == (5801300.0, 5801300.0)
+    assert load_scenario("asteroid-1997", ["uncertainty.x_km=5801.3"]).uncertainty.x_m == (
+        5801300.0,
+        5801300.0,
+    )
 
 
 def test_settings_are_in_any_unit_and_named_in_the_description() -> None:
-    scenario, before = load_scenario("asteroid-1997", ["thruster.budget_km_s=.5"]), load_scenario("asteroid-1997")
+    scenario = load_scenario("asteroid-1997", ["thruster.budget_km_s=.5"])
+    before = load_scenario("asteroid-1997")
     assert scenario.thruster.budget_m_s == 500.0
     assert scenario.description == f"{before.description}; with thruster.budget_km_s=.5"
     tilted = load_scenario("asteroid-1997", ["uncertainty.x_km.min=5200", "dispersion.z_km=-8"])
     assert tilted.uncertainty.x_m == (5200e3, before.uncertainty.x_m[1])
     assert tilted.dispersion.z_m == (-8e3, -8e3)
-    sensor = load_scenario("asteroid-1997", ["rate_sensor.period_s=1.0", "rate_sensor.error_rad_s=1e-6"]).rate_sensor
+    sensor = load_scenario(
+        "asteroid-1997", ["rate_sensor.period_s=1.0", "rate_sensor.error_rad_s=1e-6"]
+    ).rate_sensor
     assert sensor is not None
     assert sensor.error_rad_s == 1e-6
 
 
 def test_tables_of_an_array_are_numbered_from_1() -> None:
-    problem = load_problem("pareto-2008", ["craft.3.weight=2.5", "craft.1.position_m=[1, 2, 3]", "name=my meeting"])
+    problem = load_problem(
+        "pareto-2008", ["craft.3.weight=2.5", "craft.1.position_m=[1, 2, 3]", "name=my meeting"]
+    )
     assert [each.weight for each in problem.craft] == [1.0, 1.0, 2.5]
     assert problem.craft[0].position_m == (1.0, 2.0, 3.0)
     assert problem.name == "my meeting"
@@ -186,19 +231,28 @@ def test_tables_of_an_array_are_numbered_from_1() -> None:
 
 def test_changed_checks_as_a_file() -> None:
     scenario = load_scenario("asteroid-1997")
-    other = changed(scenario, {"thruster.budget_m_s": 0.1 + 0.2, "information_set.sections": 31}, "cell")
+    other = changed(
+        scenario, {"thruster.budget_m_s": 0.1 + 0.2, "information_set.sections": 31}, "cell"
+    )
     assert (other.thruster.budget_m_s, other.information_set.sections) == (0.1 + 0.2, 31)
-    assert changed(other, {"thruster.budget_m_s": 1000.0, "information_set.sections": 29}, "cell") == scenario
+    assert (
+        changed(other, {"thruster.budget_m_s": 1000.0, "information_set.sections": 29}, "cell")
+        == scenario
+    )
     with pytest.raises(InputError, match=r"cell: thruster\.budget_m_s: must be at least 0"):
         changed(scenario, {"thruster.budget_m_s": -1.0}, "cell")
 
 
-def test_a_name_wins_over_a_file_and_a_path_over_a_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_name_wins_over_a_file_and_a_path_over_a_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "comet-fast").write_text(TEXT)
     assert load_scenario("comet-fast").name == "comet-fast"
     assert load_scenario("./comet-fast").name == "asteroid-1997"
-    with pytest.raises(InputError, match=r'built-in scenario: there is no "commet-fast"; did you mean comet-fast\?'):
+    with pytest.raises(
+        InputError, match=r'built-in scenario: there is no "commet-fast"; did you mean comet-fast\?'
+    ):
         load_scenario("commet-fast")
     with pytest.raises(InputError, match=r"mine\.toml: cannot be read: No such file"):
         load_scenario("mine.toml")
@@ -208,7 +262,9 @@ def with_numpy_numbers(value: Any) -> Any:
     """Return a dataclass, or a tuple of values, with all numbers as NumPy's."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         names = [field.name for field in dataclasses.fields(value)]
-        return dataclasses.replace(value, **{name: with_numpy_numbers(getattr(value, name)) for name in names})
+        return dataclasses.replace(
+            value, **{name: with_numpy_numbers(getattr(value, name)) for name in names}
+        )
     if isinstance(value, tuple):
         return tuple(map(with_numpy_numbers, value))
     if isinstance(value, bool):
@@ -239,7 +295,9 @@ def test_numbers_of_numpy_become_those_of_python_in_a_scenario() -> None:
 
 
 def test_changed_number_of_numpy_is_written_as_a_number() -> None:
-    scenario = changed(load_scenario("dart-2022"), {"step_s": np.float64(120.0), "camera.period_s": 120.0}, "test")
+    scenario = changed(
+        load_scenario("dart-2022"), {"step_s": np.float64(120.0), "camera.period_s": 120.0}, "test"
+    )
     assert scenario.step_s == 120.0
 
 
@@ -262,7 +320,8 @@ VALUES = (
 
 def random_document(draw: random.Random, most_parts: int) -> tuple[str, int]:
     """Return a TOML text, and the number of parts of its longest key."""
-    lines, longest = [], 1
+    lines = []
+    longest = 1
     for place in range(draw.randint(1, 8)):
         count = draw.randint(1, most_parts)
         longest = max(longest, count)
@@ -277,7 +336,8 @@ def random_document(draw: random.Random, most_parts: int) -> tuple[str, int]:
 
 
 def test_only_keys_of_many_parts_are_refused_before_they_are_parsed() -> None:
-    draw, refused = random.Random(4), 0
+    draw = random.Random(4)
+    refused = 0
     for _ in range(1000):
         text, longest = random_document(draw, draw.choice((3, 20, 24)))
         if longest > 20:

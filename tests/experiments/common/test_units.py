@@ -17,7 +17,9 @@ def test_lengths(size_m: float, name: str, shown: float) -> None:
     assert size_m * per_m == pytest.approx(shown)
 
 
-@pytest.mark.parametrize(("span_s", "name", "shown"), [(9e3, "s", 9e3), (18e3, "h", 5.0), (864e4, "days", 100.0)])
+@pytest.mark.parametrize(
+    ("span_s", "name", "shown"), [(9e3, "s", 9e3), (18e3, "h", 5.0), (864e4, "days", 100.0)]
+)
 def test_times(span_s: float, name: str, shown: float) -> None:
     unit, per_s = time_unit(span_s)
     assert unit == name

@@ -25,9 +25,27 @@ from tests.space import in_space
 pytestmark = pytest.mark.usefixtures("unrendered")
 
 KEYS = [
-    *("versions", "scenario", "scenario_hash", "model", "range_sensor", "elapsed_s", "seed", "strategy", "objective"),
+    *(
+        "versions",
+        "scenario",
+        "scenario_hash",
+        "model",
+        "range_sensor",
+        "elapsed_s",
+        "seed",
+        "strategy",
+        "objective",
+    ),
     *("searched_accelerations_m_s2", "worst_of_search_set_kept_m", "worst_of_search_m"),
-    *("worst_any_state_miss_m", "worst_miss_m", "worst_miss_z_m", "outcome", "truth_kept", "evaluations", "record"),
+    *(
+        "worst_any_state_miss_m",
+        "worst_miss_m",
+        "worst_miss_z_m",
+        "outcome",
+        "truth_kept",
+        "evaluations",
+        "record",
+    ),
     *("found_from", "changes", "start", "history"),
 ]
 BUDGET = 12
@@ -35,7 +53,16 @@ BUDGET = 12
 
 def test_the_worst_as_json_and_as_a_record_that_replays(infoset: Command, tmp_path: Path) -> None:
     code, out, err = infoset(
-        "adversary", "--budget", BUDGET, "--seed", 5, "--record", "worst.npz", "--json", "-", "--quiet"
+        "adversary",
+        "--budget",
+        BUDGET,
+        "--seed",
+        5,
+        "--record",
+        "worst.npz",
+        "--json",
+        "-",
+        "--quiet",
     )
     assert (code, err) == (0, "")
     found: dict[str, Any] = json.loads(out)
@@ -44,13 +71,20 @@ def test_the_worst_as_json_and_as_a_record_that_replays(infoset: Command, tmp_pa
     assert found["versions"] == versions()
     assert (found["scenario"], found["scenario_hash"]) == (scenario.name, fingerprint(scenario))
     assert (found["seed"], found["evaluations"], found["record"]) == (5, BUDGET, "worst.npz")
-    assert (found["strategy"], found["model"], found["range_sensor"]) == ("symmetric-miss", "guaranteed", True)
+    assert (found["strategy"], found["model"], found["range_sensor"]) == (
+        "symmetric-miss",
+        "guaranteed",
+        True,
+    )
     worst = find_worst(scenario, budget=BUDGET, seed=5)
     assert (found["objective"], found["searched_accelerations_m_s2"]) == ("any-state", {"z": 0.005})
     assert found["worst_any_state_miss_m"] == worst.value_m == found["history"][-1]["value_m"]
     assert found["worst_miss_m"] == worst.miss_m
     assert worst.value_m == found["worst_of_search_m"] >= found["worst_of_search_set_kept_m"]
-    assert found["worst_of_search_set_kept_m"] == find_worst(scenario, budget=BUDGET, seed=5, keep_set=True).value_m
+    assert (
+        found["worst_of_search_set_kept_m"]
+        == find_worst(scenario, budget=BUDGET, seed=5, keep_set=True).value_m
+    )
     assert list(found["start"].values()) == [*worst.start().values()]
 
     record = load_record(tmp_path / "worst.npz")
@@ -71,10 +105,14 @@ def test_the_worst_as_json_and_as_a_record_that_replays(infoset: Command, tmp_pa
     ]
 
 
-def test_the_worst_in_space_as_json_table_and_record(infoset: Command, brief: Scenario, tmp_path: Path) -> None:
+def test_the_worst_in_space_as_json_table_and_record(
+    infoset: Command, brief: Scenario, tmp_path: Path
+) -> None:
     file = tmp_path / "space.toml"
     file.write_text(to_toml(in_space(brief)))
-    code, out, _ = infoset("adversary", file, "--budget", BUDGET, "--record", "worst.npz", "--json", "worst.json")
+    code, out, _ = infoset(
+        "adversary", file, "--budget", BUDGET, "--record", "worst.npz", "--json", "worst.json"
+    )
     assert code == 0
     assert "initial y, z, x, km" in out
     assert "initial V_y, V_z, V_x, km/s" in out
@@ -87,14 +125,18 @@ def test_the_worst_in_space_as_json_table_and_record(infoset: Command, brief: Sc
     result = record.result
     assert float(result.miss_m[0]) == found["worst_miss_m"]
     assert result.lateral_miss_m[0].tolist() == [found[name] for name in across]
-    assert [*result.position_m[0].tolist(), *result.velocity_m_s[0].tolist()] == [*found["start"].values()]
+    assert [*result.position_m[0].tolist(), *result.velocity_m_s[0].tolist()] == [
+        *found["start"].values()
+    ]
     sensor = record.scenario.set_model.angle_sensor
     errors = np.abs(record.measured["angle"] - record.true_angle_rad)
     assert (errors <= sensor.error_bound(record.true_range_m)[:, None] * (1.0 + 1e-9)).all()
 
 
 @pytest.mark.thorough
-def test_both_max_misses_are_those_of_bound(infoset: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_both_max_misses_are_those_of_bound(
+    infoset: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The same strategy, seed, budget and model: bound and adversary print the same two numbers."""
     monkeypatch.setattr("infoset.sim.bound.lower_bound.PERIODS_LOOKED_AT", 1)  # few pairs
     monkeypatch.setattr("infoset.sim.bound.lower_bound.REFINEMENTS", 0)
@@ -125,14 +167,20 @@ def test_both_max_misses_are_those_of_bound(infoset: Command, monkeypatch: pytes
         (["asteroid-1997-single", "--range-sensor"], "has no [range_sensor]"),
     ],
 )
-def test_what_is_refused_before_anything_is_flown(arguments: list[str], message: str, infoset: Command) -> None:
+def test_what_is_refused_before_anything_is_flown(
+    arguments: list[str], message: str, infoset: Command
+) -> None:
     Path("there.npz").write_text("something")
     assert message in infoset.refused("adversary", *arguments)
     assert Path("there.npz").read_text() == "something"
 
 
-def test_where_every_set_becomes_empty_one_search_has_no_result(infoset: Command, tmp_path: Path) -> None:
-    text = scenario_text("asteroid-1997").replace("vx_km_s = [-59.0, -57.0]", "vx_km_s = [-110.1, -110.0]")
+def test_where_every_set_becomes_empty_one_search_has_no_result(
+    infoset: Command, tmp_path: Path
+) -> None:
+    text = scenario_text("asteroid-1997").replace(
+        "vx_km_s = [-59.0, -57.0]", "vx_km_s = [-110.1, -110.0]"
+    )
     file = tmp_path / "fast.toml"
     file.write_text(text.replace("vx_km_s = [-58.1, -57.9]", "vx_km_s = [-110.05, -110.0]"))
     found = infoset.json("adversary", file, "--model", "paper", "--budget", 2)

@@ -26,7 +26,15 @@ from tests.space import in_space
 
 FILES = ["figure-bound.pdf", "figure-bound.png", "results.json", "scenario.toml"]
 KEYS = [
-    *("versions", "scenario", "scenario_hash", "model", "range_sensor", "elapsed_s", "disturbance_m_s2"),
+    *(
+        "versions",
+        "scenario",
+        "scenario_hash",
+        "model",
+        "range_sensor",
+        "elapsed_s",
+        "disturbance_m_s2",
+    ),
     *("lower_bound_m", "reached_at", "at_nominal_range", "by_label", "strategies", "value"),
 ]
 IS_VALUE = "the bound is the value of the game up to a reserve of "
@@ -38,8 +46,12 @@ def short() -> Scenario:
     published = load_scenario("asteroid-1997")
     box = StateBox((-1e3, 1e3), (1740e3, 1750e3), (-100.0, 100.0), (-58e3, -57.5e3))
     model = replace(published.set_model, bounds=box)
-    nominal = replace(model, angle_sensor=replace(linear(model.angle_sensor), nominal_range_m=1745e3))
-    return replace(published, name="short", **of_model(nominal), dispersion=box, nominal_range_m=1745e3)
+    nominal = replace(
+        model, angle_sensor=replace(linear(model.angle_sensor), nominal_range_m=1745e3)
+    )
+    return replace(
+        published, name="short", **of_model(nominal), dispersion=box, nominal_range_m=1745e3
+    )
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +63,9 @@ def planar(short: Scenario) -> LowerBound:
 @pytest.fixture
 def known(planar: LowerBound, monkeypatch: pytest.MonkeyPatch) -> None:
     """The command gets the bound of the short scenario without computing it again."""
-    monkeypatch.setattr("infoset.experiments.interception.runs.bound.lower_bound", lambda *_, **__: planar)
+    monkeypatch.setattr(
+        "infoset.experiments.interception.runs.bound.lower_bound", lambda *_, **__: planar
+    )
 
 
 @pytest.fixture
@@ -66,8 +80,13 @@ def test_bound_into_a_folder(
     infoset: Command, short: Scenario, planar: LowerBound, short_file: Path, tmp_path: Path
 ) -> None:
     folder = tmp_path / "results"
-    code, out, err = infoset("bound", short_file, "--out", folder, "--model", "guaranteed", "--budget", 3)
-    assert (code, err) == (0, f"wrote scenario.toml, results.json, figure-bound.pdf, figure-bound.png in {folder}\n")
+    code, out, err = infoset(
+        "bound", short_file, "--out", folder, "--model", "guaranteed", "--budget", 3
+    )
+    assert (code, err) == (
+        0,
+        f"wrote scenario.toml, results.json, figure-bound.pdf, figure-bound.png in {folder}\n",
+    )
     assert sorted(each.name for each in folder.iterdir()) == FILES
     found = json.loads((folder / "results.json").read_text())
     assert list(found) == KEYS
@@ -77,7 +96,9 @@ def test_bound_into_a_folder(
     assert found["scenario_hash"] == fingerprint(flown)
     expected = planar
     assert found["lower_bound_m"] == expected.bound_m
-    assert [each["bound_m"] for each in found["by_label"]] == [each.bound_m for each in expected.by_label]
+    assert [each["bound_m"] for each in found["by_label"]] == [
+        each.bound_m for each in expected.by_label
+    ]
     assert max(each["bound_m"] for each in found["by_label"]) == found["lower_bound_m"]
     assert {each["closing_speed_m_s"] for each in found["by_label"]} == {57.5e3, 58e3}
     assert all(1740e3 <= each["label_m"] <= 1750e3 for each in found["by_label"])
@@ -88,7 +109,9 @@ def test_bound_into_a_folder(
     assert [each["name"] for each in found["strategies"]] == strategy_names()
     for each in found["strategies"]:
         assert each["worst_found_m"] >= found["lower_bound_m"] * (1.0 - 1e-4)
-        assert each["worst_over_bound"] == pytest.approx(each["worst_found_m"] / found["lower_bound_m"])
+        assert each["worst_over_bound"] == pytest.approx(
+            each["worst_found_m"] / found["lower_bound_m"]
+        )
         assert each["guaranteed_m"] is not None
         assert each["guaranteed_m"] >= each["worst_found_m"]
         pairs = max(miss for flight in each["flights"] for miss in flight["miss_m"])
@@ -103,7 +126,11 @@ def test_bound_into_a_folder(
         "at_least_m": found["lower_bound_m"],
         "at_most_m": None,
         "reserve_m": None,
-        "not_proved_because": ["gravity", "range not exactly known", "closing speed not exactly known"],
+        "not_proved_because": [
+            "gravity",
+            "range not exactly known",
+            "closing speed not exactly known",
+        ],
         "best_strategy": best["name"],
         "best_strategy_worst_found_m": best["worst_found_m"],
     }
@@ -140,7 +167,9 @@ def test_row_of_each_strategy_is_printed_when_its_search_ends(
 
     monkeypatch.setattr(bound, "_simulate", stop_at_the_second)
 
-    code, out, err = infoset("bound", short_file, "--strategies", "symmetric-miss,least-effort", "--budget", 1)
+    code, out, err = infoset(
+        "bound", short_file, "--strategies", "symmetric-miss,least-effort", "--budget", 1
+    )
 
     assert (code, "error: stopped" in err) == (2, True)
     *_, heading, row = out.splitlines()
@@ -150,9 +179,13 @@ def test_row_of_each_strategy_is_printed_when_its_search_ends(
     assert "no strategy can guarantee a miss below" in out
 
 
-def test_value_where_range_and_speed_are_known(infoset: Command, short: Scenario, tmp_path: Path) -> None:
+def test_value_where_range_and_speed_are_known(
+    infoset: Command, short: Scenario, tmp_path: Path
+) -> None:
     box = replace(short.set_model.bounds, x_m=(1745e3, 1745e3), vx_m_s=(-58e3, -58e3))
-    free = replace(short, sun=None, dispersion=box, **of_model(replace(short.set_model, bounds=box)))
+    free = replace(
+        short, sun=None, dispersion=box, **of_model(replace(short.set_model, bounds=box))
+    )
     file = tmp_path / "free.toml"
     file.write_text(to_toml(free))
     options = (
@@ -167,34 +200,55 @@ def test_value_where_range_and_speed_are_known(infoset: Command, short: Scenario
     code, out, _ = infoset(*options, "--budget", 100)
     assert code == 0
     found = json.loads((tmp_path / "found.json").read_text())
-    value, symmetric = found["value"], found["strategies"][1]
+    value = found["value"]
+    symmetric = found["strategies"][1]
     parts = value["reserve_m"]
     total = parts.pop("total")
     assert list(parts) == ["lower_bound", "tangent", "dead_zone", "range_threshold"]
     assert total == pytest.approx(sum(parts.values()))
     assert (value["at_least_m"], value["not_proved_because"]) == (found["lower_bound_m"], [])
     assert value["at_most_m"] == pytest.approx(found["lower_bound_m"] + total)
-    assert found["lower_bound_m"] <= symmetric["worst_found_m"] <= value["at_most_m"] < 1.1 * found["lower_bound_m"]
-    assert f"{IS_VALUE}{total:.3g} m: no strategy guarantees less than {found['lower_bound_m']:.3g} m" in out
+    assert (
+        found["lower_bound_m"]
+        <= symmetric["worst_found_m"]
+        <= value["at_most_m"]
+        < 1.1 * found["lower_bound_m"]
+    )
+    assert (
+        f"{IS_VALUE}{total:.3g} m: no strategy guarantees less than {found['lower_bound_m']:.3g} m"
+        in out
+    )
     code, out, _ = infoset(*options, "--budget", 0, "--set", "thruster.budget_m_s=100")
     assert code == 0
     value = json.loads((tmp_path / "found.json").read_text())["value"]
     (reason,) = value["not_proved_because"]
     assert reason.startswith("budget below the ")
-    assert [value[key] for key in ("at_most_m", "reserve_m", "best_strategy", "best_strategy_worst_found_m")] == [
-        None
-    ] * 4
+    assert [
+        value[key]
+        for key in ("at_most_m", "reserve_m", "best_strategy", "best_strategy_worst_found_m")
+    ] == [None] * 4
     assert f"no upper end is proved, because of: {reason}\n" in out
     assert IS_VALUE not in out
 
 
 @pytest.mark.thorough
 @pytest.mark.usefixtures("unrendered")
-def test_bound_in_space(infoset: Command, short: Scenario, planar: LowerBound, tmp_path: Path) -> None:
+def test_bound_in_space(
+    infoset: Command, short: Scenario, planar: LowerBound, tmp_path: Path
+) -> None:
     spatial = in_space(short)
     file = tmp_path / "space.toml"
     file.write_text(to_toml(spatial))
-    options = ("--strategies", "symmetric-miss", "--budget", 1, "--model", "guaranteed", "--out", tmp_path / "results")
+    options = (
+        "--strategies",
+        "symmetric-miss",
+        "--budget",
+        1,
+        "--model",
+        "guaranteed",
+        "--out",
+        tmp_path / "results",
+    )
     assert infoset("bound", file, *options)[0] == 0
     found = json.loads((tmp_path / "results" / "results.json").read_text())
     expected = lower_bound(spatial)
@@ -206,11 +260,15 @@ def test_bound_in_space(infoset: Command, short: Scenario, planar: LowerBound, t
     assert np.hypot(*apart) == pytest.approx(expected.pair.apart_m)
     assert 0.0 not in apart
     for flight in found["strategies"][0]["flights"]:
-        assert np.hypot(flight["miss_y_m"], flight["miss_z_m"]) == pytest.approx(flight["miss_m"], rel=1e-3)
+        assert np.hypot(flight["miss_y_m"], flight["miss_z_m"]) == pytest.approx(
+            flight["miss_m"], rel=1e-3
+        )
         assert max(flight["miss_m"]) >= flight["bound_m"] * (1.0 - 1e-4)
         assert all(flight["truth_kept"])
     (strategy,) = found["strategies"]
-    assert strategy["worst_found_m"] == max(strategy["worst_of_pairs_m"], strategy["worst_of_search_m"])
+    assert strategy["worst_found_m"] == max(
+        strategy["worst_of_pairs_m"], strategy["worst_of_search_m"]
+    )
     assert strategy["worst_found_m"] <= strategy["guaranteed_m"]
     (_, right) = draw_bound(spatial, expected).axes
     assert right.get_ylabel() == "offset from the midpoint, m"

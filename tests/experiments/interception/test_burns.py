@@ -35,7 +35,9 @@ def test_the_burns_of_a_schedule(infoset: Command) -> None:
         assert first["p99_m_s"] is None  # ten runs do not show it
     results = simulate(load_scenario("asteroid-1997", SETTINGS), 10)
     assert curves[2]["burns"] != curves[0]["burns"]
-    assert burns_key(load_scenario("asteroid-1997", SETTINGS), results)["burns"] in [curve["burns"] for curve in curves]
+    assert burns_key(load_scenario("asteroid-1997", SETTINGS), results)["burns"] in [
+        curve["burns"] for curve in curves
+    ]
 
 
 def test_burns_are_columns_of_the_results() -> None:
@@ -57,7 +59,9 @@ def test_burns_are_columns_of_the_results() -> None:
 def test_many_burns_are_only_in_json(infoset: Command) -> None:
     settings = ("thruster.last_impulse_s=20", "thruster.impulse_period_s=1")
     options = [option for setting in settings for option in ("--set", setting)]
-    _, out, _ = infoset("experiment", "asteroid-1997", "--runs", 4, *options, "--json", "results.json")
+    _, out, _ = infoset(
+        "experiment", "asteroid-1997", "--runs", 4, *options, "--json", "results.json"
+    )
     assert "impulses at 81 times: --json has the quantiles of each" in out
     assert "burn, s before arrival" not in out
     assert len(strict(Path("results.json").read_text())["curves"][0]["burns"]) == 81

@@ -18,11 +18,21 @@ TWO = ("--strategies", "symmetric-miss,patient")
 LEVELS = ["p10", "p50", "p90", "p99", "max"]
 
 
-def test_compare_as_json(infoset: Command, brief: Scenario, brief_file: Path, tmp_path: Path) -> None:
+def test_compare_as_json(
+    infoset: Command, brief: Scenario, brief_file: Path, tmp_path: Path
+) -> None:
     found = infoset.json("compare", brief_file, *TWO, "--runs", 4, "--seed", 3)
     assert found["versions"] == versions()
-    assert (found["scenario"], found["scenario_hash"]) == ("brief", fingerprint(with_model(brief, Model.GUARANTEED)))
-    assert (found["seed"], found["runs"], found["model"], found["range_sensor"]) == (3, 4, "guaranteed", True)
+    assert (found["scenario"], found["scenario_hash"]) == (
+        "brief",
+        fingerprint(with_model(brief, Model.GUARANTEED)),
+    )
+    assert (found["seed"], found["runs"], found["model"], found["range_sensor"]) == (
+        3,
+        4,
+        "guaranteed",
+        True,
+    )
     strategies = found["strategies"]
     assert [(each["name"], each["noise"]) for each in strategies] == [
         ("symmetric-miss", "random"),
@@ -34,16 +44,23 @@ def test_compare_as_json(infoset: Command, brief: Scenario, brief_file: Path, tm
         for quantity in ("miss_m", "impulse_m_s"):
             assert list(each[quantity]) == LEVELS
             # Three runs show the median and the maximum value only.
-            assert [name for name, value in each[quantity].items() if value is not None] == ["p50", "max"]
+            assert [name for name, value in each[quantity].items() if value is not None] == [
+                "p50",
+                "max",
+            ]
             assert each[quantity]["p50"] <= each[quantity]["max"]
         assert each["truth_kept"] == each["phi_held"] == 4
-        assert list(each["ties"]) == ([] if each["noise"] == "random" else ["upper", "lower", "alternate", "random"])
+        assert list(each["ties"]) == (
+            [] if each["noise"] == "random" else ["upper", "lower", "alternate", "random"]
+        )
         assert sum(each["outcomes"].values()) == (4 if each["noise"] == "random" else 16)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_the_model_of_the_paper_has_no_bound(infoset: Command, brief_file: Path) -> None:
-    for each in infoset.json("compare", brief_file, *TWO, "--runs", 3, "--model", "paper")["strategies"]:
+    for each in infoset.json("compare", brief_file, *TWO, "--runs", 3, "--model", "paper")[
+        "strategies"
+    ]:
         assert 0 <= each["truth_kept"] <= 3
         assert each["phi_held"] is None
 
@@ -52,7 +69,16 @@ def test_the_figures_are_those_of_the_simulator_and_the_worst_tie_rule_counts(
     infoset: Command, brief: Scenario, brief_file: Path
 ) -> None:
     found = infoset.json(
-        "compare", brief_file, "--strategies", "symmetric-miss", "--runs", 5, "--seed", 2, "--model", "paper"
+        "compare",
+        brief_file,
+        "--strategies",
+        "symmetric-miss",
+        "--runs",
+        5,
+        "--seed",
+        2,
+        "--model",
+        "paper",
     )["strategies"]
     assert found[0]["miss_m"] == summary(simulate(brief, 5, seed=2).miss_m)
     game = [simulate(replace(brief, noise=NoiseKind.GAME, tie=tie), 5, seed=2) for tie in TieRule]

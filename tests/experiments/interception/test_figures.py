@@ -17,9 +17,18 @@ from infoset.experiments.common.figure_style import CURVE_LOOKS, figure_bytes
 from infoset.experiments.interception.course import Courses
 from infoset.experiments.interception.figures.commands import draw_experiment
 from infoset.experiments.interception.figures.comparison import draw_comparison
-from infoset.experiments.interception.figures.distributions import Sample, draw_distributions, draw_samples
+from infoset.experiments.interception.figures.distributions import (
+    Sample,
+    draw_distributions,
+    draw_samples,
+)
 from infoset.experiments.interception.figures.process import draw_process
-from infoset.experiments.interception.figures.sets import MEASUREMENT_MARK, TRUTH_MARK, choose_sections, draw_sets
+from infoset.experiments.interception.figures.sets import (
+    MEASUREMENT_MARK,
+    TRUTH_MARK,
+    choose_sections,
+    draw_sets,
+)
 from infoset.experiments.interception.scenario_file import load_scenario
 from infoset.experiments.interception.study import Comparison, Curve, curve_scenarios
 from infoset.guidance import NoiseKind, TieRule
@@ -73,12 +82,15 @@ def test_process_has_four_rows_of_equal_limits_and_units(records: list[Record]) 
     limit = records[0].scenario.thruster.max_impulse_m_s
     assert low < -limit < limit < high
     for column, record in zip((figure.axes[:4], figure.axes[4:]), records, strict=True):
-        np.testing.assert_allclose(points(column[0], "true value")[:, 1], 1e3 * record.true_angle_rad[:, 0])
+        np.testing.assert_allclose(
+            points(column[0], "true value")[:, 1], 1e3 * record.true_angle_rad[:, 0]
+        )
         measured = 1e3 * record.measured["angle"][record.measures("angle"), 0]
         np.testing.assert_allclose(points(column[0], "measured angle")[:, 1], measured)
         (bars,) = column[2].collections
         heights = np.array([np.asarray(path.vertices)[1, 1] for path in bars.get_paths()])
-        given, misses = record.impulse_m_s[:, 0], record.predicted_miss_m[:, 0]
+        given = record.impulse_m_s[:, 0]
+        misses = record.predicted_miss_m[:, 0]
         np.testing.assert_allclose(heights, given[given != 0.0])
         misses = misses[np.isfinite(misses[:, 0])]
         lower, upper = (data(line)[:, 1] for line in column[3].lines[1:])
@@ -90,18 +102,29 @@ def test_sets_show_truth_measurement_and_sections(records: list[Record]) -> None
     assert len(figure.axes) == 6
     assert_units(figure)
     for position, axes in enumerate(figure.axes):
-        record, step = records[position % 2], (1, 8, 16)[position // 2]
-        true = np.array([[record.true_rate_rad_s[step, 0] * 1e6, record.true_angle_rad[step, 0] * 1e3]])
+        record = records[position % 2]
+        step = (1, 8, 16)[position // 2]
+        true = np.array(
+            [[record.true_rate_rad_s[step, 0] * 1e6, record.true_angle_rad[step, 0] * 1e3]]
+        )
         np.testing.assert_allclose(points(axes, TRUTH_MARK), true)
         np.testing.assert_allclose(
             points(axes, MEASUREMENT_MARK), [[true[0, 0], record.measured["angle"][step, 0] * 1e3]]
         )
         chosen = choose_sections(record.sections[step], 5)
-        outlines = [np.asarray(patch.get_xy()) for patch in axes.patches if isinstance(patch, Polygon)]
+        outlines = [
+            np.asarray(patch.get_xy()) for patch in axes.patches if isinstance(patch, Polygon)
+        ]
         for outline, section in zip(outlines, chosen, strict=True):
             np.testing.assert_allclose(outline[:-1], section.omega_alpha[0].polygon() * [1e6, 1e3])
-        name = f"({'abcdef'[position]}) {('random', 'game')[position % 2]} noise,\nt = {record.time_s[step]:g} s"
-        assert axes.get_title("left") == f"{name}, {chosen[0].range_m / 1e3:.0f} to {chosen[-1].range_m / 1e3:.0f} km"
+        name = (
+            f"({'abcdef'[position]}) {('random', 'game')[position % 2]} noise,\n"
+            f"t = {record.time_s[step]:g} s"
+        )
+        assert (
+            axes.get_title("left")
+            == f"{name}, {chosen[0].range_m / 1e3:.0f} to {chosen[-1].range_m / 1e3:.0f} km"
+        )
     for first, second in zip(figure.axes[::2], figure.axes[1::2], strict=True):
         assert (first.get_xlim(), first.get_ylim()) == (second.get_xlim(), second.get_ylim())
     assert len(legend(figure)) == 4
@@ -121,10 +144,17 @@ def test_distributions_draw_the_curves_and_their_bands(curves: list[Curve]) -> N
     half = np.sqrt(np.log(40.0) / (2.0 * RUNS))  # Dvoretzky-Kiefer-Wolfowitz
     share = np.arange(1, RUNS + 1) / RUNS
     for axes, name in zip(figure.axes, ("miss_m", "impulse_m_s"), strict=True):
-        bands = [np.asarray(band.get_paths()[0].vertices) for band in axes.collections if band.get_paths()]
+        bands = [
+            np.asarray(band.get_paths()[0].vertices)
+            for band in axes.collections
+            if band.get_paths()
+        ]
         for curve, band in zip(curves, bands, strict=True):
             sample = np.sort(getattr(curve.results, name))
-            label = f"{curve.number}  {curve.noise} noise, {'with' if curve.range_sensor else 'no'} range sensor"
+            label = (
+                f"{curve.number}  {curve.noise} noise, {'with' if curve.range_sensor else 'no'} "
+                "range sensor"
+            )
             drawn = points(axes, f"{label}, {RUNS} runs")
             np.testing.assert_array_equal(drawn[1:-1], np.column_stack([sample, share]))
             for edge in (np.maximum(share - half, 0.0), np.minimum(share + half, 1.0)):
@@ -145,8 +175,12 @@ def test_the_runs_that_the_paper_prints_are_marks() -> None:
     assert label not in legend(other)
 
 
-@pytest.mark.parametrize(("radius_m", "scale"), [(None, "linear"), (400.0, "linear"), (20.0, "log")])
-def test_the_axis_of_the_miss_shows_the_radius_of_the_body(radius_m: float | None, scale: str) -> None:
+@pytest.mark.parametrize(
+    ("radius_m", "scale"), [(None, "linear"), (400.0, "linear"), (20.0, "log")]
+)
+def test_the_axis_of_the_miss_shows_the_radius_of_the_body(
+    radius_m: float | None, scale: str
+) -> None:
     misses = np.geomspace(500.0, 2000.0, 40)
     figure = draw_samples([Sample("wide", CURVE_LOOKS[1], misses, misses)], radius_m)
     assert figure.axes[0].get_xscale() == scale
@@ -155,7 +189,9 @@ def test_the_axis_of_the_miss_shows_the_radius_of_the_body(radius_m: float | Non
 
 
 @pytest.mark.parametrize(
-    ("runs", "marks"), [(2, []), (10, ["10 to 90 %"]), (100, ["10 to 90 %", "99 %"])], ids=["2", "10", "100"]
+    ("runs", "marks"),
+    [(2, []), (10, ["10 to 90 %"]), (100, ["10 to 90 %", "99 %"])],
+    ids=["2", "10", "100"],
 )
 def test_a_comparison_draws_only_quantiles_that_the_runs_show(runs: int, marks: list[str]) -> None:
     results = simulate(load_scenario("asteroid-1997-single"), 2).take(np.arange(runs) % 2)
@@ -168,7 +204,9 @@ def test_a_comparison_draws_only_quantiles_that_the_runs_show(runs: int, marks: 
 
 
 @pytest.mark.thorough
-def test_files_are_written_twice_the_same_and_nothing_global_is_touched(curves: list[Curve]) -> None:
+def test_files_are_written_twice_the_same_and_nothing_global_is_touched(
+    curves: list[Curve],
+) -> None:
     before = dict(mpl.rcParams)
     first, second = (figure_bytes(draw_distributions(curves)) for _ in range(2))
     assert first == second

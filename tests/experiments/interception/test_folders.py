@@ -1,4 +1,6 @@
-"""What --out writes: the numbers of --json and --csv, figures, and the scenario that was simulated."""
+"""What --out writes: the numbers of --json and --csv, figures, and the scenario that was
+simulated.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,11 @@ from tests.experiments.command_line import Command, strict
 
 TIE_AND_SECTIONS = ("--set", "tie=lower", "--set", "information_set.sections=9")
 STUDIES = {
-    "experiment": (("--runs", 2, *TIE_AND_SECTIONS), ["distributions", "corridor"], ["results.csv"]),
+    "experiment": (
+        ("--runs", 2, *TIE_AND_SECTIONS),
+        ["distributions", "corridor"],
+        ["results.csv"],
+    ),
     "compare": (
         ("--runs", 2, "--strategies", "symmetric-miss,patient", "--no-range-sensor"),
         ["comparison"],
@@ -40,15 +46,22 @@ def test_the_folder_of_a_study(command: str, infoset: Command, brief_file: Path)
     )
     text = Path("out/results.json").read_text()
     assert text == Path("beside.json").read_text()
-    found, flown = strict(text), load_scenario(Path("out/scenario.toml"))
+    found = strict(text)
+    flown = load_scenario(Path("out/scenario.toml"))
     assert found["scenario_hash"] == fingerprint(flown)
     assert (flown.range_sensor is None) == ("--no-range-sensor" in options)
     rows = list(csv.DictReader(io.StringIO((Path("out") / files[-1]).read_text())))
     if command == "experiment":
         assert (flown.tie.value, flown.set_model.sections) == ("lower", 9)
-        assert [float(row["miss_m"]) for row in rows] == [miss for curve in found["curves"] for miss in curve["miss_m"]]
+        assert [float(row["miss_m"]) for row in rows] == [
+            miss for curve in found["curves"] for miss in curve["miss_m"]
+        ]
     if command == "compare":
         assert len(rows) == 2 * 5 * 2  # two strategies, random noise and four tie rules, two runs
-        worst = max(float(row["miss_m"]) for row in rows if (row["strategy"], row["noise"]) == ("patient", "game"))
+        worst = max(
+            float(row["miss_m"])
+            for row in rows
+            if (row["strategy"], row["noise"]) == ("patient", "game")
+        )
         assert found["strategies"][3]["miss_m"]["max"] == worst
     assert "exists already" in infoset.refused(*asked)

@@ -28,7 +28,11 @@ def test_a_speed_near_that_of_light_is_called_that(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "radius", "part"),
     [
-        ("dart-2022", "radius_km=30", "all of them hit without impulses; check the unit of the radius"),
+        (
+            "dart-2022",
+            "radius_km=30",
+            "all of them hit without impulses; check the unit of the radius",
+        ),
         ("deep-impact-2005", "radius_km=30", "check"),
         # With so fast starts most of them miss even this body.
         (
@@ -45,9 +49,13 @@ def test_a_huge_body_is_questioned(name: str, radius: str, part: str) -> None:
     assert part in lines[0]
 
 
-@pytest.mark.parametrize("name", [file.name for file in built_in_files().values() if file.kind == "scenario"])
+@pytest.mark.parametrize(
+    "name", [file.name for file in built_in_files().values() if file.kind == "scenario"]
+)
 def test_no_body_of_a_built_in_scenario_is_questioned(name: str) -> None:
-    assert not [line for line in all_warnings(load_scenario(name)) if "check the unit of the radius" in line]
+    assert not [
+        line for line in all_warnings(load_scenario(name)) if "check the unit of the radius" in line
+    ]
 
 
 @pytest.mark.parametrize("key", ["pixel_error_mas", "pixel_error_m", "pixel_error"])

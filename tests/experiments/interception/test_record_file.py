@@ -1,4 +1,6 @@
-"""Records: every value comes back bit for bit, and what is damaged, foreign or hostile is refused with one message."""
+"""Records: every value comes back bit for bit, and what is damaged, foreign or hostile is refused
+with one message.
+"""
 
 from __future__ import annotations
 
@@ -49,7 +51,11 @@ class Outlier:
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> dict[str, Any]:
         errors = {"angle": 5.0 if sight.step == OUTLIER_AT else 0.0, "rate": 0.0}
-        return {name: sight.sensors[name].measured(sight, errors[name]) for name in sight.sensors if name in errors}
+        return {
+            name: sight.sensors[name].measured(sight, errors[name])
+            for name in sight.sensors
+            if name in errors
+        }
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +87,11 @@ def refused(content: bytes, tmp_path: Path) -> str:
 
 
 def assert_same_section(one: Section, other: Section) -> None:
-    assert (one.label_m, one.range_m, one.closing_speed_m_s) == (other.label_m, other.range_m, other.closing_speed_m_s)
+    assert (one.label_m, one.range_m, one.closing_speed_m_s) == (
+        other.label_m,
+        other.range_m,
+        other.closing_speed_m_s,
+    )
     assert np.array_equal(one.polygons.counts, other.polygons.counts)
     assert np.array_equal(one.polygons.vertices, other.polygons.vertices)
 
@@ -90,10 +100,12 @@ def assert_same(one: Record, other: Record) -> None:
     for name in ("scenario", "versions", "seed", "run", "strategy", "noise", "inconsistency"):
         assert getattr(one, name) == getattr(other, name)
     for field in dataclasses.fields(one.result):
-        a, b = getattr(one.result, field.name), getattr(other.result, field.name)
+        a = getattr(one.result, field.name)
+        b = getattr(other.result, field.name)
         if np.ma.isMaskedArray(a):
             assert np.ma.getmaskarray(a).tolist() == np.ma.getmaskarray(b).tolist()
-            a, b = a.filled(0.0), b.filled(0.0)
+            a = a.filled(0.0)
+            b = b.filled(0.0)
         assert np.array_equal(a, b)
         assert getattr(a, "dtype", None) == getattr(b, "dtype", None)
     for name in ("time_s", "true_range_m", "true_angle_rad", "true_rate_rad_s", "impulse_m_s"):
@@ -101,7 +113,10 @@ def assert_same(one: Record, other: Record) -> None:
     for name in ("predicted_miss_m", "truth_margin_m"):
         assert np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True)
     assert one.measured.keys() == other.measured.keys()
-    assert all(np.array_equal(one.measured[name], other.measured[name], equal_nan=True) for name in one.measured)
+    assert all(
+        np.array_equal(one.measured[name], other.measured[name], equal_nan=True)
+        for name in one.measured
+    )
     assert [*map(len, one.sections)] == [*map(len, other.sections)]
     for mine, others in zip(one.sections, other.sections, strict=True):
         for a, b in zip(mine, others, strict=True):
@@ -109,16 +124,25 @@ def assert_same(one: Record, other: Record) -> None:
 
 
 def with_rates(name: str) -> Any:
-    return dataclasses.replace(with_long_steps(load_scenario(name)), rate_sensor=RateSensor(1.0, 1e-6))
+    return dataclasses.replace(
+        with_long_steps(load_scenario(name)), rate_sensor=RateSensor(1.0, 1e-6)
+    )
 
 
 RECORDS: dict[str, Callable[[], Record]] = {
     "plane": lambda: fly_one(with_long_steps(load_scenario("asteroid-1997")), 1, seed=2**70),
-    "game": lambda: fly_one(dataclasses.replace(load_scenario("asteroid-1997-single"), noise=NoiseKind.GAME)),
+    "game": lambda: fly_one(
+        dataclasses.replace(load_scenario("asteroid-1997-single"), noise=NoiseKind.GAME)
+    ),
     "space": lambda: fly_one(in_space(with_rates("asteroid-1997")), 1),
-    "own strategy": lambda: fly_one(with_long_steps(load_scenario("asteroid-1997")), strategy=Idle()),
+    "own strategy": lambda: fly_one(
+        with_long_steps(load_scenario("asteroid-1997")), strategy=Idle()
+    ),
     "contradiction": lambda: fly_one(
-        dataclasses.replace(load_scenario("asteroid-1997-single"), rate_sensor=RateSensor(1.0, 1e-6)), noise=Outlier()
+        dataclasses.replace(
+            load_scenario("asteroid-1997-single"), rate_sensor=RateSensor(1.0, 1e-6)
+        ),
+        noise=Outlier(),
     ),
 }
 
@@ -153,7 +177,9 @@ def test_what_is_not_known_comes_back_as_not_known(record: Record, tmp_path: Pat
     write_record(changed, tmp_path / "x.npz")
     found = load_record(tmp_path / "x.npz")
     assert_same(dataclasses.replace(found, sections=changed.sections), changed)
-    assert np.isfinite(found.sections[0][0].polygons.vertices).all()  # of a set that nothing was measured of
+    assert np.isfinite(
+        found.sections[0][0].polygons.vertices
+    ).all()  # of a set that nothing was measured of
 
 
 def test_the_file_is_an_archive_of_numpy_that_depends_on_the_record_only(
@@ -168,7 +194,9 @@ def test_the_file_is_an_archive_of_numpy_that_depends_on_the_record_only(
         assert arrays["header"].size < record_file.MAX_HEADER_BYTES / 100
 
 
-def test_a_file_that_is_too_large_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_is_too_large_is_not_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(record_file, "MAX_FILE_BYTES", 10)
     (tmp_path / "y.npz").write_bytes(b"x" * 11)
     with pytest.raises(InputError, match="has more than 10 bytes"):
@@ -182,10 +210,23 @@ def archive(**arrays: Any) -> bytes:
 
 
 def test_what_is_no_record(content: bytes, tmp_path: Path) -> None:
-    foreign = [b"", b"x", b"PK\x03\x04", b"\x93NUMPY\x01\x00", b"\0" * 1000, archive(a=np.arange(3))]
+    foreign = [
+        b"",
+        b"x",
+        b"PK\x03\x04",
+        b"\x93NUMPY\x01\x00",
+        b"\0" * 1000,
+        archive(a=np.arange(3)),
+    ]
     foreign += [archive(header=np.array([{}], dtype=object)), content + content[-100:]]
     draw = random.Random(0)
-    sizes = [1, 100, len(content) // 2, len(content) - 1, *(draw.randrange(len(content)) for _ in range(30))]
+    sizes = [
+        1,
+        100,
+        len(content) // 2,
+        len(content) - 1,
+        *(draw.randrange(len(content)) for _ in range(30)),
+    ]
     for each in [*foreign, *(content[:size] for size in sizes)]:
         refused(each, tmp_path)
 
@@ -247,7 +288,9 @@ CHANGES: list[tuple[Change, str]] = [
 ]  # fmt: skip
 
 
-def test_unchanged_it_is_read_and_changed_it_is_refused(content: bytes, record: Record, tmp_path: Path) -> None:
+def test_unchanged_it_is_read_and_changed_it_is_refused(
+    content: bytes, record: Record, tmp_path: Path
+) -> None:
     (tmp_path / "x.npz").write_bytes(remade(content, lambda arrays: None))
     assert_same(load_record(tmp_path / "x.npz"), record)
     for change, part in CHANGES:
@@ -260,10 +303,14 @@ def array_bytes(head: bytes, data: bytes = b"") -> bytes:
 
 MEMBERS = {
     "10 GB": array_bytes(b"{'descr': '<f8', 'fortran_order': False, 'shape': (1250000000,), }"),
-    "10 PB": array_bytes(b"{'descr': '<f8', 'fortran_order': False, 'shape': (1250000000000000,), }"),
+    "10 PB": array_bytes(
+        b"{'descr': '<f8', 'fortran_order': False, 'shape': (1250000000000000,), }"
+    ),
     "empty": b"",
     "nested": array_bytes(b"-" * 9000 + b"1"),
-    "pickle": array_bytes(b"{'descr': '|O', 'fortran_order': False, 'shape': (1,), }", b"\x80\x04N."),
+    "pickle": array_bytes(
+        b"{'descr': '|O', 'fortran_order': False, 'shape': (1,), }", b"\x80\x04N."
+    ),
 }
 
 
@@ -272,7 +319,9 @@ def test_a_damaged_member(name: str, content: bytes, tmp_path: Path) -> None:
     out = io.BytesIO()
     with zipfile.ZipFile(io.BytesIO(content)) as stored, zipfile.ZipFile(out, "w") as changed:
         for member in stored.namelist():
-            changed.writestr(member, MEMBERS[name] if member == "time_s.npy" else stored.read(member))
+            changed.writestr(
+                member, MEMBERS[name] if member == "time_s.npy" else stored.read(member)
+            )
     refused(out.getvalue(), tmp_path)
 
 

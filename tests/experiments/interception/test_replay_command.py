@@ -28,14 +28,20 @@ def file(record: Record, infoset: Command, tmp_path: Path) -> Path:
     return tmp_path / "a.npz"
 
 
-def test_a_page_is_written_whole_and_replaced_only_when_told(file: Path, record: Record, infoset: Command) -> None:
+def test_a_page_is_written_whole_and_replaced_only_when_told(
+    file: Path, record: Record, infoset: Command
+) -> None:
     record = first_steps(record, 20)
     file.unlink()
     write_record(record, file)
     assert infoset("replay", file, "--html", "page.html", "--quiet") == (0, "", "")
     assert (file.parent / "page.html").read_text(encoding="utf-8") == interception_page([record])
     assert "--overwrite" in infoset.refused("replay", file, "--html", "page.html")
-    assert infoset("replay", file, file, "--html", "page.html", "--overwrite", "--quiet") == (0, "", "")
+    assert infoset("replay", file, file, "--html", "page.html", "--overwrite", "--quiet") == (
+        0,
+        "",
+        "",
+    )
     assert sorted(each.name for each in file.parent.iterdir()) == ["a.npz", "page.html"]
 
 
@@ -59,4 +65,6 @@ def test_an_animation_has_a_picture_a_moment(record: Record, tmp_path: Path) -> 
 def test_figure_3_at_other_times(file: Path, tmp_path: Path, infoset: Command) -> None:
     assert infoset("replay", file, "--out", "sets", "--times", "2, 40,60,90", "-q")[0] == 0
     assert (tmp_path / "sets" / "figure-3-sets.png").is_file()
-    assert "--times: could not convert" in infoset.refused("replay", file, "--out", "no", "--times", "1,x")
+    assert "--times: could not convert" in infoset.refused(
+        "replay", file, "--out", "no", "--times", "1,x"
+    )

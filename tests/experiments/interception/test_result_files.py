@@ -39,7 +39,8 @@ def test_loaded_results_equal_the_saved_ones(results: Results, saved: Path) -> N
     assert (again.guarantees, again.b_plane_t_rad) == (results.guarantees, results.b_plane_t_rad)
     np.testing.assert_equal(again.burns_m_s, results.burns_m_s)
     for name in ("miss_m", "position_m", "velocity_m_s", "lateral_miss_m", "runs", "truth_kept"):
-        mine, theirs = getattr(again, name), getattr(results, name)
+        mine = getattr(again, name)
+        theirs = getattr(results, name)
         assert (mine.shape, mine.dtype) == (theirs.shape, theirs.dtype)
         np.testing.assert_array_equal(mine, theirs)
 

@@ -46,15 +46,26 @@ def test_every_key_is_read_and_written(text: str) -> None:
     images = [*IMAGES, *(["bias=constant"] if text == CAMERA else [])]
     settings = [*WHOLE, *(f"{table}.{image}" for image in images)]
     scenario = read_text(Scenario, text, "file", settings)
-    sensor, thruster = scenario.bearing_sensor, scenario.thruster
-    assert (sensor.first_image_s, sensor.last_image_s, sensor.miss_probability) == (50.0, 4.5, 0.125)
+    sensor = scenario.bearing_sensor
+    thruster = scenario.thruster
+    assert (sensor.first_image_s, sensor.last_image_s, sensor.miss_probability) == (
+        50.0,
+        4.5,
+        0.125,
+    )
     assert sensor.has_constant_bias is (text == CAMERA)
-    assert (thruster.last_impulse_s, thruster.impulses_s, thruster.delay_steps) == (7.0, (50.0, 20.0, 7.5), 2)
+    assert (thruster.last_impulse_s, thruster.impulses_s, thruster.delay_steps) == (
+        7.0,
+        (50.0, 20.0, 7.5),
+        2,
+    )
     assert read_text(Scenario, to_toml(scenario), "written") == scenario
 
 
 def test_the_error_of_the_centre_is_small_at_the_range_threshold() -> None:
-    with pytest.raises(InputError, match=r"range_threshold_m must be at least 10 times .*, 8000 m: got 5000"):
+    with pytest.raises(
+        InputError, match=r"range_threshold_m must be at least 10 times .*, 8000 m: got 5000"
+    ):
         camera(camera__centroid_error_m="800")
 
 
@@ -63,8 +74,12 @@ def test_measurements_after_the_last_impulse_are_warned_of() -> None:
     (line,) = scenario_warnings(blind)
     assert "no impulse follows a measurement" in line
     assert "the last impulse is 30.0224 s before it" in line
-    assert not scenario_warnings(camera(camera__first_image_s="30.1", thruster__last_impulse_s="30"))
+    assert not scenario_warnings(
+        camera(camera__first_image_s="30.1", thruster__last_impulse_s="30")
+    )
     schedule = {"thruster__impulses_s": "[60.0, 40.0, 20.0]", "thruster__last_impulse_s": "30"}
     for first_image_s, delay_steps, number in (("35", "0", 1), ("40.1", "0", 0), ("40.1", "2", 1)):
-        late = camera(camera__first_image_s=first_image_s, thruster__delay_steps=delay_steps, **schedule)
+        late = camera(
+            camera__first_image_s=first_image_s, thruster__delay_steps=delay_steps, **schedule
+        )
         assert len(scenario_warnings(late)) == number

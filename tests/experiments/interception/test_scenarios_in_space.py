@@ -1,4 +1,6 @@
-"""Scenario files of engagements in space: keys of a second axis across, and planar files as they were."""
+"""Scenario files of engagements in space: keys of a second axis across, and planar files as they
+were.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,10 @@ from infoset.sim.storage.codec import fingerprint
 from tests.built_in import scenario_text
 from tests.sensors import linear
 
-AXIS = {"uncertainty": ("[-9.0, 9.0]", "[-0.09, 0.09]"), "dispersion": ("[-0.9, 0.9]", "[-0.08, 0.08]")}
+AXIS = {
+    "uncertainty": ("[-9.0, 9.0]", "[-0.09, 0.09]"),
+    "dispersion": ("[-0.9, 0.9]", "[-0.08, 0.08]"),
+}
 
 
 def spatial(**values: str) -> str:
@@ -44,7 +49,10 @@ def test_two_pairs_in_both_tables_make_a_scenario_spatial(space: Scenario) -> No
         planar,
         dispersion=replace(planar.dispersion, y_m=(-900.0, 900.0), vy_m_s=(-80.0, 80.0)),
         **of_model(
-            replace(planar.set_model, bounds=replace(planar.set_model.bounds, y_m=(-9e3, 9e3), vy_m_s=(-90.0, 90.0)))
+            replace(
+                planar.set_model,
+                bounds=replace(planar.set_model.bounds, y_m=(-9e3, 9e3), vy_m_s=(-90.0, 90.0)),
+            )
         ),
     )
     assert scenario_warnings(space) == []
@@ -52,13 +60,16 @@ def test_two_pairs_in_both_tables_make_a_scenario_spatial(space: Scenario) -> No
 
 
 def test_the_built_in_scenario_has_the_numbers_of_the_plane_in_both_axes() -> None:
-    planar, space = load_scenario("asteroid-1997"), load_scenario("asteroid-1997-space")
-    assert [space.set_model.bounds.axis(name) for name in ("y", "z")] == [planar.set_model.bounds] * 2
+    planar = load_scenario("asteroid-1997")
+    space = load_scenario("asteroid-1997-space")
+    assert [space.set_model.bounds.axis(name) for name in ("y", "z")] == [
+        planar.set_model.bounds
+    ] * 2
     assert [space.dispersion.axis(name) for name in ("y", "z")] == [planar.dispersion] * 2
     in_plane = replace(space.set_model, bounds=planar.set_model.bounds)
-    assert replace(space, dispersion=planar.dispersion, **of_model(in_plane), name="", description="") == replace(
-        planar, name="", description=""
-    )
+    assert replace(
+        space, dispersion=planar.dispersion, **of_model(in_plane), name="", description=""
+    ) == replace(planar, name="", description="")
 
 
 def test_every_key_of_space_is_read_and_written() -> None:
@@ -76,7 +87,10 @@ def test_every_key_of_space_is_read_and_written() -> None:
     )
     sensor = linear(scenario.angle_sensor)
     assert (sensor.error_at_nominal_range_y_rad, sensor.error_at_zero_range_y_rad) == (0.0, 0.0)
-    assert (scenario.set_model.disturbance_y_m_s2, scenario.thruster.pointing_error_rad) == (0.006, 0.01)
+    assert (scenario.set_model.disturbance_y_m_s2, scenario.thruster.pointing_error_rad) == (
+        0.006,
+        0.01,
+    )
     assert scenario.sun is not None
     assert scenario.sun.elevation_rad == pytest.approx(-0.5235987755982988)
     assert scenario.target == Target(Manoeuvre.CONSTANT, 0.001, acceleration_y_m_s2=0.002)

@@ -27,7 +27,9 @@ from infoset.sim import Record, Results, fly_one, simulate
 from infoset.sim.scenario import of_model
 
 RUNS = 12
-MEDIAN, NINETY, GUARANTEE = "circle: median of the miss", "circle: 90 % of the misses", "guaranteed miss Φ"
+MEDIAN = "circle: median of the miss"
+NINETY = "circle: 90 % of the misses"
+GUARANTEE = "guaranteed miss Φ"
 
 
 @pytest.fixture(scope="module")
@@ -43,12 +45,17 @@ def records() -> list[Record]:
 
 def drawn(axes: Axes) -> dict[str, Floats]:
     """Return the points of the lines of axes by their labels."""
-    return {str(line.get_label()): np.asarray(line.get_xydata(), dtype=np.float64) for line in axes.lines}
+    return {
+        str(line.get_label()): np.asarray(line.get_xydata(), dtype=np.float64)
+        for line in axes.lines
+    }
 
 
 def circles(axes: Axes) -> dict[str, float]:
     """Return the radii of the circles by their labels."""
-    lines = {name: points for name, points in drawn(axes).items() if name in (MEDIAN, NINETY, GUARANTEE)}
+    lines = {
+        name: points for name, points in drawn(axes).items() if name in (MEDIAN, NINETY, GUARANTEE)
+    }
     return {name: float(np.hypot(*points.T).mean()) for name, points in lines.items()}
 
 
@@ -71,7 +78,9 @@ def test_the_b_plane_shows_each_miss_and_the_circles_of_its_quantiles(results: R
 
 def test_with_several_results_of_a_run_the_worst_is_drawn(results: Results) -> None:
     middle = float(np.median(results.miss_m))
-    near = replace(results, miss_m=np.full(RUNS, middle), lateral_miss_m=0.5 * results.lateral_miss_m)
+    near = replace(
+        results, miss_m=np.full(RUNS, middle), lateral_miss_m=0.5 * results.lateral_miss_m
+    )
     worst = cloud("worst", [near, results])
     np.testing.assert_array_equal(worst.miss_m, np.maximum(results.miss_m, middle))
     worse = results.miss_m > middle
@@ -81,12 +90,17 @@ def test_with_several_results_of_a_run_the_worst_is_drawn(results: Results) -> N
 
 
 def test_ellipses_contain_their_share_of_the_runs_and_are_not_beyond_the_guaranteed_miss() -> None:
-    across = np.random.default_rng(3).normal(size=(400, 2)) @ np.array([[3.0, 1.0], [0.0, 0.5]]) + [4.0, -2.0]
+    across = np.random.default_rng(3).normal(size=(400, 2)) @ np.array([[3.0, 1.0], [0.0, 0.5]]) + [
+        4.0,
+        -2.0,
+    ]
     for level in (0.5, 0.99):
         outline = ellipse(across, level)
         assert outline is not None
         centre = across.mean(axis=0)[:, None]
-        wider = centre + (1.0 + 2e-4) * (outline - centre)  # 180 chords are up to 1.5e-4 inside, and a point is on them
+        wider = centre + (1.0 + 2e-4) * (
+            outline - centre
+        )  # 180 chords are up to 1.5e-4 inside, and a point is on them
         assert np.mean(Path(wider.T).contains_points(across)) == pytest.approx(level, abs=0.003)
         reach = float(np.hypot(*outline).max())
         assert ellipse(across, level, 0.99 * reach) is None
@@ -105,11 +119,15 @@ def test_wide_misses_have_a_panel_at_the_scale_of_the_body() -> None:
     figure = draw_b_plane([wide, wide], 100.0)
     hits = int((wide.miss_m <= 100.0).sum())
     assert 4 <= hits < 50
-    assert [axes.get_title("left").splitlines()[-1] for axes in figure.axes] == [f"hits: {hits} of 50 runs"] * 4
+    assert [axes.get_title("left").splitlines()[-1] for axes in figure.axes] == [
+        f"hits: {hits} of 50 runs"
+    ] * 4
     assert [axes.get_xlim()[1] == 200.0 for axes in figure.axes] == [False, False, True, True]
     assert "body radius, 100 m" in legend(figure)
     assert len(draw_b_plane([wide], 1500.0).axes) == 1
-    far = draw_b_plane([replace(wide, across_m=20.0 * across, miss_m=20.0 * wide.miss_m)], None).axes[0]
+    far = draw_b_plane(
+        [replace(wide, across_m=20.0 * across, miss_m=20.0 * wide.miss_m)], None
+    ).axes[0]
     assert far.get_xlabel() == "miss along y, km"
 
 
@@ -117,7 +135,9 @@ def test_sets_much_smaller_than_others_have_their_own_limits(records: list[Recor
     random, game = records
     step = int(np.abs(random.time_s - 60.0).argmin())
     figure = draw_sets(records, [float(random.time_s[step])])
-    for axes, (record, axis) in zip(figure.axes, ((random, 0), (random, 1), (game, 0), (game, 1)), strict=True):
+    for axes, (record, axis) in zip(
+        figure.axes, ((random, 0), (random, 1), (game, 0), (game, 1)), strict=True
+    ):
         outlines = [section.omega_alpha[axis].polygon() for section in record.sections[step]]
         width = 1e6 * np.ptp(np.concatenate(outlines)[:, 0])
         assert width > 0.14 * np.ptp(axes.get_xlim())
@@ -127,8 +147,11 @@ def test_process_has_a_column_for_each_record_and_axis(records: list[Record]) ->
     figure = draw_process(records)
     assert len(figure.axes) == 16
     for number, axes in enumerate(figure.axes[::8] + figure.axes[1::8]):
-        record, axis = records[number % 2], number // 2
-        np.testing.assert_allclose(drawn(axes)["true value"][:, 1], 1e3 * record.true_angle_rad[:, axis])
+        record = records[number % 2]
+        axis = number // 2
+        np.testing.assert_allclose(
+            drawn(axes)["true value"][:, 1], 1e3 * record.true_angle_rad[:, axis]
+        )
 
 
 def scheduled(record: Record) -> Record:
@@ -145,15 +168,20 @@ def test_approach_shows_possible_misses_and_the_schedule(records: list[Record]) 
     figure = draw_approach([record])
     b_plane, possible, moduli = figure.axes
     lines = drawn(possible)
-    known, centred = lines["possible miss without further impulses"], lines["after an impulse that centres the set"]
+    known = lines["possible miss without further impulses"]
+    centred = lines["after an impulse that centres the set"]
     shown = lines["miss of the true state without further impulses"]
     model = record.scenario.set_model
     near_m = model.range_threshold_m + model.closing_speed_m_s * model.step_s
-    count = 1 + next(number for number, sections in enumerate(record.sections) if sections[0].range_m < near_m)
+    count = 1 + next(
+        number for number, sections in enumerate(record.sections) if sections[0].range_m < near_m
+    )
     assert 0.8 * record.steps < count < record.steps
     intervals = record.predicted_miss_m[:count]
     np.testing.assert_allclose(known[:, 1], np.hypot(*np.abs(intervals).max(axis=2).T))
-    np.testing.assert_allclose(centred[:, 1], np.hypot(*(0.5 * np.diff(intervals, axis=2)[:, :, 0].T)))
+    np.testing.assert_allclose(
+        centred[:, 1], np.hypot(*(0.5 * np.diff(intervals, axis=2)[:, :, 0].T))
+    )
     before = record.scenario.nominal_arrival_s - record.time_s
     np.testing.assert_allclose(known[:, 0], np.maximum(before[:count], 0.25))
     np.testing.assert_allclose(shown[:, 0], np.maximum(before, 0.25))
@@ -163,9 +191,14 @@ def test_approach_shows_possible_misses_and_the_schedule(records: list[Record]) 
     assert (shown[:count, 1] < 1.001 * known[:, 1]).all()
     assert possible.get_xlim()[0] > possible.get_xlim()[1]
     # The image of the schedule that is nearest to 4 s.
-    image_times_s = record.scenario.nominal_arrival_s - model.angle_sensor.period_s * np.arange(record.steps)
+    image_times_s = record.scenario.nominal_arrival_s - model.angle_sensor.period_s * np.arange(
+        record.steps
+    )
     last_s = image_times_s[np.abs(image_times_s - 4.0).argmin()]
-    assert [text.get_text() for text in possible.texts] == ["cut-off, 10 s", f"last image, {last_s:.3g} s"]
+    assert [text.get_text() for text in possible.texts] == [
+        "cut-off, 10 s",
+        f"last image, {last_s:.3g} s",
+    ]
     assert moduli.get_xlabel() == "time to go"
     assert b_plane.get_xlim() == b_plane.get_ylim()
     assert "times of the schedule" in legend(figure)
@@ -173,7 +206,9 @@ def test_approach_shows_possible_misses_and_the_schedule(records: list[Record]) 
 
 
 @pytest.mark.parametrize("name", ["asteroid-1997", "asteroid-1997-space"])
-def test_courses_are_those_of_single_engagements(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_courses_are_those_of_single_engagements(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(sys.modules["infoset.sim.simulate"], "ENGAGEMENTS_AT_ONCE", 2)
     monkeypatch.setattr("infoset.experiments.interception.course.MAX_COURSES", 3)
     scenario = load_scenario(name)
@@ -200,13 +235,17 @@ def test_courses_of_long_flights_keep_the_max_impulses(monkeypatch: pytest.Monke
     assert len(courses.steps) <= 44
     assert set(scenario.thruster.impulses_s) <= set(courses.before_arrival_s)
     flown = simulate(scenario, 2, observe=courses.observe)
-    at = [courses.before_arrival_s.tolist().index(time_s) for time_s in scenario.thruster.impulses_s]
+    at = [
+        courses.before_arrival_s.tolist().index(time_s) for time_s in scenario.thruster.impulses_s
+    ]
     assert flown.burns_m_s is not None
     np.testing.assert_allclose(courses.impulse_m_s[:, at], flown.burns_m_s, rtol=1e-12)
     every = load_scenario("asteroid-1997-space")
     courses = Courses(every, 1)
     simulate(every, 1, observe=courses.observe)
-    assert courses.impulse_m_s.max() == pytest.approx(modulus(fly_one(every).impulse_m_s.T).max(), rel=1e-12)
+    assert courses.impulse_m_s.max() == pytest.approx(
+        modulus(fly_one(every).impulse_m_s.T).max(), rel=1e-12
+    )
 
 
 def test_the_corridor_has_quantiles_of_possible_misses_and_impulses() -> None:
@@ -224,11 +263,18 @@ def test_the_corridor_has_quantiles_of_possible_misses_and_impulses() -> None:
     np.testing.assert_array_equal(end[0], median[-1])
     assert left.get_ylim() == right.get_ylim()
     assert left.get_xlim() == left_impulse.get_xlim()
-    assert {"impulse: median", "guaranteed miss Φ", "body radius, 50 m", "times of the schedule"} <= set(legend(figure))
+    assert {
+        "impulse: median",
+        "guaranteed miss Φ",
+        "body radius, 50 m",
+        "times of the schedule",
+    } <= set(legend(figure))
     assert "impulse: 90 %" not in legend(figure)
 
 
-def test_a_long_flight_shows_the_errors_of_its_angles_within_their_bound_over_the_time_to_go() -> None:
+def test_a_long_flight_shows_the_errors_of_its_angles_within_their_bound_over_the_time_to_go() -> (
+    None
+):
     scenario = load_scenario("dart-2022", ["step_s=120", "camera.period_s=120"])
     record = fly_one(scenario)
     panels = [

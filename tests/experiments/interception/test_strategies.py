@@ -11,7 +11,12 @@ import pytest
 
 from infoset.experiments.common.errors import InputError
 from infoset.experiments.interception.scenario_file import load_scenario
-from infoset.experiments.interception.strategies import chosen_strategies, load_noise, load_strategy, own_strategy
+from infoset.experiments.interception.strategies import (
+    chosen_strategies,
+    load_noise,
+    load_strategy,
+    own_strategy,
+)
 from infoset.guidance import SymmetricMiss
 from infoset.sim import Scenario, simulate
 from tests.experiments.command_line import Command
@@ -43,7 +48,9 @@ class Half:
 
 
 @pytest.fixture(autouse=True)
-def _modules_are_put_back(infoset: Command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[None]:
+def _modules_are_put_back(
+    infoset: Command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> Iterator[None]:
     monkeypatch.setattr(sys, "path", list(sys.path))
     yield
     for name, module in list(sys.modules.items()):
@@ -92,10 +99,18 @@ def test_every_command_takes_a_strategy_of_a_file(
     }
     numbers: list[Any] = []
     for strategy in ("mine.py:Mine", "symmetric-miss"):
-        code, out, err = infoset(command, brief_file, option, strategy, *few.get(command, []), "--json", "-")
+        code, out, err = infoset(
+            command, brief_file, option, strategy, *few.get(command, []), "--json", "-"
+        )
         assert code == 0, err
         text = out.replace("mine.Mine", "symmetric-miss")
-        numbers.append({key: value for key, value in json.loads(text).items() if key not in {"elapsed_s", "strategy"}})
+        numbers.append(
+            {
+                key: value
+                for key, value in json.loads(text).items()
+                if key not in {"elapsed_s", "strategy"}
+            }
+        )
     assert numbers[0] == numbers[1]
 
 
@@ -114,11 +129,17 @@ def test_strategies_of_files_and_built_in_ones_are_compared(mine: Path, brief: S
         ("mine.py:HALF", None, 'mine.py has no class "HALF" with the methods start and decide'),
         ("typo.py:Mine", "\nclass Mine\n", "typo.py, line 2: SyntaxError: "),
         ("leaving.py:Mine", "import sys\nsys.exit(3)\n", "leaving.py, line 2: SystemExit: 3"),
-        ("needs.py:Mine", LIKE_PUBLISHED.replace("share: float = 2 * HALF", "share: float"), "TypeError"),
+        (
+            "needs.py:Mine",
+            LIKE_PUBLISHED.replace("share: float = 2 * HALF", "share: float"),
+            "TypeError",
+        ),
         ("random.py:Mine", LIKE_PUBLISHED, "random.py has the name of another Python module"),
     ],
 )
-def test_what_is_wrong_with_a_file_is_one_message(text: str, code: str | None, part: str, mine: Path) -> None:
+def test_what_is_wrong_with_a_file_is_one_message(
+    text: str, code: str | None, part: str, mine: Path
+) -> None:
     if code is not None:
         Path(text.partition(":")[0]).write_text(code)
     with pytest.raises(InputError) as refused:
@@ -130,7 +151,11 @@ def test_what_is_wrong_with_a_file_is_one_message(text: str, code: str | None, p
     ("method", "body", "message"),
     [
         ("decide", "return situation.nothing", "line 5: AttributeError"),
-        ("decide", "return [1.0, 2.0, 3.0]", "must return finite impulses (m/s) of the shape (1, 1)"),
+        (
+            "decide",
+            "return [1.0, 2.0, 3.0]",
+            "must return finite impulses (m/s) of the shape (1, 1)",
+        ),
         ("start", "raise RuntimeError('no state')", "line 3: RuntimeError: no state"),
     ],
 )
@@ -161,7 +186,11 @@ def misses(found: dict[str, Any], noise: str) -> list[Any]:
     """The misses of a noise in the JSON of a command."""
     for key, name in (("curves", "noise"), ("strategies", "noise"), ("samples", "noise")):
         if key in found:
-            return [[each.get("miss_m"), each.get("miss_m_p50")] for each in found[key] if each[name] == noise]
+            return [
+                [each.get("miss_m"), each.get("miss_m_p50")]
+                for each in found[key]
+                if each[name] == noise
+            ]
     return [found["miss_m"], found["noise"] == noise]
 
 
@@ -191,7 +220,17 @@ def test_every_command_that_draws_errors_takes_a_noise_of_a_file(
         assert again["miss_m"] == report["worst"][0]["miss_m"]
         Path("noisy.py").write_text(LIKE_RANDOM + "# changed")
         del sys.modules["noisy"]
-        resumed = ("campaign", brief_file, "--noise", "noisy.py:Uniform", "--runs", 8, "--out", "noisy", "--resume")
+        resumed = (
+            "campaign",
+            brief_file,
+            "--noise",
+            "noisy.py:Uniform",
+            "--runs",
+            8,
+            "--out",
+            "noisy",
+            "--resume",
+        )
         assert "own_noise: " in infoset(*resumed)[2]
 
 
@@ -203,13 +242,29 @@ def test_a_noise_of_a_file_can_be_pickled_and_its_mistakes_are_one_message(
     assert (simulate(brief, 2, noise=noise).miss_m == simulate(brief, 2).miss_m).all()
     code, _, err = infoset("engage", brief_file, "--noise", "noisy.py:Half")
     assert code == 2
-    assert "noise Half at step 0: angle must be an array of the shape (1, 1): got np.float64(0.0)" in err
-    assert 'no class "Full" with the method measure' in infoset.refused("engage", "--noise", "noisy.py:Full")
-    assert "did you mean gaussian?" in infoset.refused("campaign", "--noise", "gaus", "--runs", 1, "--out", "no")
+    assert (
+        "noise Half at step 0: angle must be an array of the shape (1, 1): got np.float64(0.0)"
+        in err
+    )
+    assert 'no class "Full" with the method measure' in infoset.refused(
+        "engage", "--noise", "noisy.py:Full"
+    )
+    assert "did you mean gaussian?" in infoset.refused(
+        "campaign", "--noise", "gaus", "--runs", 1, "--out", "no"
+    )
 
 
 def test_compare_shows_what_depends_on_the_noise(brief_file: Path, infoset: Command) -> None:
-    options = ("--strategies", "patient,symmetric-miss", "--runs", 10, "--noise", "all", "--set", "noise_sigma=0.5")
+    options = (
+        "--strategies",
+        "patient,symmetric-miss",
+        "--runs",
+        10,
+        "--noise",
+        "all",
+        "--set",
+        "noise_sigma=0.5",
+    )
     code, out, _ = infoset("compare", brief_file, *options)
     assert code == 0
     assert "maximum / minimum" in out

@@ -15,14 +15,23 @@ from infoset import Model
 from infoset.experiments import load_scenario
 from infoset.experiments.common.input_file import to_toml
 from infoset.experiments.interception.scenario_file import with_model
-from infoset.experiments.interception.study import SetCounts, hit_text, percent, set_counts, set_warnings
+from infoset.experiments.interception.study import (
+    SetCounts,
+    hit_text,
+    percent,
+    set_counts,
+    set_warnings,
+)
 from infoset.sim import Body, Scenario, estimate_hits, simulate
 
 pytestmark = pytest.mark.usefixtures("unrendered")
 
 Infoset = Callable[..., tuple[int, str, str]]
 KEYS = ["runs", "hits", "probability", "lower", "upper"]
-WARNING = "the quantiles include these failures of the model; for quantiles without them, use --model guaranteed"
+WARNING = (
+    "the quantiles include these failures of the model; for quantiles without them, use --model "
+    "guaranteed"
+)
 
 
 @pytest.fixture
@@ -32,16 +41,27 @@ def sized(brief: Scenario, tmp_path: Path) -> Path:
     return file
 
 
-def test_a_better_range_sensor_looks_worse_in_the_paper_and_the_study_says_why(infoset: Infoset) -> None:
-    """On commit 652bf7c nothing tells the two apart: the quantiles of the better meter are those of emptied sets."""
+def test_a_better_range_sensor_looks_worse_in_the_paper_and_the_study_says_why(
+    infoset: Infoset,
+) -> None:
+    """On commit 652bf7c nothing tells the two apart: the quantiles of the better meter are those of
+    emptied sets.
+    """
     published = load_scenario("asteroid-1997")
 
     def p99(model: Model, error: float) -> tuple[float, int]:
-        meter = replace(published.range_sensor, relative_error=error) if published.range_sensor is not None else None
-        flown = simulate(with_model(replace(published, range_sensor=meter), model), 20, guarantee=False)
+        meter = (
+            replace(published.range_sensor, relative_error=error)
+            if published.range_sensor is not None
+            else None
+        )
+        flown = simulate(
+            with_model(replace(published, range_sensor=meter), model), 20, guarantee=False
+        )
         return float(np.quantile(flown.miss_m, 0.99)), int(flown.set_emptied.sum())
 
-    good, poor = p99(Model.PAPER, 0.01), p99(Model.PAPER, 0.1)
+    good = p99(Model.PAPER, 0.01)
+    poor = p99(Model.PAPER, 0.1)
     assert good[0] > 3.0 * poor[0]
     assert good[1] == 15
     assert p99(Model.GUARANTEED, 0.01)[0] < 1.1 * p99(Model.GUARANTEED, 0.1)[0]
@@ -54,11 +74,16 @@ def test_a_better_range_sensor_looks_worse_in_the_paper_and_the_study_says_why(i
     assert WARNING in out
     code, out, _ = infoset(*asked, "default")
     assert code == 0
-    assert "true state inside the set at every step: 20 of 20 runs (100 %); set became empty: 0 of 20 runs (0 %)" in out
+    assert (
+        "true state inside the set at every step: 20 of 20 runs (100 %); set became empty: 0 "
+        "of 20 runs (0 %)"
+    ) in out
     assert "warning" not in out
 
 
-def test_the_json_of_an_experiment_has_its_hits(infoset: Infoset, sized: Path, tmp_path: Path) -> None:
+def test_the_json_of_an_experiment_has_its_hits(
+    infoset: Infoset, sized: Path, tmp_path: Path
+) -> None:
     code, out, _ = infoset("experiment", sized, "--runs", 5, "--json", "-", "--csv", "all.csv")
     assert code == 0
     with (tmp_path / "all.csv").open() as stream:
@@ -69,11 +94,15 @@ def test_the_json_of_an_experiment_has_its_hits(infoset: Infoset, sized: Path, t
         case = curve["noise"], str(curve["range_sensor"]).lower()
         assert curve["hit"] == vars(expected)
         own = [row for row in rows if (row["noise"], row["range_sensor"]) == case]
-        assert [row["hit"] == "true" for row in own] == [float(row["miss_m"]) <= 10.0 for row in own]
+        assert [row["hit"] == "true" for row in own] == [
+            float(row["miss_m"]) <= 10.0 for row in own
+        ]
 
 
 @pytest.mark.parametrize(("radius", "word"), [(1e5, "hit"), (1e-6, "missed")])
-def test_one_engagement_hits_or_misses(infoset: Infoset, sized: Path, radius: float, word: str) -> None:
+def test_one_engagement_hits_or_misses(
+    infoset: Infoset, sized: Path, radius: float, word: str
+) -> None:
     size = ("--set", f"body.radius_m={radius}", "--no-range-sensor")
     code, out, _ = infoset("engage", sized, *size, "--record", "one.npz", "--out", "out")
     assert code == 0
@@ -86,16 +115,24 @@ def test_one_engagement_hits_or_misses(infoset: Infoset, sized: Path, radius: fl
 
 
 def test_counts_of_sets() -> None:
-    kept, emptied = np.array([True, True, False, False]), np.array([False, True, False, True])
+    kept = np.array([True, True, False, False])
+    emptied = np.array([False, True, False, True])
     counts = set_counts(kept, emptied)
     assert counts == SetCounts(4, 2, 2, 3)
     assert counts + SetCounts(6, 6, 0, 0) == SetCounts(10, 8, 2, 3)
     assert set_warnings(Model.PAPER, SetCounts(5, 5, 0, 0)) == []
-    assert len(set_warnings(Model.PAPER, counts)) == len(set_warnings(Model.GUARANTEED, counts)) == 1
+    assert (
+        len(set_warnings(Model.PAPER, counts)) == len(set_warnings(Model.GUARANTEED, counts)) == 1
+    )
 
 
 def test_shares_are_not_rounded_to_certainty(brief: Scenario) -> None:
-    assert [percent(share) for share in (0.0, 0.5, 1.0, 1e-9)] == ["0 %", "50 %", "100 %", "1e-07 %"]
+    assert [percent(share) for share in (0.0, 0.5, 1.0, 1e-9)] == [
+        "0 %",
+        "50 %",
+        "100 %",
+        "1e-07 %",
+    ]
     assert percent(1.0 - 1e-6) == "99.9999 %"
     text = hit_text(estimate_hits(187, 200), replace(brief, body=Body(80.0)))
     assert text == "hit (miss at most 80 m): 187 of 200 runs (93.5 %), 95 % CI 89.14 % to 96.49 %"

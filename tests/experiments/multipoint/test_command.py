@@ -43,7 +43,11 @@ def targets(count: int, apart_s: float = 500.0) -> str:
 
 def test_three_targets(infoset: Command) -> None:
     results = found(infoset, "service-3")
-    assert (results["order_chosen"], results["times_chosen"], results["evaluations"]) == ("given", "given", 1)
+    assert (results["order_chosen"], results["times_chosen"], results["evaluations"]) == (
+        "given",
+        "given",
+        1,
+    )
     # The acceptance, N = 3.
     assert results["cost_m2_s3"] == pytest.approx(0.021142280110555873, rel=1e-9)
     assert results["order"] == ["T1", "T2", "T3"]
@@ -70,16 +74,24 @@ def test_order_and_times_override_the_file(infoset: Command, mine: Callable[[str
     assert slots["notes"] == ["no order that fits the times costs less"]
     assert slots["time_search"] is None
     assert slots["cost_m2_s3"] <= 0.0211422802
-    assert found(infoset, mine(OPTIMISED))["cost_m2_s3"] == pytest.approx(best["cost_m2_s3"], rel=1e-12)
+    assert found(infoset, mine(OPTIMISED))["cost_m2_s3"] == pytest.approx(
+        best["cost_m2_s3"], rel=1e-12
+    )
     given = found(infoset, mine(OPTIMISED), "--times", "given")
     assert given["cost_m2_s3"] == pytest.approx(0.021142280110555873, rel=1e-9)
 
 
-def test_rendezvous_prices_and_eccentric_orbits(infoset: Command, mine: Callable[[str], Path]) -> None:
+def test_rendezvous_prices_and_eccentric_orbits(
+    infoset: Command, mine: Callable[[str], Path]
+) -> None:
     met = found(infoset, "service-3", "--set", "target.3.meet=rendezvous")
     assert met["nodes"][-1]["velocity_m_s"] == met["nodes"][-1]["target_velocity_m_s"]
-    priced = found(infoset, mine(changed("latest_s = 3000.0", "price_per_s = 1e-6", TWO)), "--times", "best")
-    assert priced["cost_with_price_m2_s3"] == pytest.approx(priced["cost_m2_s3"] + 1e-6 * priced["times_s"][-1])
+    priced = found(
+        infoset, mine(changed("latest_s = 3000.0", "price_per_s = 1e-6", TWO)), "--times", "best"
+    )
+    assert priced["cost_with_price_m2_s3"] == pytest.approx(
+        priced["cost_m2_s3"] + 1e-6 * priced["times_s"][-1]
+    )
     # A nearly circular orbit is nearly the circular one, wherever the craft is on it.
     for anomaly_deg in (0, 200):
         orbit = ("--set", "eccentricity=1e-7", "--set", f"true_anomaly_deg={anomaly_deg}")
@@ -87,7 +99,9 @@ def test_rendezvous_prices_and_eccentric_orbits(infoset: Command, mine: Callable
         assert near["cost_m2_s3"] == pytest.approx(0.021142280110555873, rel=1e-4)
 
 
-def test_a_chaser_that_is_at_its_target_costs_nothing(infoset: Command, mine: Callable[[str], Path]) -> None:
+def test_a_chaser_that_is_at_its_target_costs_nothing(
+    infoset: Command, mine: Callable[[str], Path]
+) -> None:
     target = 'name = "T1"\nposition_m = [0, 0, 0]\nvelocity_m_s = [0, 0, 0]\nmeet = "rendezvous"'
     text = f"{HEAD}[[target]]\n{target}\n[times]\nlatest_s = 3000.0\n"
     assert found(infoset, mine(changed("= false", "= true", text)))["cost_m2_s3"] == 0.0
@@ -106,8 +120,12 @@ def test_the_asteroid_tour(infoset: Command, mine: Callable[[str], Path]) -> Non
     # Elements or the state they mean: the same.
     position, velocity = (part.tolist() for part in np.split(problem.tour.start_state / 1e3, 2))
     elements = TOUR[TOUR.index("[chaser.elements]") : TOUR.index("[[target]]")]
-    state = changed(elements, f"[chaser]\nposition_km = {position}\nvelocity_km_s = {velocity}\n", TOUR)
-    assert found(infoset, mine(state))["cost_m2_s3"] == pytest.approx(results["cost_m2_s3"], rel=1e-9)
+    state = changed(
+        elements, f"[chaser]\nposition_km = {position}\nvelocity_km_s = {velocity}\n", TOUR
+    )
+    assert found(infoset, mine(state))["cost_m2_s3"] == pytest.approx(
+        results["cost_m2_s3"], rel=1e-9
+    )
 
 
 def test_five_targets_as_listed(infoset: Command) -> None:
@@ -115,7 +133,9 @@ def test_five_targets_as_listed(infoset: Command) -> None:
     assert results["times_chosen"] == "best"
     leave = [each["leave_s"] for each in results["nodes"]]
     assert leave[2] == pytest.approx(results["times_s"][2] + 300.0)
-    assert (np.array(results["times_s"]) - np.array([0.0, *leave[:-1]]) >= 600.0 * (1.0 - 1e-9)).all()
+    assert (
+        np.array(results["times_s"]) - np.array([0.0, *leave[:-1]]) >= 600.0 * (1.0 - 1e-9)
+    ).all()
     gradient = results["time_gradient_m2_s4"]
     assert max(abs(each) for each in gradient[:-1]) < 1e-6 * abs(gradient[-1])
 
@@ -147,7 +167,11 @@ min_gap_s = 1514.3
 
 @pytest.mark.parametrize(
     ("latest_s", "is_coarse"),
-    [(31000.0, False), (151431.23337079378, False), pytest.param(2.0e6, True, marks=pytest.mark.thorough)],
+    [
+        (31000.0, False),
+        (151431.23337079378, False),
+        pytest.param(2.0e6, True, marks=pytest.mark.thorough),
+    ],
 )
 def test_search_of_best_times_says_how_fine_its_grid_is(
     infoset: Command, mine: Callable[[str], Path], latest_s: float, is_coarse: bool
@@ -165,8 +189,8 @@ def test_search_of_best_times_says_how_fine_its_grid_is(
     assert grid["per_revolution"] == pytest.approx(grid["times"] / revolutions, rel=1e-12)
     assert (grid["per_revolution"] < 20.0) == is_coarse
     words = (
-        f"found by {search['followed']} descents from the best of {search['starts']} starting points on a grid of "
-        f"{grid['times']} times, {grid['per_revolution']:.2g} a revolution"
+        f"found by {search['followed']} descents from the best of {search['starts']} starting "
+        f"points on a grid of {grid['times']} times, {grid['per_revolution']:.2g} a revolution"
     )
     page = file.with_suffix(".html").read_text()
     for text in (" ".join(screen.split()), " ".join(results["notes"]), page):
@@ -182,14 +206,22 @@ def test_best_order_is_compared_on_a_grid(infoset: Command, mine: Callable[[str]
     assert results["order"] == ["A", "B"]
     search = results["order_search"]
     assert search["orders_searched_again"] == 2
-    assert f"all orders were compared on a grid of {search['grid']['times']} times" in results["notes"][0]
+    assert (
+        f"all orders were compared on a grid of {search['grid']['times']} times"
+        in results["notes"][0]
+    )
 
 
 @pytest.mark.thorough
-def test_best_times_under_gravity_over_several_revolutions_are_said_to_be_uncertain(infoset: Command) -> None:
+def test_best_times_under_gravity_over_several_revolutions_are_said_to_be_uncertain(
+    infoset: Command,
+) -> None:
     results = found(infoset, "asteroid-tour", "--times", "best")
     assert results["time_search"]["grid"] is None
-    assert "revolutions there are many local minima, and others are often lower" in results["notes"][-1]
+    assert (
+        "revolutions there are many local minima, and others are often lower"
+        in results["notes"][-1]
+    )
 
 
 def test_given_times_are_not_searched(infoset: Command) -> None:
@@ -203,7 +235,9 @@ CIRCLE_KM_S = 6.3134811459289
 
 
 def published(chaser: str) -> str:
-    """A rendezvous with a station on a circle of 10 000 km after a radian, the gravity that of the Earth."""
+    """A rendezvous with a station on a circle of 10 000 km after a radian, the gravity that of the
+    Earth.
+    """
     station = f"position_km = [10000.0, 0.0, 0.0]\nvelocity_km_s = [0.0, {CIRCLE_KM_S}, 0.0]\n"
     return (
         'kind = "multipoint"\nname = "published"\ngravitational_parameter_km3_s2 = 398600.4418\n'
@@ -212,8 +246,8 @@ def published(chaser: str) -> str:
 
 
 def test_a_chaser_on_a_hyperbola(infoset: Command, mine: Callable[[str], Path]) -> None:
-    # The published relative state 0.2, 0.2, 0.1, 0.1 was refused as no ellipse; its cost, with mu = 1, is that of
-    # tests/rendezvous/multipoint/test_kepler.py.
+    # The published relative state 0.2, 0.2, 0.1, 0.1 was refused as no ellipse; its cost, with mu =
+    # 1, is that of tests/rendezvous/multipoint/test_kepler.py.
     hyperbola = CHASER.format(-0.1 * CIRCLE_KM_S, 1.3 * CIRCLE_KM_S)
     unit_m2_s3 = (CIRCLE_KM_S * 1e3) ** 2 / (1e7 / (CIRCLE_KM_S * 1e3))
     start = np.array([1.2, 0.2, 0.0, -0.1, 1.3, 0.0])
@@ -230,8 +264,14 @@ def test_a_chaser_on_a_hyperbola(infoset: Command, mine: Callable[[str], Path]) 
     ("chaser", "message"),
     [
         (CHASER.format(-7.0, 0.0), "chaser: the orbit meets the planet during the flight"),
-        (CHASER.format(7.0, 0.0) + "epoch_s = 4000.0\n", "chaser: the orbit meets the planet during the flight"),
-        ("[chaser]\nposition_km = [0, 0, 0]\nvelocity_km_s = [1, 0, 0]\n", "chaser: the position is the centre"),
+        (
+            CHASER.format(7.0, 0.0) + "epoch_s = 4000.0\n",
+            "chaser: the orbit meets the planet during the flight",
+        ),
+        (
+            "[chaser]\nposition_km = [0, 0, 0]\nvelocity_km_s = [1, 0, 0]\n",
+            "chaser: the position is the centre",
+        ),
     ],
 )
 def test_a_body_that_meets_the_planet_is_refused(
@@ -240,7 +280,9 @@ def test_a_body_that_meets_the_planet_is_refused(
     assert message in infoset.refused("multipoint", mine(published(chaser)))
 
 
-def test_a_planet_that_is_met_after_the_flight_does_not_matter(infoset: Command, mine: Callable[[str], Path]) -> None:
+def test_a_planet_that_is_met_after_the_flight_does_not_matter(
+    infoset: Command, mine: Callable[[str], Path]
+) -> None:
     # Falls on the planet after 45 minutes.
     assert found(infoset, mine(published(CHASER.format(0.0, 2.0))))["cost_m2_s3"] > 0.0
 
@@ -248,19 +290,48 @@ def test_a_planet_that_is_met_after_the_flight_does_not_matter(infoset: Command,
 @pytest.mark.parametrize(
     ("text", "options", "told"),
     [
-        (changed("2600.0", "1200.0"), [], "times must increase: visit 2 is at 1200 s, not after 1200 s"),
+        (
+            changed("2600.0", "1200.0"),
+            [],
+            "times must increase: visit 2 is at 1200 s, not after 1200 s",
+        ),
         (changed("time_s = 2600.0\n", ""), [], "--times given: needs time_s of every target"),
-        (OPTIMISED.replace("time_s = 2600.0\n", ""), ["--times", "given"], "--times given: needs time_s"),
-        (changed("4000.0", "1e9"), [], "the last of time_s and latest_s is 1.13e+06 radians of the orbit"),
-        (changed(ORBIT, f"{ORBIT}\ngravitational_parameter_m3_s2 = 4e14"), [], "is needed, not both"),
-        (OPTIMISED.replace("latest_s = 4000.0", "latest_s = 1000.0\nmin_gap_s = 400.0"), [], "3 visits do not fit"),
-        (targets(120), ["--order", "best"], "--order best: takes at most 9 targets, and service-3 has 120"),
+        (
+            OPTIMISED.replace("time_s = 2600.0\n", ""),
+            ["--times", "given"],
+            "--times given: needs time_s",
+        ),
+        (
+            changed("4000.0", "1e9"),
+            [],
+            "the last of time_s and latest_s is 1.13e+06 radians of the orbit",
+        ),
+        (
+            changed(ORBIT, f"{ORBIT}\ngravitational_parameter_m3_s2 = 4e14"),
+            [],
+            "is needed, not both",
+        ),
+        (
+            OPTIMISED.replace("latest_s = 4000.0", "latest_s = 1000.0\nmin_gap_s = 400.0"),
+            [],
+            "3 visits do not fit",
+        ),
+        (
+            targets(120),
+            ["--order", "best"],
+            "--order best: takes at most 9 targets, and service-3 has 120",
+        ),
         (changed('meet = "flyby"', "dwell_s = 5.0"), [], "target 'T1': a flyby cannot dwell"),
         (changed("132712440018.0", "1e-50", TOUR), [], "no trajectory was found"),
     ],
 )
 def test_unsound_problems_are_refused(
-    text: str, options: list[str], told: str, infoset: Command, mine: Callable[[str], Path], tmp_path: Path
+    text: str,
+    options: list[str],
+    told: str,
+    infoset: Command,
+    mine: Callable[[str], Path],
+    tmp_path: Path,
 ) -> None:
     assert told in infoset.refused("multipoint", mine(text), *options, "--out", tmp_path / "out")
     assert [each.name for each in tmp_path.iterdir()] == ["mine.toml"]
@@ -268,7 +339,9 @@ def test_unsound_problems_are_refused(
 
 def test_bound_above_the_peak_changes_nothing(infoset: Command) -> None:
     without = found(infoset, "service-3")
-    bounded = found(infoset, "service-3", "--set", f"max_control_m_s2={without['peak_control_m_s2'] * 1.0001}")
+    bounded = found(
+        infoset, "service-3", "--set", f"max_control_m_s2={without['peak_control_m_s2'] * 1.0001}"
+    )
     assert bounded | {"problem_hash": ""} == without | {"problem_hash": ""}
     assert bounded["imposed_bound"] is None
 
@@ -276,7 +349,9 @@ def test_bound_above_the_peak_changes_nothing(infoset: Command) -> None:
 def test_bound_below_the_peak_is_imposed(infoset: Command) -> None:
     without = found(infoset, "service-3")
     bounded = found(infoset, "service-3", "--set", "max_control_m_s2=0.005")
-    _, screen, _ = infoset("multipoint", "service-3", "--set", "max_control_m_s2=0.005", "--html", "page.html")
+    _, screen, _ = infoset(
+        "multipoint", "service-3", "--set", "max_control_m_s2=0.005", "--html", "page.html"
+    )
 
     assert bounded["peak_control_m_s2"] == pytest.approx(0.005, rel=1e-9)
     assert bounded["cost_m2_s3"] > without["cost_m2_s3"]
@@ -285,7 +360,9 @@ def test_bound_below_the_peak_is_imposed(infoset: Command) -> None:
     assert imposed["peak_control_without_m_s2"] == without["peak_control_m_s2"]
     assert imposed["smallest_possible_m_s2"] < 0.005
     (note,) = bounded["notes"]
-    assert note.startswith("the bound of 0.005 m/s^2 is imposed: without it the cost is 0.02114228 m^2/s^3")
+    assert note.startswith(
+        "the bound of 0.005 m/s^2 is imposed: without it the cost is 0.02114228 m^2/s^3"
+    )
     assert note in " ".join(screen.split())
     assert "0.005 m/s^2 is imposed" in Path("page.html").read_text()
 
@@ -308,7 +385,9 @@ def test_bound_below_the_smallest_possible_one_is_refused(infoset: Command) -> N
     least = float(err.split("at least ")[1].split(" m/s^2")[0])
     just_above = found(infoset, "service-3", "--set", f"max_control_m_s2={1.001 * least}")
     assert just_above["peak_control_m_s2"] == pytest.approx(1.001 * least, rel=1e-9)
-    close = infoset.refused("multipoint", "service-3", "--set", f"max_control_m_s2={least * (1.0 + 1e-9)}")
+    close = infoset.refused(
+        "multipoint", "service-3", "--set", f"max_control_m_s2={least * (1.0 + 1e-9)}"
+    )
     assert "m/s^2" in close
     assert f"{least:.6g}" in close
 
@@ -316,13 +395,22 @@ def test_bound_below_the_smallest_possible_one_is_refused(infoset: Command) -> N
 def test_bound_under_the_gravity_of_one_point_is_only_checked(infoset: Command) -> None:
     peak = found(infoset, "asteroid-tour")["peak_control_m_s2"]
     err = infoset.refused("multipoint", "asteroid-tour", "--set", "max_control_m_s2=0.0001")
-    assert f"reaches {peak:.6g} m/s^2, {peak / 0.0001 - 1.0:.2%} over the bound of 0.0001 m/s^2" in err
+    assert (
+        f"reaches {peak:.6g} m/s^2, {peak / 0.0001 - 1.0:.2%} over the bound of 0.0001 m/s^2" in err
+    )
     assert "the bound is checked but not imposed" in err
-    assert infoset("multipoint", "asteroid-tour", "--set", f"max_control_m_s2={peak * 1.0001}", "-q")[0] == 0
+    assert (
+        infoset("multipoint", "asteroid-tour", "--set", f"max_control_m_s2={peak * 1.0001}", "-q")[
+            0
+        ]
+        == 0
+    )
 
 
 def test_stays_that_fit_no_order(infoset: Command) -> None:
-    stays = [f"target.{i}.{key}" for i in range(1, 6) for key in ("meet=rendezvous", "dwell_s=4000")]
+    stays = [
+        f"target.{i}.{key}" for i in range(1, 6) for key in ("meet=rendezvous", "dwell_s=4000")
+    ]
     options = [part for setting in (*stays, "times.latest_s=99000") for part in ("--set", setting)]
     assert "no order fits" in infoset.refused(
         "multipoint", "service-5", *options, "--order", "best", "--times", "given"

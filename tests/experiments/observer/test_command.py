@@ -1,4 +1,6 @@
-"""`infoset observe`: published numbers, files, data of CSV files, simulations and contradictions."""
+"""`infoset observe`: published numbers, files, data of CSV files, simulations and
+contradictions.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,9 @@ from infoset.experiments.observer.command import Errors
 from infoset.experiments.observer.data import simulate
 from tests.experiments.command_line import Command, strict
 
-PUBLISHED = json.loads((Path(__file__).parents[2] / "data" / "observer" / "alamo-2005.json").read_text())
+PUBLISHED = json.loads(
+    (Path(__file__).parents[2] / "data" / "observer" / "alamo-2005.json").read_text()
+)
 FOUR_STATES = """kind = "observer"
 name = "four"
 [system]
@@ -38,11 +42,18 @@ steps = 10
 def test_the_published_example_has_the_exact_bounds(infoset: Command) -> None:
     results = infoset.json("observe", "observer-2005")
     assert [step["k"] for step in results["steps"]] == list(range(20))
-    for step, hull in zip(results["steps"], PUBLISHED["exact_rational"]["hull_of_each_step"], strict=True):
+    for step, hull in zip(
+        results["steps"], PUBLISHED["exact_rational"]["hull_of_each_step"], strict=True
+    ):
         assert step["empty"] is False
         np.testing.assert_allclose([step["lower"], step["upper"]], hull, rtol=0.0, atol=1e-12)
-    assert [len(step["vertices"]) for step in results["steps"]] == PUBLISHED["exact_rational"]["counts"]
-    assert results["final"] == {"lower": results["steps"][-1]["lower"], "upper": results["steps"][-1]["upper"]}
+    assert [len(step["vertices"]) for step in results["steps"]] == PUBLISHED["exact_rational"][
+        "counts"
+    ]
+    assert results["final"] == {
+        "lower": results["steps"][-1]["lower"],
+        "upper": results["steps"][-1]["upper"],
+    }
     assert results["inconsistency"] is None
     assert results["excess_widths"] is None
 
@@ -57,7 +68,9 @@ def test_bounds_of_a_simulation(infoset: Command) -> None:
     for row, step in zip(rows, results["steps"], strict=True):
         assert float(row["x2_lower"]) == step["lower"][1]
         assert float(row["x1_smoothed_upper"]) == step["smoothed"]["upper"][0]
-        assert step["lower"][0] <= step["smoothed"]["lower"][0] <= step["state"][0] <= step["upper"][0]
+        assert (
+            step["lower"][0] <= step["smoothed"]["lower"][0] <= step["state"][0] <= step["upper"][0]
+        )
 
 
 def test_a_csv_file_gives_the_same_as_the_problem_file(infoset: Command) -> None:
@@ -87,9 +100,14 @@ def test_wrong_data_are_refused(content: bytes, told: str, infoset: Command) -> 
 @pytest.mark.parametrize("separator", [",", ";", "\t"])
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
 @pytest.mark.parametrize("newline", ["\n", "\r\n"])
-def test_files_of_spreadsheets_give_the_same(separator: str, encoding: str, newline: str, infoset: Command) -> None:
+def test_files_of_spreadsheets_give_the_same(
+    separator: str, encoding: str, newline: str, infoset: Command
+) -> None:
     rows = [["note", "y1", "u1"], ["a, b", "0.0", "1.0"], ["", "", "0.5"], ["", "12.0", "0"]]
-    text = newline.join(separator.join(cell if separator not in cell else f'"{cell}"' for cell in row) for row in rows)
+    text = newline.join(
+        separator.join(cell if separator not in cell else f'"{cell}"' for cell in row)
+        for row in rows
+    )
     Path("data.csv").write_bytes(f"{text}{newline}".encode(encoding))
     Path("plain.csv").write_text("y1,u1\n0.0,1.0\n,0.5\n12.0,0\n")
     steps = infoset.json("observe", "vehicle", "--data", "data.csv")["steps"]
@@ -112,7 +130,10 @@ def test_an_empty_cell_is_a_missing_measurement(infoset: Command) -> None:
     results = infoset.json("observe", "vehicle", "--data", "data.csv")
     Path("other.csv").write_text("thrust,time_s,range_m\n1,0,0\n0.5,0.5,NaN\n0,1,12\n")
     columns = "--columns", "y1=range_m,u1=thrust"
-    assert infoset.json("observe", "vehicle", "--data", "other.csv", *columns)["steps"] == results["steps"]
+    assert (
+        infoset.json("observe", "vehicle", "--data", "other.csv", *columns)["steps"]
+        == results["steps"]
+    )
     told = infoset.refused("observe", "vehicle", "--data", "other.csv", "--columns", "y2=range_m")
     assert '--columns: "y2=range_m": must be NAME=COLUMN with a name of y1, u1' in told
     first, second, third = results["steps"]
@@ -138,10 +159,19 @@ def changed(old: str, new: str, name: str = "vehicle") -> str:
         ("system.A=[[1, 2, 3], [3, 4, 5]]", "state_matrix must have the shape (3, 3): got (2, 3)"),
         ("system.c=[1]", "offset must have the shape (2,)"),
         ("noise.half_width=[3, 1]", "noise must"),
-        ("initial.center=[0, 0]", "initial: must have lower and upper, or center and generators, or vertices"),
+        (
+            "initial.center=[0, 0]",
+            "initial: must have lower and upper, or center and generators, or vertices",
+        ),
         ("initial.lower=[11, 0]", "initial: the box is reversed"),
-        ("measurements.y=[[1, 2], []]", "measurements.y must be an array, its rows of equal length"),
-        ("simulation.missing=[3, -1]", "simulation.missing: number 2 must be at least 0, found [3, -1]"),
+        (
+            "measurements.y=[[1, 2], []]",
+            "measurements.y must be an array, its rows of equal length",
+        ),
+        (
+            "simulation.missing=[3, -1]",
+            "simulation.missing: number 2 must be at least 0, found [3, -1]",
+        ),
     ],
 )
 def test_wrong_problems_are_refused(setting: str, told: str, infoset: Command) -> None:
@@ -154,7 +184,10 @@ def test_a_contradiction_is_reported(infoset: Command) -> None:
     Path("odd.toml").write_text(changed("[-0.1292621672249405]", "[-1.5]", "observer-2005"))
     code, out, _ = infoset("observe", "odd.toml", "--out", "o", "--html", "page.html", "--smooth")
     assert code == 0
-    assert "the measurements contradict the model at step 10: no state is possible; the bound of output 1" in out
+    assert (
+        "the measurements contradict the model at step 10: no state is possible; the bound of "
+        "output 1"
+    ) in out
     results = strict(Path("o/results.json").read_text())
     assert [step["empty"] for step in results["steps"]] == [False] * 10 + [True] * 10
     assert results["final"] == {"lower": None, "upper": None}
@@ -162,7 +195,11 @@ def test_a_contradiction_is_reported(infoset: Command) -> None:
     assert '"empty_from":10' in Path("page.html").read_text(encoding="utf-8")
     # With the bound enlarged by the excess a state is possible.
     width = 0.2 + results["inconsistency"]["excess"]
-    alone = Path("odd.toml").read_text().replace("half_width = [0.2]", f"half_width = [{width + 1e-9!r}]")
+    alone = (
+        Path("odd.toml")
+        .read_text()
+        .replace("half_width = [0.2]", f"half_width = [{width + 1e-9!r}]")
+    )
     Path("wide.toml").write_text(alone)
     assert infoset.json("observe", "wide.toml")["steps"][10]["empty"] is False
 
@@ -185,7 +222,10 @@ def test_a_set_may_be_given_by_its_vertices(infoset: Command) -> None:
     corners = "vertices = [[-10.0, 0.0], [10.0, 0.0], [10.0, 20.0], [-10.0, 20.0]]"
     Path("mine.toml").write_text(changed("lower = [-10.0, 0.0]\nupper = [10.0, 20.0]", corners))
     Path("data.csv").write_text("y1,u1\n0.0,1.0\n1.0,0.0\n")
-    one, other = (infoset.json("observe", name, "--data", "data.csv")["final"] for name in ("mine.toml", "vehicle"))
+    one, other = (
+        infoset.json("observe", name, "--data", "data.csv")["final"]
+        for name in ("mine.toml", "vehicle")
+    )
     np.testing.assert_allclose(one["lower"] + one["upper"], other["lower"] + other["upper"])
     for errors in Errors:
         states = simulate(load_problem("mine.toml"), errors, 1).states
@@ -246,12 +286,16 @@ def test_eight_states_have_bounds_figures_and_a_page(infoset: Command) -> None:
 
 @pytest.mark.parametrize("states", [2, 3])
 @pytest.mark.parametrize("data", ["simulated", "measured"])
-def test_unstable_systems_are_refused_before_numbers_overflow(infoset: Command, data: str, states: int) -> None:
+def test_unstable_systems_are_refused_before_numbers_overflow(
+    infoset: Command, data: str, states: int
+) -> None:
     ones = [1.0] * states
     Path("big.toml").write_text(
         f'kind = "observer"\n[system]\nA = {[[1e15] * states] * states}\nC = {[ones]}\n'
         f"[initial]\nlower = {[0.5] * states}\nupper = {ones}\n[noise]\nhalf_width = [0.2]\n"
     )
     Path("data.csv").write_text("y1\n" + '""\n' * 30)
-    err = infoset.refused("observe", "big.toml", *(["--data", "data.csv"] if data == "measured" else []))
+    err = infoset.refused(
+        "observe", "big.toml", *(["--data", "data.csv"] if data == "measured" else [])
+    )
     assert "a state is larger than 1e+40; the system is unstable" in err

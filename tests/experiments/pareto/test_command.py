@@ -23,23 +23,49 @@ def test_the_published_example(infoset: Command) -> None:
     code, out, _ = infoset("pareto", "--prefer", "x_m=0,z_m=50", "--json", "x.json")
     assert code == 0
     results = strict(Path("x.json").read_text())
-    meeting = [-40.25672153628559, 0.0, 36.755682761552535, 0.0, 0.0, 0.0]  # of the acceptance, w = 0.001176
+    meeting = [
+        -40.25672153628559,
+        0.0,
+        36.755682761552535,
+        0.0,
+        0.0,
+        0.0,
+    ]  # of the acceptance, w = 0.001176
     assert results["meeting"] == pytest.approx(dict(zip(STATE, meeting, strict=True)), rel=1e-9)
     assert [each["name"] for each in results["craft"]] == ["first", "second", "third"]
-    excess = [each["cost_squared_m2_s3"] - each["ideal_cost_squared_m2_s3"] for each in results["craft"]]
+    excess = [
+        each["cost_squared_m2_s3"] - each["ideal_cost_squared_m2_s3"] for each in results["craft"]
+    ]
     assert [each["excess_m2_s3"] for each in results["craft"]] == pytest.approx(excess, rel=1e-12)
     assert results["group_loss_m2_s3"] == pytest.approx(18.58690436675526, rel=1e-9)
-    assert results["coalitions"]["first+third"]["excess_m2_s3"] == pytest.approx(10.45954394, rel=1e-9)
+    assert results["coalitions"]["first+third"]["excess_m2_s3"] == pytest.approx(
+        10.45954394, rel=1e-9
+    )
     assert results["core"]["verdict"] == "empty"
-    assert set(results["selections"]) == {"min_group_loss", "min_sum_of_costs", "minimax_excess", "preferred"}
+    assert set(results["selections"]) == {
+        "min_group_loss",
+        "min_sum_of_costs",
+        "minimax_excess",
+        "preferred",
+    }
     assert len(results["sweep"]["group_loss_m2_s3"]) == len(results["sweep"]["meeting_time_s"])
-    for piece in ("group loss", "18.6", "Shapley value", "the core is empty: each craft alone has zero", "preferred"):
+    for piece in (
+        "group loss",
+        "18.6",
+        "Shapley value",
+        "the core is empty: each craft alone has zero",
+        "preferred",
+    ):
         assert piece in out
 
 
-def test_an_intercept_and_craft_that_start_later(infoset: Command, mine: Callable[[str], Path]) -> None:
+def test_an_intercept_and_craft_that_start_later(
+    infoset: Command, mine: Callable[[str], Path]
+) -> None:
     text = changed('free = ["x", "z"] ', 'free = ["x", "y", "z"]\nmeet = "intercept"\n#')
-    file = mine(changed("weight = 1.0", "weight = 2.0\nstart_s = 5.0", text.replace("y_m = 0.0\n", "", 1)))
+    file = mine(
+        changed("weight = 1.0", "weight = 2.0\nstart_s = 5.0", text.replace("y_m = 0.0\n", "", 1))
+    )
     code, out, _ = infoset("pareto", file, "--json", "x.json", "--csv", "-")
     assert code == 0
     results = strict(Path("x.json").read_text())
@@ -63,7 +89,15 @@ def test_bound_above_the_peaks_changes_nothing(infoset: Command) -> None:
 def test_bound_below_a_peak_is_imposed(infoset: Command) -> None:
     without = infoset.json("pareto", "-q")
     code, screen, _ = infoset(
-        "pareto", "--set", "max_control_m_s2=1.1", "--json", "x.json", "--csv", "x.csv", "--html", "x.html"
+        "pareto",
+        "--set",
+        "max_control_m_s2=1.1",
+        "--json",
+        "x.json",
+        "--csv",
+        "x.csv",
+        "--html",
+        "x.html",
     )
     assert code == 0
     bounded = strict(Path("x.json").read_text())
@@ -92,7 +126,10 @@ def test_bound_below_a_peak_is_imposed(infoset: Command) -> None:
 
 def test_bound_that_no_meeting_keeps_is_refused_with_the_smallest_one(infoset: Command) -> None:
     err = infoset.refused("pareto", "--set", "max_control_m_s2=0.5")
-    assert "no meeting is possible with controls of at most 0.5 m/s^2; second and third need at least" in err
+    assert (
+        "no meeting is possible with controls of at most 0.5 m/s^2; second and third need at least"
+        in err
+    )
     minimum = float(err.split("at least ")[1].split(" m/s^2")[0])
     assert f"{minimum / 0.5:.4g} times the bound" in err
     # Just over what is said, it is possible; at it, the reason is the same.
@@ -102,7 +139,15 @@ def test_bound_that_no_meeting_keeps_is_refused_with_the_smallest_one(infoset: C
 
 
 @pytest.mark.parametrize(
-    "preferred", ["x_m=0", "x_m=0,z_m=1,y_m=2", "x_m=0,x_m=1", "x_m=0,z_m=far", "x_m=0,z_m=nan", "x_m=0,z_m=1e300"]
+    "preferred",
+    [
+        "x_m=0",
+        "x_m=0,z_m=1,y_m=2",
+        "x_m=0,x_m=1",
+        "x_m=0,z_m=far",
+        "x_m=0,z_m=nan",
+        "x_m=0,z_m=1e300",
+    ],
 )
 def test_a_preferred_meeting_that_is_none(infoset: Command, preferred: str) -> None:
     err = infoset.refused("pareto", "--prefer", preferred)
@@ -118,16 +163,27 @@ def test_a_preferred_meeting_of_craft_that_start_apart(infoset: Command) -> None
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        (changed("duration_s = 30.0", "duration_s = 1e9"), "duration_s is 1.18e+06 radians of the orbit"),
+        (
+            changed("duration_s = 30.0", "duration_s = 1e9"),
+            "duration_s is 1.18e+06 radians of the orbit",
+        ),
         (
             changed('free = ["x", "z"]', 'free = ["x", "x"]'),
             "name one or more free components",
         ),
         (changed('free = ["x", "z"]', 'free = ["vy"]\nmeet = "intercept"'), "free only x, y and z"),
-        (EXAMPLE.replace("weight = 1.0", "").replace("velocity_m_s", "weight = 0\nvelocity_m_s"), "weights are zero"),
-        (changed("weight = 1.0", "start_s = 30.0"), "craft 'first': it must start before the meeting at 30.0 s"),
+        (
+            EXAMPLE.replace("weight = 1.0", "").replace("velocity_m_s", "weight = 0\nvelocity_m_s"),
+            "weights are zero",
+        ),
+        (
+            changed("weight = 1.0", "start_s = 30.0"),
+            "craft 'first': it must start before the meeting at 30.0 s",
+        ),
     ],
 )
-def test_unsound_files_are_refused(text: str, told: str, infoset: Command, mine: Callable[[str], Path]) -> None:
+def test_unsound_files_are_refused(
+    text: str, told: str, infoset: Command, mine: Callable[[str], Path]
+) -> None:
     assert told in infoset.refused("pareto", mine(text), "--json", "x.json")
     assert not Path("x.json").exists()

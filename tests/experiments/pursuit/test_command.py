@@ -17,10 +17,13 @@ SMALL_MAP = ["--x", "phase_deg=-9:-6:4", "--y", "evader.thrust_N=10:20:2"]
 def test_the_slides_case_as_json(infoset: Command) -> None:
     found = infoset.json("pursuit", "geo-pursuit")
     assert found["verdict"] == "captured"
-    capture, certificate = found["capture"], found["certificate"]
+    capture = found["capture"]
+    certificate = found["certificate"]
     assert capture["time_s"] == pytest.approx(45343.620266, rel=1e-8)
     assert (certificate["saddle_point"], certificate["failures"]) == (True, [])
-    assert {each["name"] for each in certificate["evader_deviations"]} == {each.value for each in Policy}
+    assert {each["name"] for each in certificate["evader_deviations"]} == {
+        each.value for each in Policy
+    }
 
 
 def test_a_capture_is_at_the_capture_radius(infoset: Command) -> None:
@@ -36,7 +39,9 @@ def test_a_capture_is_at_the_capture_radius(infoset: Command) -> None:
         ((), "the other directions at the capture were not compared (add --certify)"),
     ],
 )
-def test_a_certificate_says_what_it_leaves_open(options: tuple[str, ...], undecided: str, infoset: Command) -> None:
+def test_a_certificate_says_what_it_leaves_open(
+    options: tuple[str, ...], undecided: str, infoset: Command
+) -> None:
     code, out, _ = infoset("pursuit", "geo-pursuit", *options)
     assert code == 0
     assert "all checks hold" not in out
@@ -46,16 +51,31 @@ def test_a_certificate_says_what_it_leaves_open(options: tuple[str, ...], undeci
 @pytest.mark.parametrize(
     ("settings", "verdict", "said"),
     [
-        pytest.param(["gravity.parameter_km3_s2=1e14"], "branch-not-certified", "", marks=pytest.mark.thorough),
+        pytest.param(
+            ["gravity.parameter_km3_s2=1e14"],
+            "branch-not-certified",
+            "",
+            marks=pytest.mark.thorough,
+        ),
         (["pursuer.thrust_N=1e9"], "propellant-exhausted", ""),
         (["pursuer.mass_kg=1e-9", "pursuer.dry_mass_kg=0"], "branch-not-certified", ""),
         (["longest_s=1e-9"], "branch-not-certified", ""),
-        (["evader.thrust_N=20"], "escapes", "escapes: no capture until the pursuer has no propellant"),
+        (
+            ["evader.thrust_N=20"],
+            "escapes",
+            "escapes: no capture until the pursuer has no propellant",
+        ),
         (["evader.thrust_N=25"], "propellant-exhausted", "the evader has no propellant after"),
-        (["pursuer.dry_mass_kg=1900"], "propellant-exhausted", "the pursuer has no propellant after"),
+        (
+            ["pursuer.dry_mass_kg=1900"],
+            "propellant-exhausted",
+            "the pursuer has no propellant after",
+        ),
     ],
 )
-def test_verdicts_without_a_capture(settings: list[str], verdict: str, said: str, infoset: Command) -> None:
+def test_verdicts_without_a_capture(
+    settings: list[str], verdict: str, said: str, infoset: Command
+) -> None:
     options = [part for setting in settings for part in ("--set", setting)]
     code, out, err = infoset("pursuit", *options, "--feedback", "coast", "--csv", "x.csv")
     assert code == 0
@@ -63,13 +83,19 @@ def test_verdicts_without_a_capture(settings: list[str], verdict: str, said: str
     assert said in out
     assert "no feedback" in err
     assert len(Path("x.csv").read_text().splitlines()) == 1
-    assert "there is no trajectory to show" in infoset.refused("pursuit", *options, "--html", "page.html")
+    assert "there is no trajectory to show" in infoset.refused(
+        "pursuit", *options, "--html", "page.html"
+    )
     found = infoset.json("pursuit", *options)
     assert (found["verdict"], found["capture"], found["certificate"]) == (verdict, None, None)
 
 
-def test_a_game_that_takes_too_long_to_follow_is_bounded(infoset: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("infoset.rendezvous.pursuit_evasion.solver.follow", partial(follow, max_work=10.0))
+def test_a_game_that_takes_too_long_to_follow_is_bounded(
+    infoset: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        "infoset.rendezvous.pursuit_evasion.solver.follow", partial(follow, max_work=10.0)
+    )
     code, out, _ = infoset("pursuit")
     assert code == 0
     assert "branch-not-certified: the extremals are a saddle up to a duration of" in out
@@ -87,7 +113,10 @@ def test_feedback(infoset: Command) -> None:
     flights = infoset.json("pursuit", "--feedback", "random", *noise)["feedback"]["flights"]
     assert flights[0]["time_s"] != flights[1]["time_s"]
     noise = (*noise[:-3], 1, *noise[-2:])  # one run is the first of two
-    assert infoset.json("pursuit", "--feedback", "random", *noise)["feedback"]["flights"] == flights[:1]
+    assert (
+        infoset.json("pursuit", "--feedback", "random", *noise)["feedback"]["flights"]
+        == flights[:1]
+    )
 
 
 def test_a_map(infoset: Command) -> None:
@@ -108,7 +137,9 @@ def test_a_map(infoset: Command) -> None:
 
 
 def test_points_of_a_map_that_are_no_game(infoset: Command) -> None:
-    found = infoset.json("pursuit-map", "--x", "phase_deg=-9:-8:2", "--y", "evader.mass_kg=900:2000:2")
+    found = infoset.json(
+        "pursuit-map", "--x", "phase_deg=-9:-8:2", "--y", "evader.mass_kg=900:2000:2"
+    )
     assert found["verdict"] == [["no-game"] * 2, ["captured"] * 2]
 
 
@@ -120,7 +151,10 @@ def test_points_of_a_map_that_are_no_game(infoset: Command) -> None:
         (["pursuit-map", "state.toml"], "phase_deg: both players must have the table orbit"),
         (["pursuit-map", "--x", "phase_deg=1:-1:3"], "KEY=FROM:TO:N"),
         (["pursuit-map", "--y", "phase_deg=-1:1:3"], "is also the parameter of --x"),
-        (["pursuit-map", "--x", "phase_deg=-1:1:2000", "--y", "thrust_ratio=0:1:2000"], "more than 100000 points"),
+        (
+            ["pursuit-map", "--x", "phase_deg=-1:1:2000", "--y", "thrust_ratio=0:1:2000"],
+            "more than 100000 points",
+        ),
     ],
 )
 def test_wrong_options_are_refused(arguments: list[str], told: str, infoset: Command) -> None:

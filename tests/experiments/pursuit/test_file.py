@@ -38,18 +38,30 @@ ORBIT = TEXT.partition("[pursuer.orbit]")[2].partition("\n\n")[0]
 @pytest.mark.parametrize(
     ("text", "line"),
     [
-        (TEXT.replace("= 0.00013", "= 0.9"), "pursuer: the orbit meets the planet: its perigee is 4216.6 km"),
+        (
+            TEXT.replace("= 0.00013", "= 0.9"),
+            "pursuer: the orbit meets the planet: its perigee is 4216.6 km",
+        ),
         (
             TEXT + STATE.format("[1, 0, 0]", "[0, 1, 0]"),
             "evader: orbit: give either the table orbit or the table state",
         ),
-        (TEXT.replace(TEXT.partition("[evader.orbit]")[2], ORBIT), "pursuer and evader are at the same position"),
+        (
+            TEXT.replace(TEXT.partition("[evader.orbit]")[2], ORBIT),
+            "pursuer and evader are at the same position",
+        ),
         (
             TEXT.replace("capture_radius_km = 0.0", "capture_radius_km = 7000"),
             "the evader is within the capture radius",
         ),
-        (TEXT.replace("[pursuer]", "j2 = 0.001\n[pursuer]"), "gravity: J2 needs the equatorial radius"),
-        (with_state("[42000.0, 0.0, 0.0]", "[0.0, 9.0, 0.0]"), "evader: the orbit is a parabola or a hyperbola"),
+        (
+            TEXT.replace("[pursuer]", "j2 = 0.001\n[pursuer]"),
+            "gravity: J2 needs the equatorial radius",
+        ),
+        (
+            with_state("[42000.0, 0.0, 0.0]", "[0.0, 9.0, 0.0]"),
+            "evader: the orbit is a parabola or a hyperbola",
+        ),
     ],
 )
 def test_what_is_no_game_is_refused(text: str, line: str) -> None:

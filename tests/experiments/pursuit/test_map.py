@@ -19,7 +19,9 @@ def solved(phase_deg: float, thrust_ratio: float) -> Solution:
 
 
 def scaled(phase_deg: float, thrust_ratio: float) -> ScaledGame:
-    return scaled_game(game_at(load_problem("geo-pursuit"), {"phase_deg": phase_deg, "thrust_ratio": thrust_ratio}))
+    return scaled_game(
+        game_at(load_problem("geo-pursuit"), {"phase_deg": phase_deg, "thrust_ratio": thrust_ratio})
+    )
 
 
 @pytest.mark.parametrize("phase_deg", [-24.0, 0.0, 12.0, 28.0])
@@ -33,15 +35,21 @@ def test_capture_time_does_not_fall_as_the_thrust_of_the_evader_rises(phase_deg:
 
 
 def test_an_extremal_continued_in_thrust_is_not_always_that_of_the_game() -> None:
-    # Two branches exist over this column. The one at 70 % of the pursuer's thrust continues smoothly up to 80 %, but
-    # there the branch from T = 0 keeps the evader away at its capture time: a point cannot start at its neighbour.
+    # Two branches exist over this column. The one at 70 % of the pursuer's thrust continues
+    # smoothly up to 80 %, but there the branch from T = 0 keeps the evader away at its capture
+    # time: a point cannot start at its neighbour.
     capture = solved(28.0, 0.7).capture
     assert capture is not None
     continued: Node = capture.extremal
     for ratio in np.linspace(0.705, 0.8, 20):
         game = scaled(28.0, float(ratio))
         begin = game.pair.solve(
-            continued.vector, continued.duration, 0.0, time_free=False, tolerance=COARSE, close=ROUGH
+            continued.vector,
+            continued.duration,
+            0.0,
+            time_free=False,
+            tolerance=COARSE,
+            close=ROUGH,
         )
         assert begin is not None
         branch = follow(game.pair, begin, 0.0, game.latest)

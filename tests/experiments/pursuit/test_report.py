@@ -27,7 +27,14 @@ def certificate(solved: Solution) -> Certificate:
     ("found", "said", "is_claimed"),
     [
         (120, "saddle point: all checks hold", True),
-        (60, "saddle point: no check failed; 60 of 120 directions were not decided (no farthest extremal was", True),
+        (
+            60,
+            (
+                "saddle point: no check failed; 60 of 120 directions were not decided (no "
+                "farthest extremal was"
+            ),
+            True,
+        ),
         (7, "saddle point: not claimed: 113 of 120 directions were not decided", False),
     ],
 )

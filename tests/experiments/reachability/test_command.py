@@ -28,7 +28,12 @@ def test_the_published_problem(infoset: Command) -> None:
     assert tube["min"][1] == pytest.approx(-2032.6346647262549, rel=1e-9)
     assert [each["period"] for each in found["sets"]] == [1, 2, 3, 4]
     names = [each["name"] for each in found["controls"]]
-    assert names == ["energy", "l1", *(f"vertex {k}" for k in range(1, 28)), *(f"sample {k}" for k in range(1, 4))]
+    assert names == [
+        "energy",
+        "l1",
+        *(f"vertex {k}" for k in range(1, 28)),
+        *(f"sample {k}" for k in range(1, 4)),
+    ]
     energy = found["controls"][0]
     assert energy["energy"] == pytest.approx(0.14323052820, abs=1e-11)
     assert energy["nonlinear_miss"] == pytest.approx(1.668028, abs=1e-6)
@@ -47,30 +52,46 @@ def test_delta_v(infoset: Command, thrust: str) -> None:
     for result in (found["controls"][0], found["replan"]):
         control = 0.15 * np.array(result["controls"])
         used = result["delta_v_m_s"]
-        assert [used[axis] for axis in "xyz"] == pytest.approx((180.0 * np.abs(control).sum(axis=0)).tolist())
-        engines = np.abs(control).sum() if thrust == "box" else np.sqrt((control**2).sum(axis=1)).sum()
+        assert [used[axis] for axis in "xyz"] == pytest.approx(
+            (180.0 * np.abs(control).sum(axis=0)).tolist()
+        )
+        engines = (
+            np.abs(control).sum() if thrust == "box" else np.sqrt((control**2).sum(axis=1)).sum()
+        )
         assert used["sum"] == pytest.approx(180.0 * float(engines))
 
 
 def test_samples_follow_the_seed() -> None:
-    one, same, other = (COMMAND.report(Reach(select="samples:2", seed=seed)).members for seed in (1, 1, 2))
+    one, same, other = (
+        COMMAND.report(Reach(select="samples:2", seed=seed)).members for seed in (1, 1, 2)
+    )
     np.testing.assert_array_equal(one[1].controls, same[1].controls)
     assert (one[1].controls != other[1].controls).any()
 
 
 @pytest.mark.parametrize(
-    ("selected", "hidden"), [("energy,l1,norms,analytic", "minimum norms"), ("samples:20", "15 of 20")]
+    ("selected", "hidden"),
+    [("energy,l1,norms,analytic", "minimum norms"), ("samples:20", "15 of 20")],
 )
 def test_figures_name_the_controls_that_they_do_not_draw(selected: str, hidden: str) -> None:
     (legend,) = draw_controls(COMMAND.report(Reach(select=selected))).legends
-    assert legend.get_title().get_text() == f"not drawn, as equal to others or beyond the first 5: {hidden}"
+    assert (
+        legend.get_title().get_text()
+        == f"not drawn, as equal to others or beyond the first 5: {hidden}"
+    )
 
 
 def test_constraints_between_the_periods_bind() -> None:
     # Short of the bound at whole periods only, a control may break it between them.
-    settings = ["model=time-varying", "initial.position_m=[-2540, -2990, 2120]", "initial.velocity_m_s=[2, -1, 3]"]
+    settings = [
+        "model=time-varying",
+        "initial.position_m=[-2540, -2990, 2120]",
+        "initial.velocity_m_s=[2, -1, 3]",
+    ]
     loose, kept = (
-        COMMAND.report(Reach(settings=[*settings, f"checks_between_periods={checks}"], select="energy")).members[0]
+        COMMAND.report(
+            Reach(settings=[*settings, f"checks_between_periods={checks}"], select="energy")
+        ).members[0]
         for checks in (0, 5)
     )
     assert loose.between > 1e-3
@@ -90,7 +111,10 @@ def test_zero_out_of_reach_is_looked_for_further_on(infoset: Command) -> None:
         (["--select", "enrgy"], "did you mean energy?"),
         (["--select", "samples"], "--select samples: invalid literal"),
         (["approach-cone", "--select", "vertices"], "choose for example --select samples:20"),
-        ([CASES / "s4_1_59.toml", "--select", "vertices"], "the optimal controls have 22875 vertices, more than the"),
+        (
+            [CASES / "s4_1_59.toml", "--select", "vertices"],
+            "the optimal controls have 22875 vertices, more than the",
+        ),
         (
             [
                 *("--set", "orbit.eccentricity=0.9", "--set", "orbit.semi_major_axis_km=65000"),
@@ -104,11 +128,15 @@ def test_what_is_wrong_is_refused(arguments: list[str], told: str, infoset: Comm
     assert told in infoset.refused("reach", *arguments)
 
 
-def test_a_program_without_an_accurate_solution_is_refused(infoset: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_program_without_an_accurate_solution_is_refused(
+    infoset: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
     # Which programs a solver fails on depends on the machine, so here every answer fails the check.
     monkeypatch.setattr(ConeProgram, "violation_and_gap", lambda *_: (0.0, 1.0))
     err = infoset.refused("reach", CASES / "s2_2_68.toml")
-    assert "a convex program was not solved to 1e-07: relative gap 1, constraints violated by 0" in err
+    assert (
+        "a convex program was not solved to 1e-07: relative gap 1, constraints violated by 0" in err
+    )
 
 
 def test_a_conflict_says_when_and_by_how_much(infoset: Command) -> None:
@@ -118,9 +146,15 @@ def test_a_conflict_says_when_and_by_how_much(infoset: Command) -> None:
     by = float(err.split("relaxed by ")[1].split(" %")[0]) / 100.0
     # Relaxed by so much and a little more, it can be kept.
     relaxed = [
-        f"bounds.{key}={value * (1.0 + by * 1.01)}" for key, value in (("position_m", 3e3), ("velocity_m_s", 7.5))
+        f"bounds.{key}={value * (1.0 + by * 1.01)}"
+        for key, value in (("position_m", 3e3), ("velocity_m_s", 7.5))
     ]
-    assert infoset("reach", *settings, "--set", relaxed[0], "--set", relaxed[1], "--select", "energy")[0] == 0
+    assert (
+        infoset("reach", *settings, "--set", relaxed[0], "--set", relaxed[1], "--select", "energy")[
+            0
+        ]
+        == 0
+    )
 
 
 def test_the_published_problem_with_less_thrust(infoset: Command) -> None:
@@ -161,13 +195,48 @@ KEEP_IN = "[[keep_in]]\nnormals = {}\noffsets_m = {}\n[orbit]"
 @pytest.mark.parametrize(
     ("problem", "old", "new", "line"),
     [
-        ("rendezvous-2021", "[orbit]", KEEP_IN.format("[[1, 0, 0]]", "[1, 2]"), "offsets_m: must have 1 numbers"),
-        ("rendezvous-2021", "[orbit]", CONE.format("[0, -1, 0]"), "is outside its constraints: face 3 of the cone by"),
-        ("rendezvous-2021", POSITION, "[3200.0, -2650.0, 2120.0]", "is outside its constraints: x by 200"),
-        ("rendezvous-2021", "10000.0", "6000.0", "orbit: semi_major_axis_m: the orbit meets the planet"),
-        ("rendezvous-2021", "180.0", "1e9", "period_s, in all periods, is 2.53e+06 radians of the orbit"),
-        ("rendezvous-16-periods", "control = 1.0", "control = [1, 1, 0.5]", "in a ball the bounds on controls must"),
-        ("approach-cone", "[orbit]", "checks_between_periods = 1\n[orbit]", "checks_between_periods: must be 0 with"),
+        (
+            "rendezvous-2021",
+            "[orbit]",
+            KEEP_IN.format("[[1, 0, 0]]", "[1, 2]"),
+            "offsets_m: must have 1 numbers",
+        ),
+        (
+            "rendezvous-2021",
+            "[orbit]",
+            CONE.format("[0, -1, 0]"),
+            "is outside its constraints: face 3 of the cone by",
+        ),
+        (
+            "rendezvous-2021",
+            POSITION,
+            "[3200.0, -2650.0, 2120.0]",
+            "is outside its constraints: x by 200",
+        ),
+        (
+            "rendezvous-2021",
+            "10000.0",
+            "6000.0",
+            "orbit: semi_major_axis_m: the orbit meets the planet",
+        ),
+        (
+            "rendezvous-2021",
+            "180.0",
+            "1e9",
+            "period_s, in all periods, is 2.53e+06 radians of the orbit",
+        ),
+        (
+            "rendezvous-16-periods",
+            "control = 1.0",
+            "control = [1, 1, 0.5]",
+            "in a ball the bounds on controls must",
+        ),
+        (
+            "approach-cone",
+            "[orbit]",
+            "checks_between_periods = 1\n[orbit]",
+            "checks_between_periods: must be 0 with",
+        ),
     ],
 )
 def test_contradictions_are_refused(problem: str, old: str, new: str, line: str) -> None:

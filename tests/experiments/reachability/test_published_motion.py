@@ -35,8 +35,11 @@ CHANGE = 1e-3
 
 
 def nonlinear(controls: Floats) -> Floats:
-    """Integrate (1) of the paper with e = 0, mu = w^2 R^3, by a method other than that of the package."""
-    states, state = [], START
+    """Integrate (1) of the paper with e = 0, mu = w^2 R^3, by a method other than that of the
+    package.
+    """
+    states = []
+    state = START
     for push in PUSH_M_S2 * controls:
 
         def slope(_time: float, at: Floats, push: Floats = push) -> Floats:
@@ -44,12 +47,16 @@ def nonlinear(controls: Floats) -> Floats:
             gravity = RATE_RAD_S**2 * RADIUS_M**3 / (x**2 + (RADIUS_M + y) ** 2 + z**2) ** 1.5
             force = [
                 2 * RATE_RAD_S * velocity[1] + RATE_RAD_S**2 * x - gravity * x,
-                -2 * RATE_RAD_S * velocity[0] + RATE_RAD_S**2 * (RADIUS_M + y) - gravity * (RADIUS_M + y),
+                -2 * RATE_RAD_S * velocity[0]
+                + RATE_RAD_S**2 * (RADIUS_M + y)
+                - gravity * (RADIUS_M + y),
                 -gravity * z,
             ]
             return np.concatenate([velocity, force + push])
 
-        state = solve_ivp(slope, (0.0, PERIOD_S), state, method="LSODA", rtol=1e-11, atol=1e-9).y[:, -1]
+        state = solve_ivp(slope, (0.0, PERIOD_S), state, method="LSODA", rtol=1e-11, atol=1e-9).y[
+            :, -1
+        ]
         states.append(state)
     return np.array(states)
 
@@ -60,24 +67,32 @@ def linear(controls: Floats) -> Floats:
 
 @cache
 def states(number: int) -> tuple[Floats, Floats]:
-    """Return both columns of the printed controls, shape (2, 4, 6), and their derivatives, shape (12, 2, 4, 6)."""
+    """Return both columns of the printed controls, shape (2, 4, 6), and their derivatives, shape
+    (12, 2, 4, 6).
+    """
     controls = TABLES[number - 1].controls
     middle = np.array([linear(controls), nonlinear(controls)])
     moved = (controls + CHANGE * step.reshape(4, 3) for step in np.eye(12))
-    return middle, np.array([(np.array([linear(each), nonlinear(each)]) - middle) / CHANGE for each in moved])
+    return middle, np.array(
+        [(np.array([linear(each), nonlinear(each)]) - middle) / CHANGE for each in moved]
+    )
 
 
 @pytest.fixture(scope="module")
 def numbers() -> dict[tuple[int, str], Comparison]:
     """Verdicts by table and name without unit."""
     found = reproduce_paper(read_paper("reachability"), lambda _done: None)
-    return {(int(each.number.source[-1]), each.number.name.partition(" (")[0]): each for each in found}
+    return {
+        (int(each.number.source[-1]), each.number.name.partition(" (")[0]): each for each in found
+    }
 
 
 def test_the_motion_as_published_is_equation_1_with_a_radius_of_90_km() -> None:
     controls = TABLES[0].controls
     motion = published_motion(RENDEZVOUS.truth.orbit)
-    found = motion.fly(RENDEZVOUS.problem.initial, PUSH_M_S2 * from_paper(controls)[None], PERIOD_S)[0, 1:]
+    found = motion.fly(
+        RENDEZVOUS.problem.initial, PUSH_M_S2 * from_paper(controls)[None], PERIOD_S
+    )[0, 1:]
     np.testing.assert_allclose(to_paper(found), nonlinear(controls), rtol=0.0, atol=1e-6)
 
 
@@ -85,7 +100,9 @@ def test_the_motion_as_published_is_equation_1_with_a_radius_of_90_km() -> None:
 def test_a_control_gives_the_nonlinear_column(
     number: int, misprints: list[tuple[int, int]], numbers: dict[tuple[int, str], Comparison]
 ) -> None:
-    """Table 1: the control of minimum energy; table 3: the printed controls, with the effect of their rounding."""
+    """Table 1: the control of minimum energy; table 3: the printed controls, with the effect of
+    their rounding.
+    """
     if number == 1:
         computed = nonlinear(to_paper(minimum_energy(solve(RENDEZVOUS.problem).optimal)))
         rounding = np.tile(ROUNDING, (4, 1))
@@ -111,7 +128,10 @@ def test_nonlinear_less_linear_of_table_2_is_that_of_the_model(
     assert (np.abs(off) <= 2.0 * ROUNDING).sum() >= 20
     # Without the model the differences are as large as the printed ones.
     assert np.abs(table.nonlinear - table.linear).max() > 50.0
-    found = [numbers[2, f"nonlinear x{component + 1}({t + 1})"].verdict for t, component in np.ndindex(4, 6)]
+    found = [
+        numbers[2, f"nonlinear x{component + 1}({t + 1})"].verdict
+        for t, component in np.ndindex(4, 6)
+    ]
     assert found == [Verdict.EXPLAINED] * 24
 
 
@@ -121,7 +141,9 @@ def test_nonlinear_less_linear_of_table_2_is_that_of_the_model(
 def test_misprints_follow_from_the_other_numbers(
     number: int, column: int, t: int, component: int, numbers: dict[tuple[int, str], Comparison]
 ) -> None:
-    """Minimum and maximum value over all controls that round to the printed ones and lead to the other positions."""
+    """Minimum and maximum value over all controls that round to the printed ones and lead to the
+    other positions.
+    """
     table = TABLES[number - 1]
     middle, changes = states(number)
     printed = np.array([table.linear, table.nonlinear])
@@ -129,7 +151,8 @@ def test_misprints_follow_from_the_other_numbers(
     fixed[:, :, 3:] = False
     # Three linear positions are printed with two decimals.
     rounding = np.where(np.round(printed, 1) == printed, 0.05, 0.005)[fixed]
-    rows, room = changes[:, fixed].T, (printed - middle)[fixed]
+    rows = changes[:, fixed].T
+    room = (printed - middle)[fixed]
     ends = []
     for sign in (1.0, -1.0):
         answer = linprog(
@@ -152,6 +175,8 @@ def test_the_fit_of_the_radius(capsys: pytest.CaptureFixture[str]) -> None:
     published_radius.main()
     found = re.match(r"radius (\S+) \+- (\S+) km from (\d+) differences", capsys.readouterr().out)
     assert found is not None
-    radius_km, error_km, kept = float(found[1]), float(found[2]), int(found[3])
+    radius_km = float(found[1])
+    error_km = float(found[2])
+    kept = int(found[3])
     assert abs(radius_km - 90.0) < 2.0 * error_km < 0.2
     assert kept == 70

@@ -1,16 +1,18 @@
 """Sections kept as two chains, against exact rational polygons in the coordinates (V, m).
 
-What rounding may do is bounded beforehand, in units `U` of the magnitudes that a section had over its life: `R` for V,
-`G` for m and z (the maximum m plus the first time to go times `R`). An operation that writes a vertex sums a few
-numbers, of up to `2 R` in V and `2 G` in m: it puts the vertex off by less than `8 U R` and `16 U G`. A height that is
-compared is off by less than `16 U G` as well. Moves of the origins are compensated and add nothing.
+What rounding may do is bounded beforehand, in units `U` of the magnitudes that a section had over
+its life: `R` for V, `G` for m and z (the maximum m plus the first time to go times `R`). An
+operation that writes a vertex sums a few numbers, of up to `2 R` in V and `2 G` in m: it puts the
+vertex off by less than `8 U R` and `16 U G`. A height that is compared is off by less than `16 U G`
+as well. Moves of the origins are compensated and add nothing.
 
-An error of a level can move a vertex far along an edge that is nearly level, so a section cannot be near the exact
-one at all places; but it is the exact section of bands that differ by rounding. So two exact polygons are carried,
-one through bands too narrow by the rounding, one through bands too wide: after `k` operations a section lies in the
-wide one enlarged by the box of `8 k U R` by `16 k U G`, and contains the narrow one to within that box. A box is
-not enlarged by a cut, if the band is widened by its height. Where no band is nearly along an edge, the narrow
-and the wide one are the same to a few ulp, and without cuts they are equal.
+An error of a level can move a vertex far along an edge that is nearly level, so a section cannot be
+near the exact one at all places; but it is the exact section of bands that differ by rounding. So
+two exact polygons are carried, one through bands too narrow by the rounding, one through bands too
+wide: after `k` operations a section lies in the wide one enlarged by the box of `8 k U R` by `16 k
+U G`, and contains the narrow one to within that box. A box is not enlarged by a cut, if the band is
+widened by its height. Where no band is nearly along an edge, the narrow and the wide one are the
+same to a few ulp, and without cuts they are equal.
 """
 
 from __future__ import annotations
@@ -30,7 +32,14 @@ import infoset.engine.chains
 from infoset.arrays import Floats
 from infoset.engine.chain_storage import FIRST_RING, TAKEN
 from infoset.engine.chains import CAPACITY, SectionView
-from tests.infoset.geometry.test_polygon_oracle import AXES, Exact, dot, exact_clip, hull, outside_by
+from tests.infoset.geometry.test_polygon_oracle import (
+    AXES,
+    Exact,
+    dot,
+    exact_clip,
+    hull,
+    outside_by,
+)
 from tests.kernels import callable_kernels
 from tests.rationals import Fraction
 
@@ -44,7 +53,8 @@ checked = settings(max_examples=25, deadline=None, suppress_health_check=[Health
 briefly = settings(checked, max_examples=12)
 
 
-# The oracle: convex polygons with rational vertices (V, m), counter-clockwise, no three of them on a line.
+# The oracle: convex polygons with rational vertices (V, m), counter-clockwise, no three of them on
+# a line.
 
 
 def upward(tau: float) -> Exact:
@@ -60,11 +70,16 @@ def rounded(points: Sequence[Exact]) -> Floats:
 
 
 def may_reach(points: Floats, normal: Exact, height: Fraction | None = None) -> list[int]:
-    """Return the points that may lie above a height, by default above all others: the rest do not, despite rounding."""
+    """Return the points that may lie above a height, by default above all others: the rest do not,
+    despite rounding.
+    """
     components = rounded([normal])[0]
-    heights, sizes = points @ components, np.abs(points) @ np.abs(components)
+    heights = points @ components
+    sizes = np.abs(points) @ np.abs(components)
     level = heights.max() if height is None else float(height)
-    indices: list[int] = np.flatnonzero(heights >= level - 1e-14 * (sizes.max() + abs(level))).tolist()
+    indices: list[int] = np.flatnonzero(
+        heights >= level - 1e-14 * (sizes.max() + abs(level))
+    ).tolist()
     return indices
 
 
@@ -88,7 +103,9 @@ def with_segment(polygon: Sequence[Exact], half: Exact) -> list[Exact]:
 
 def assert_contains(polygon: Sequence[Exact], points: Sequence[Exact], box: Exact) -> None:
     lost = outside_by(points, polygon, box)
-    assert lost is None, f"{tuple(map(float, lost))} is not in {[tuple(map(float, point)) for point in polygon]}"
+    assert lost is None, (
+        f"{tuple(map(float, lost))} is not in {[tuple(map(float, point)) for point in polygon]}"
+    )
 
 
 # A section, and what its chains hold, exactly.
@@ -182,13 +199,18 @@ class Section:
     def is_alone(self) -> bool:
         """Whether the rows before and after are as they were made."""
         others = np.delete(self.chains.records, [2 * ROW, 2 * ROW + 1])
-        rings = [self.chains.rings[ring : ring + 2 * (mask + 1)] for ring, mask in others[["ring", "mask"]].tolist()]
+        rings = [
+            self.chains.rings[ring : ring + 2 * (mask + 1)]
+            for ring, mask in others[["ring", "mask"]].tolist()
+        ]
         fields = [others[name] for name in others.dtype.names or () if name not in ("ring", "mask")]
         return not any(part.any() for part in (*fields, *rings))
 
 
 class Life:
-    """A section with its exact polygons, narrow and wide, and the bounds of the module's docstring."""
+    """A section with its exact polygons, narrow and wide, and the bounds of the module's
+    docstring.
+    """
 
     def __init__(self, tau: float, bottom: Level, top: Level, room: int = CAPACITY) -> None:
         self.section = Section(tau, bottom, top, room)
@@ -236,7 +258,9 @@ class Life:
         self.check()
 
     def cut(self, lower: float, upper: float, of_miss: bool = False) -> bool:
-        """Cut by a band of height or of predicted miss; whether the section is alive as it should be."""
+        """Cut by a band of height or of predicted miss; whether the section is alive as it should
+        be.
+        """
         normal = MISS if of_miss else upward(self.section.tau)
         operation = self.section.cut_misses if of_miss else self.section.cut
         alive, overlap = operation(lower, upper)
@@ -250,8 +274,12 @@ class Life:
                 assert sign * (Fraction(overlap) - exact) <= doubt
                 assert alive or sign > 0 or exact <= doubt
                 assert not alive or sign < 0 or exact >= -doubt
-        self.narrow = exact_clip(self.narrow, normal, Fraction(lower) + rounding, Fraction(upper) - rounding)
-        self.wide = exact_clip(self.wide, normal, Fraction(lower) - rounding, Fraction(upper) + rounding)
+        self.narrow = exact_clip(
+            self.narrow, normal, Fraction(lower) + rounding, Fraction(upper) - rounding
+        )
+        self.wide = exact_clip(
+            self.wide, normal, Fraction(lower) - rounding, Fraction(upper) + rounding
+        )
         self.operations += 1
         if alive:
             assert self.wide
@@ -262,15 +290,20 @@ class Life:
 
     def check(self) -> None:
         """All that holds after any operation."""
-        section, normal = self.section, upward(self.section.tau)
-        right, left = section.chain(RIGHT), section.chain(LEFT)
+        section = self.section
+        normal = upward(self.section.tau)
+        right = section.chain(RIGHT)
+        left = section.chain(LEFT)
         assert right
         assert left
         assert section.count == len(right) + len(left) <= CAPACITY
         assert section.is_alone()
-        assert Fraction(section.reach) * (1 + self.operations * U) >= max(abs(v) for v, _ in right + left)
+        assert Fraction(section.reach) * (1 + self.operations * U) >= max(
+            abs(v) for v, _ in right + left
+        )
         if not self.narrow:
-            # Thinner than rounding: which vertex is the higher or the more to the right is anybody's guess.
+            # Thinner than rounding: which vertex is the higher or the more to the right is
+            # anybody's guess.
             return
         tolerance = self.tolerance
         for chain, sign in ((right, 1), (left, -1)):
@@ -279,8 +312,11 @@ class Life:
         self.check_extremes(right, left)
 
     def check_extremes(self, right: list[Exact], left: list[Exact]) -> None:
-        """Heights and peaks lie between those of the narrow and the wide polygon, and are those of the vertices."""
-        section, normal = self.section, upward(self.section.tau)
+        """Heights and peaks lie between those of the narrow and the wide polygon, and are those of
+        the vertices.
+        """
+        section = self.section
+        normal = upward(self.section.tau)
         minimum, maximum = map(Fraction, section.heights())
         lowest, highest = reaches(right + left, normal)
         assert abs(minimum - lowest) <= self.tolerance
@@ -293,7 +329,8 @@ class Life:
             (minimum, maximum, normal, self.tolerance),
             (trough, peak, MISS, self.box[1]),
         ):
-            inner, outer = reaches(self.narrow, direction), reaches(self.wide, direction)
+            inner = reaches(self.narrow, direction)
+            outer = reaches(self.wide, direction)
             assert outer[0] - slack <= low <= inner[0] + slack
             assert inner[1] - slack <= high <= outer[1] + slack
 
@@ -306,7 +343,10 @@ class Life:
 
 # Life stories: plain numbers, put in proportion to the section when they are told.
 
-UNIT = st.one_of(st.integers(-(2**40), 2**40).map(lambda i: i / 2**40), st.sampled_from([-1.0, -0.5, 0.0, 0.5, 1.0]))
+UNIT = st.one_of(
+    st.integers(-(2**40), 2**40).map(lambda i: i / 2**40),
+    st.sampled_from([-1.0, -0.5, 0.0, 0.5, 1.0]),
+)
 SIZES = st.sampled_from([1e-9, 1e-3, 1.0, 1.0, 1.0, 1e3])
 FALLS = st.sampled_from([1.0, 1.0, 1.0 - 1e-12, 0.999, 0.9, 0.9, 0.7, 0.5, 0.01])
 ULPS = st.sampled_from([0, 0, 1, -1, 3, -3, 20, 1000])
@@ -340,26 +380,34 @@ class Step(NamedTuple):
 
 @st.composite
 def starts(draw: st.DrawFn) -> Start:
-    """Trapezia, points, segments along the level, across it and aslant, near zero and far from it."""
+    """Trapezia, points, segments along the level, across it and aslant, near zero and far from
+    it.
+    """
     tau = draw(st.sampled_from([1e-3, 0.7, 1.0, 130.0, 1e4]))
-    size_v, place = draw(SIZES), draw(st.sampled_from([0.0, 0.0, 1.0, 100.0]))
+    size_v = draw(SIZES)
+    place = draw(st.sampled_from([0.0, 0.0, 1.0, 100.0]))
     size_z = draw(st.one_of(SIZES, st.just(size_v * tau)))
     vs = [size_v * (draw(UNIT) + place) for _ in range(4)]
     zs = [size_z * draw(UNIT) for _ in range(2)]
-    kind = draw(st.sampled_from(["trapezium"] * 4 + ["rectangle", "point", "level", "upright", "aslant"]))
+    kind = draw(
+        st.sampled_from(["trapezium"] * 4 + ["rectangle", "point", "level", "upright", "aslant"])
+    )
     if kind in ("point", "level"):
         zs[1] = zs[0]
     if kind in ("point", "upright", "aslant"):
         vs[1], vs[3] = vs[0], vs[2]
     if kind in ("point", "upright", "rectangle", "level"):
         vs[2:] = vs[:2]
-    bottom, top = sorted(vs[:2]), sorted(vs[2:])
+    bottom = sorted(vs[:2])
+    top = sorted(vs[2:])
     return Start(tau, (bottom[0], bottom[1], min(zs)), (top[0], top[1], max(zs)))
 
 
 BANDS = st.builds(
     Band,
-    st.sampled_from(["parts", "parts", "vertex", "vertex", "thin", "touching", "beyond", "around", "rest"]),
+    st.sampled_from(
+        ["parts", "parts", "vertex", "vertex", "thin", "touching", "beyond", "around", "rest"]
+    ),
     st.tuples(UNIT, UNIT),
     ULPS,
     st.sampled_from([False] * 5 + [True]),
@@ -375,8 +423,10 @@ def levels(section: Section, band: Band, ulp: float) -> tuple[float, float]:
     """The borders of a band."""
     outline = section.outline()
     heights = outline[:, 1] + (section.tau * outline[:, 0] if band.of_miss else 0.0)
-    minimum, maximum = float(heights.min()), float(heights.max())
-    extent, error = maximum - minimum, band.ulps * ulp
+    minimum = float(heights.min())
+    maximum = float(heights.max())
+    extent = maximum - minimum
+    error = band.ulps * ulp
     first, second = band.parts
     if band.kind == "parts":
         borders = [0.5 * (minimum + maximum) + part * extent for part in band.parts]
@@ -388,12 +438,20 @@ def levels(section: Section, band: Band, ulp: float) -> tuple[float, float]:
         level = minimum + abs(first) * extent
         return level, level + abs(error)
     if band.kind == "touching":
-        return (maximum + error, maximum + extent + 1.0) if first < 0.0 else (minimum - extent - 1.0, minimum + error)
+        return (
+            (maximum + error, maximum + extent + 1.0)
+            if first < 0.0
+            else (minimum - extent - 1.0, minimum + error)
+        )
     if band.kind == "beyond":
         return maximum + abs(first) * extent, maximum + 2.0 * extent
     if band.kind == "around":
         return minimum - 1.0, maximum + 1.0
-    return (minimum + 0.999 * extent, maximum + 1.0) if first < 0.0 else (minimum - 1.0, minimum + 0.001 * extent)
+    return (
+        (minimum + 0.999 * extent, maximum + 1.0)
+        if first < 0.0
+        else (minimum - 1.0, minimum + 0.001 * extent)
+    )
 
 
 def tell(life: Life, step: Step) -> bool:
@@ -424,8 +482,12 @@ def test_a_life_is_the_exact_one_up_to_rounding(start: Start, story: list[Step])
 
 @pytest.mark.parametrize("start", [(3.0, 3.0, -50.4220476397299), (2.0, 5.0, 7.1)])
 @pytest.mark.parametrize("tau", [0.44999999999955004, 1.0, 7.3, 1e4])
-def test_a_level_segment_keeps_its_ends_where_the_level_does_not_turn(start: Level, tau: float) -> None:
-    """All its heights are equal to within rounding: which of its ends is the higher must not be taken from that."""
+def test_a_level_segment_keeps_its_ends_where_the_level_does_not_turn(
+    start: Level, tau: float
+) -> None:
+    """All its heights are equal to within rounding: which of its ends is the higher must not be
+    taken from that.
+    """
     halves = (202.7652897567146, 0.0, 613.1018861295662, 1e-3)
     for kick in np.random.default_rng(1).uniform(-300.0, 300.0, 20):
         life = Life(tau, start, start)
@@ -438,13 +500,17 @@ def test_a_level_segment_keeps_its_ends_where_the_level_does_not_turn(start: Lev
         life.turn(0.9 * tau)
         life.check_outline()
         lowest, highest = life.section.heights()
-        assert highest - lowest == pytest.approx((start[1] - start[0] + 2.0 * sum(halves)) * 0.1 * tau, rel=1e-9)
+        assert highest - lowest == pytest.approx(
+            (start[1] - start[0] + 2.0 * sum(halves)) * 0.1 * tau, rel=1e-9
+        )
 
 
 def test_a_step_of_a_square_by_hand() -> None:
     section = Section(2.0, (-1.0, 1.0, -1.0), (-1.0, 1.0, 1.0))
     section.turn(1.0)
-    np.testing.assert_array_equal(section.outline(), [(-1.0, -2.0), (1.0, 0.0), (1.0, 2.0), (-1.0, 0.0)])
+    np.testing.assert_array_equal(
+        section.outline(), [(-1.0, -2.0), (1.0, 0.0), (1.0, 2.0), (-1.0, 0.0)]
+    )
     section.spread(0.5)
     outline = section.outline()
     np.testing.assert_array_equal(
@@ -457,7 +523,9 @@ def test_a_step_of_a_square_by_hand() -> None:
     assert sorted(section.outline().tolist()) == sorted(map(list, wanted))
     assert section.heights() == (-1.0, 1.0)
     assert section.cut(1.0 + 2.0**-40, 3.0) == (False, -(2.0**-40))
-    assert sorted(section.outline().tolist()) == sorted(map(list, wanted)), "a dead section is left as it was"
+    assert sorted(section.outline().tolist()) == sorted(map(list, wanted)), (
+        "a dead section is left as it was"
+    )
     assert section.cut(1.0, 3.0) == (True, 0.0)
     np.testing.assert_array_equal(np.sort(section.outline(), axis=0), [(-0.25, 1.0), (1.75, 1.0)])
 
@@ -467,11 +535,17 @@ def test_a_step_of_a_square_by_hand() -> None:
     st.integers(0, 3),
     st.lists(st.tuples(steps(st.none()), st.booleans(), UNIT.map(abs)), min_size=4, max_size=16),
 )
-def test_extremal_bands_never_lose_the_truth(corner: int, story: list[tuple[Step, bool, float]]) -> None:
-    """The truth is a corner of the set, and each band ends at it, widened by the 16 ulp that a measurement has."""
-    bottom, top = (-0.2, 0.3, -17.0), (-0.1, 0.3, 23.0)
+def test_extremal_bands_never_lose_the_truth(
+    corner: int, story: list[tuple[Step, bool, float]]
+) -> None:
+    """The truth is a corner of the set, and each band ends at it, widened by the 16 ulp that a
+    measurement has.
+    """
+    bottom = (-0.2, 0.3, -17.0)
+    top = (-0.1, 0.3, 23.0)
     section = Section(300.0, bottom, top)
-    v, z = Fraction((*bottom[:2], *top[:2])[corner]), Fraction((bottom, top)[corner // 2][2])
+    v = Fraction((*bottom[:2], *top[:2])[corner])
+    z = Fraction((bottom, top)[corner // 2][2])
     truth = (v, z + 300 * v)
     max_m = 400.0
     for step, from_below, width in story:
@@ -484,12 +558,18 @@ def test_extremal_bands_never_lose_the_truth(corner: int, story: list[tuple[Step
         level = float(dot(upward(section.tau), truth))
         max_m += abs(0.1 * step.kick) * section.tau + 0.01 * step.half_v * section.tau
         slack = 16.0 * chains.EPSILON * (max_m + 300.0 * section.reach)
-        band = (level - slack, level + width + slack) if from_below else (level - width - slack, level + slack)
+        band = (
+            (level - slack, level + width + slack)
+            if from_below
+            else (level - width - slack, level + slack)
+        )
         alive, overlap = section.cut(*band)
         assert alive
         assert overlap > 0.0
     # A truth once lost would be far outside by now, for the level has turned.
-    assert_contains(section.corners(), [truth], (8 * U * Fraction(section.reach), 16 * U * Fraction(max_m)))
+    assert_contains(
+        section.corners(), [truth], (8 * U * Fraction(section.reach), 16 * U * Fraction(max_m))
+    )
 
 
 # Peaks.
@@ -514,7 +594,8 @@ def test_the_first_vertex_near_a_peak(start: Start, story: list[Step], part: flo
     section = life.section
     for side, sign in ((RIGHT, 1.0), (LEFT, -1.0)):
         misses = [sign * m for _, m in section.local(side)]
-        first, peak = section.numbers(side)[0], section.peak(side)
+        first = section.numbers(side)[0]
+        peak = section.peak(side)
         tolerance = part * (max(misses) - min(misses))
         near = chains.first_near_peak(section.sides[side], section.chains.rings, sign, tolerance)
         level = misses[peak - first] - tolerance
@@ -543,7 +624,9 @@ def test_a_level_segment_cut_by_its_miss_stays_a_segment(part: float) -> None:
 
 
 def crowded(tau: float, size_v: float, size_z: float, fall: float) -> Life:
-    """A section that has grown until it may have no room for another step; its exact polygon is taken from there."""
+    """A section that has grown until it may have no room for another step; its exact polygon is
+    taken from there.
+    """
     life = Life(tau, (-size_v, 1.3 * size_v, -size_z), (-size_v, size_v, 1.3 * size_z))
     section = life.section
     while not chains.is_crowded(section.view):
@@ -561,15 +644,20 @@ def crowded(tau: float, size_v: float, size_z: float, fall: float) -> Life:
 
 
 @pytest.mark.parametrize("fall", [pytest.param(0.999, marks=pytest.mark.thorough), 0.97])
-@pytest.mark.parametrize(("tau", "size_v", "size_z"), [(1.0, 1.0, 1.0), (500.0, 1e-9, 30.0), (500.0, 2.0, 1e-6)])
-def test_reduction_is_outward_and_life_goes_on(tau: float, size_v: float, size_z: float, fall: float) -> None:
+@pytest.mark.parametrize(
+    ("tau", "size_v", "size_z"), [(1.0, 1.0, 1.0), (500.0, 1e-9, 30.0), (500.0, 2.0, 1e-6)]
+)
+def test_reduction_is_outward_and_life_goes_on(
+    tau: float, size_v: float, size_z: float, fall: float
+) -> None:
     life = crowded(tau, size_v, size_z, fall)
     section = life.section
     section.reduce()
     assert section.count <= chains.REDUCED
     reduced = hull(section.chain(RIGHT) + section.chain(LEFT))
     assert_contains(reduced, life.narrow, life.box)
-    # The edges that go are those that cost minimum: there is hardly more of the set in any direction.
+    # The edges that go are those that cost minimum: there is hardly more of the set in any
+    # direction.
     for normal in AXES:
         (minimum, maximum), (low, high) = reaches(life.narrow, normal), reaches(reduced, normal)
         assert high - low <= (maximum - minimum) * Fraction(11, 10)
@@ -590,7 +678,9 @@ def test_reduction_of_a_round_chain_keeps_the_bound_on_v() -> None:
     """Dropping edges all around, it goes farther out than any vertex was."""
     section = Section(3.0, (-1.0, 1.0, 0.0), (-1.0, 1.0, 1.0))
     turns = np.linspace(-0.8, 0.8, 248)
-    section.replace(RIGHT, [(math.cos(turn), math.sin(turn) + 3.0 * math.cos(turn)) for turn in turns])
+    section.replace(
+        RIGHT, [(math.cos(turn), math.sin(turn) + 3.0 * math.cos(turn)) for turn in turns]
+    )
     before = hull(section.chain(RIGHT) + section.chain(LEFT))
     section.reduce()
     assert section.count == chains.REDUCED
@@ -600,7 +690,9 @@ def test_reduction_of_a_round_chain_keeps_the_bound_on_v() -> None:
 
 
 def test_reduction_of_a_chain_as_thin_as_rounding_contains_it() -> None:
-    """Where rounding has left edges no direction, three sides of a box around the chain are taken."""
+    """Where rounding has left edges no direction, three sides of a box around the chain are
+    taken.
+    """
     rng = np.random.default_rng(5)
     for thickness in (0.0, 1e-17, 1e-16, 1e-15, 1e-12):
         section = Section(3.0, (-1.0, 1.0, 0.0), (-1.0, 1.0, 1.0))
@@ -612,15 +704,22 @@ def test_reduction_of_a_chain_as_thin_as_rounding_contains_it() -> None:
         section.reduce()
         assert section.count <= chains.REDUCED
         assert_contains(section.corners(), before, (32 * U * 2, 64 * U * 6))
-        assert all(abs(v) <= section.reach for side in (RIGHT, LEFT) for v, _ in section.chain(side))
+        assert all(
+            abs(v) <= section.reach for side in (RIGHT, LEFT) for v, _ in section.chain(side)
+        )
         misses = [m for _, m in section.chain(RIGHT)]
         assert misses[section.peak(RIGHT) - section.numbers(RIGHT)[0]] >= max(misses) - 64 * U
 
 
 @briefly
-@given(starts(), st.lists(steps(st.none()), min_size=1, max_size=6), st.lists(steps(BANDS), max_size=3))
-def test_moving_to_wider_rings_keeps_everything(start: Start, before: list[Step], after: list[Step]) -> None:
-    life, twin = Life(*start, room=32), Life(*start)
+@given(
+    starts(), st.lists(steps(st.none()), min_size=1, max_size=6), st.lists(steps(BANDS), max_size=3)
+)
+def test_moving_to_wider_rings_keeps_everything(
+    start: Start, before: list[Step], after: list[Step]
+) -> None:
+    life = Life(*start, room=32)
+    twin = Life(*start)
     for step in before:
         assert tell(life, step) == tell(twin, step)
     rings = chain_storage.with_room(life.section.chains.rings, 4 * CAPACITY)
@@ -652,15 +751,20 @@ def assert_mirrored(section: Section, mirror: Section) -> None:
     starts(),
     st.lists(st.tuples(steps(st.none()), st.booleans(), UNIT.map(abs)), min_size=1, max_size=10),
 )
-def test_a_mirrored_life_is_mirrored_to_the_last_bit(start: Start, story: list[tuple[Step, bool, float]]) -> None:
-    """With one border a cut: two borders on one edge are worked in another order, see the next test.
+def test_a_mirrored_life_is_mirrored_to_the_last_bit(
+    start: Start, story: list[tuple[Step, bool, float]]
+) -> None:
+    """With one border a cut: two borders on one edge are worked in another order, see the next
+    test.
 
-    So it is with the two turns of a section that is as thin as rounding, which could share an edge: none is here.
+    So it is with the two turns of a section that is as thin as rounding, which could share an edge:
+    none is here.
     """
     tau, (low, high, z), (low_top, high_top, z_top) = start
     magnitude = max(abs(z), abs(z_top)) + tau * max(map(abs, (low, high, low_top, high_top)))
     assume(z_top - z > 1e-5 * magnitude)
-    section, mirror = Section(*start), Section(tau, (-high_top, -low_top, -z_top), (-high, -low, -z))
+    section = Section(*start)
+    mirror = Section(tau, (-high_top, -low_top, -z_top), (-high, -low, -z))
     size = max(map(abs, (low, high, low_top, high_top)))
     for step, from_below, part in story:
         for one, sign in ((section, 1.0), (mirror, -1.0)):
@@ -682,11 +786,17 @@ def test_a_mirrored_life_is_mirrored_to_the_last_bit(start: Start, story: list[t
 
 
 def test_ten_thousand_moves_do_not_wear_a_section() -> None:
-    """Origins a thousand times as far out as the section is wide, and back: it is exact to 4 ulp, not to 10 000."""
+    """Origins a thousand times as far out as the section is wide, and back: it is exact to 4 ulp,
+    not to 10 000.
+    """
     rng = np.random.default_rng(3)
     life = Life(97.3, (-1.3, 0.7, -20.0), (-0.9, 1.1, 30.0))
-    section, exact = life.section, life.wide
-    added, place, max_v, max_m = (Fraction(0), Fraction(0)), (Fraction(0), Fraction(0)), Fraction(0), Fraction(0)
+    section = life.section
+    exact = life.wide
+    added = (Fraction(0), Fraction(0))
+    place = (Fraction(0), Fraction(0))
+    max_v = Fraction(0)
+    max_m = Fraction(0)
     for _ in range(10_000):
         half_v = float(rng.uniform(0.0, 1e-4))
         kick = float(rng.uniform(-1.0, 1.0) * 1e3) if abs(place[0]) < 3000 else -float(place[0])
@@ -695,7 +805,8 @@ def test_ten_thousand_moves_do_not_wear_a_section() -> None:
         by = (Fraction(kick), Fraction(kick) * Fraction(97.3))
         place = (place[0] + by[0], place[1] + by[1])
         added = (added[0] + Fraction(half_v), added[1] + Fraction(half_v) * Fraction(97.3))
-        max_v, max_m = max(max_v, abs(place[0])), max(max_m, abs(place[1]))
+        max_v = max(max_v, abs(place[0]))
+        max_m = max(max_m, abs(place[1]))
     section.shift(-float(place[0]))
     back = Fraction(-float(place[0]))
     place = (place[0] + back, place[1] + back * Fraction(97.3))
@@ -716,7 +827,9 @@ def test_ten_thousand_moves_do_not_wear_a_section() -> None:
 
 
 def test_vertices_that_repeat_one_another_do_not_stop_the_search_for_a_peak() -> None:
-    """Both have the same miss, so that to look for a greater one next to the first is to look no further."""
+    """Both have the same miss, so that to look for a greater one next to the first is to look no
+    further.
+    """
     section = Section(3.0, (-1.0, 1.0, 0.0), (-1.0, 1.0, 1.0))
     (v, m), (v_top, m_top) = section.local(RIGHT)
     section.replace(RIGHT, [(v, m), (math.nextafter(v, 2.0), m), (v, m), (v_top, m_top)])

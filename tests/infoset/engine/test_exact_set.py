@@ -1,4 +1,6 @@
-"""Sections against linear programs: with an error of its own for each impulse, and with one error of the speed."""
+"""Sections against linear programs: with an error of its own for each impulse, and with one error
+of the speed.
+"""
 
 from __future__ import annotations
 
@@ -11,16 +13,25 @@ from scipy.optimize import linprog
 from infoset import AngleSensor, InformationSet, Model, SetModel, StateBox
 from infoset.arrays import Floats
 
-E_M_S, STEP_S, NU_M_S2, STEPS, LABEL_M, ETA = 58e3, 0.5, 0.005, 40, 2.4e6, 1.0 / 58.0
+E_M_S = 58e3
+STEP_S = 0.5
+NU_M_S2 = 0.005
+STEPS = 40
+LABEL_M = 2.4e6
+ETA = 1.0 / 58.0
 BOX = StateBox(z_m=(-10e3, 10e3), x_m=(2.3e6, 2.5e6), vz_m_s=(-100.0, 100.0), vx_m_s=(-59e3, -57e3))
 SENSOR = AngleSensor(STEP_S, 0.00015, 0.00023, nominal_range_m=5.8e6)
 
 
 def history(seed: int) -> tuple[Floats, Floats]:
-    """Return the angles and impulses of a flight whose impulses are all (1 + eta) times too great for the model."""
+    """Return the angles and impulses of a flight whose impulses are all (1 + eta) times too great
+    for the model.
+    """
     rng = np.random.default_rng(seed)
-    v, z = rng.uniform(-50.0, 50.0), rng.uniform(-1e3, 1e3)
-    angles, impulses = np.zeros(STEPS), rng.uniform(-7.5, 7.5, STEPS)
+    v = rng.uniform(-50.0, 50.0)
+    z = rng.uniform(-1e3, 1e3)
+    angles = np.zeros(STEPS)
+    impulses = rng.uniform(-7.5, 7.5, STEPS)
     for k in range(STEPS):
         x = LABEL_M - E_M_S * STEP_S * k
         bound = 0.00023 - (0.00023 - 0.00015) * x / 5.8e6
@@ -33,8 +44,8 @@ def history(seed: int) -> tuple[Floats, Floats]:
 def program(angles: Floats, impulses: Floats, direction: Floats, shared: bool) -> float:
     """Return the maximum of a linear function of (V, z) after the last image, by a linear program.
 
-    The unknowns are V and z at the start, the changes of V by the disturbance, and the relative errors of the impulses:
-    one for each of them, or one for all.
+    The unknowns are V and z at the start, the changes of V by the disturbance, and the relative
+    errors of the impulses: one for each of them, or one for all.
     """
     share = ETA / (1.0 - ETA)
     number = 2 + STEPS + (1 if shared else STEPS)
@@ -42,32 +53,50 @@ def program(angles: Floats, impulses: Floats, direction: Floats, shared: bool) -
     half = 0.5 * NU_M_S2 / (1.0 - ETA) * STEP_S
     limits = [*start, (-half, half), *[(-2.0 * half, 2.0 * half)] * (STEPS - 1)]
     limits += [(-share, share)] * (number - len(limits))
-    v, z, known_v, known_z = np.eye(number)[0], np.eye(number)[1], 0.0, 0.0
+    v = np.eye(number)[0]
+    z = np.eye(number)[1]
+    known_v = 0.0
+    known_z = 0.0
     v[2] = 1.0
-    rows, bounds = [], []
+    rows = []
+    bounds = []
     for k in range(STEPS):
         x = LABEL_M - E_M_S * STEP_S * k
         # The sensor's bound, which falls with the range, at the minimum true range (1 - eta) x.
         error = 0.00023 - (0.00023 - 0.00015) * (1.0 - ETA) * x / 5.8e6
         rows += [z / x, -z / x]
-        bounds += [math.tan(angles[k] + error) - known_z / x, known_z / x - math.tan(angles[k] - error)]
+        bounds += [
+            math.tan(angles[k] + error) - known_z / x,
+            known_z / x - math.tan(angles[k] - error),
+        ]
         if k == STEPS - 1:
             break
-        v, known_v = v.copy(), known_v - impulses[k]
+        v = v.copy()
+        known_v = known_v - impulses[k]
         v[2 + STEPS + (0 if shared else k)] -= impulses[k]
-        z, known_z = z + v * STEP_S, known_z + known_v * STEP_S
+        z = z + v * STEP_S
+        known_z = known_z + known_v * STEP_S
         v = v.copy()
         v[3 + k] += 1.0
     # Rows in units of the bound: the solver's tolerances are absolute.
-    best = linprog(-(direction[0] * v + direction[1] * z), 1e4 * np.array(rows), 1e4 * np.array(bounds), bounds=limits)
+    best = linprog(
+        -(direction[0] * v + direction[1] * z),
+        1e4 * np.array(rows),
+        1e4 * np.array(bounds),
+        bounds=limits,
+    )
     assert best.success
     return float(direction[0] * known_v + direction[1] * known_z - best.fun)
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_section_is_the_set_of_impulses_with_errors_of_their_own_and_contains_that_of_one_speed(seed: int) -> None:
+def test_a_section_is_the_set_of_impulses_with_errors_of_their_own_and_contains_that_of_one_speed(
+    seed: int,
+) -> None:
     angles, impulses = history(seed)
-    model = SetModel(E_M_S, STEP_S, BOX, SENSOR, disturbance_m_s2=NU_M_S2, sections=5, model=Model.GUARANTEED)
+    model = SetModel(
+        E_M_S, STEP_S, BOX, SENSOR, disturbance_m_s2=NU_M_S2, sections=5, model=Model.GUARANTEED
+    )
     information = InformationSet(model)
     for k in range(STEPS):
         information.measure_angle(angles[k])
@@ -76,12 +105,16 @@ def test_a_section_is_the_set_of_impulses_with_errors_of_their_own_and_contains_
             information.predict()
     polygon = information.section_at(LABEL_M).polygons[0]
     vertices = polygon.vertices[: int(polygon.counts)]
-    to_go_s, since_first_s = LABEL_M / E_M_S - STEP_S * (STEPS - 1), STEP_S * (STEPS - 1)
+    to_go_s = LABEL_M / E_M_S - STEP_S * (STEPS - 1)
+    since_first_s = STEP_S * (STEPS - 1)
     shares = []
     # The predicted miss, V, the height at the first image without impulses, and z.
     for direction in np.array([[to_go_s, 1.0], [1.0, 0.0], [-since_first_s, 1.0], [0.0, 1.0]]):
         both = np.stack([direction, -direction])
-        own, one = (np.array([program(angles, impulses, side, shared) for side in both]) for shared in (False, True))
+        own, one = (
+            np.array([program(angles, impulses, side, shared) for side in both])
+            for shared in (False, True)
+        )
         of_section = (both @ vertices.T).max(axis=1)
         width = own.sum()
         assert of_section == pytest.approx(own, abs=1e-6 * width)

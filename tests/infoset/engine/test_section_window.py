@@ -1,4 +1,6 @@
-"""Sections of a window of labels hold every motion whose label is in the window, and those of its labels."""
+"""Sections of a window of labels hold every motion whose label is in the window, and those of its
+labels.
+"""
 
 from __future__ import annotations
 
@@ -21,9 +23,11 @@ ANGLE_ERROR, RATE_ERROR, PUSH = 2.3e-4, 1e-5, 0.02
 
 
 def _extremes(label: float, near: float, far: float, past: Past) -> Any:
-    """Return the extremes of the predicted miss in the section of a label in a window, displaced by (13).
+    """Return the extremes of the predicted miss in the section of a label in a window, displaced by
+    (13).
 
-    If the replay of the window is thinned, it applies what has cut the sections of three of its labels.
+    If the replay of the window is thinned, it applies what has cut the sections of three of its
+    labels.
     """
     replays.select(past, 0)
     if past.thinned:
@@ -31,18 +35,25 @@ def _extremes(label: float, near: float, far: float, past: Past) -> Any:
             replays.run(each, replays.with_window(past, np.inf, -np.inf))
     window = Past(past.log, past.errors, past.laws, past.room, near, far, past.thinned)
     died, _, _ = replays.run(label, window)
-    law, middle = law_of(past.laws, 0), replays.middle_label(label, window)
+    law = law_of(past.laws, 0)
+    middle = replays.middle_label(label, window)
     section = replays.replayed_section(window, 0, PROBE, middle)
     upper, lower = chains.max_and_min_miss(section, time_to_go(middle, past.log.elapsed, law))
     turn = past.room.drifts[0, 0] * (label - middle) / law.closing_speed
-    return died == ALIVE, lower - turn - past.room.drifts[0, 1], upper - turn + past.room.drifts[0, 1]
+    return (
+        died == ALIVE,
+        lower - turn - past.room.drifts[0, 1],
+        upper - turn + past.room.drifts[0, 1],
+    )
 
 
 extremes = JIT(_nrt=False)(_extremes)
 
 
 def flight(seed: int, rate_period: int) -> tuple[Past, float, float]:
-    """Return the history of a motion with errors, impulses and accelerations at their bounds, its label and miss."""
+    """Return the history of a motion with errors, impulses and accelerations at their bounds, its
+    label and miss.
+    """
     draws = np.random.default_rng(seed)
     box = StateBox((-1e4, 1e4), (5.3e6, 6.3e6), (-100.0, 100.0), (-SPEED, -SPEED))
     model = SetModel(
@@ -51,20 +62,26 @@ def flight(seed: int, rate_period: int) -> tuple[Past, float, float]:
         execution_error_relative=0.02,
     )  # fmt: skip
     label = draws.uniform(5.7e6, 5.9e6)
-    z, v = draws.uniform(-1e3, 1e3), draws.uniform(-20.0, 20.0)
+    z = draws.uniform(-1e3, 1e3)
+    v = draws.uniform(-20.0, 20.0)
     information = InformationSet(model)
     for step in range(STEPS):
         x = label - SPEED * STEP * step
         omega = (v + SPEED * z / x) / x / (1.0 + (z / x) ** 2)
-        information.measure_angle(math.atan(z / x) + draws.choice([-1.0, 1.0, draws.uniform(-1, 1)]) * ANGLE_ERROR)
+        information.measure_angle(
+            math.atan(z / x) + draws.choice([-1.0, 1.0, draws.uniform(-1, 1)]) * ANGLE_ERROR
+        )
         if step % rate_period == 0:
-            information.measure_rate(omega + draws.choice([-1.0, 1.0, draws.uniform(-1, 1)]) * RATE_ERROR, RATE_ERROR)
+            information.measure_rate(
+                omega + draws.choice([-1.0, 1.0, draws.uniform(-1, 1)]) * RATE_ERROR, RATE_ERROR
+            )
         impulse = draws.uniform(-7.0, 7.0) * (draws.random() < 0.2)
         information.shift(impulse)
         information.predict()
         v -= impulse * (1.0 + 0.02 * draws.choice([-1.0, 1.0]))
         acceleration = PUSH * draws.choice([-1.0, 1.0])
-        z, v = z + v * STEP + 0.5 * acceleration * STEP**2, v + acceleration * STEP
+        z = z + v * STEP + 0.5 * acceleration * STEP**2
+        v = v + acceleration * STEP
     state = information._state
     return past_of(state.history, state.table), label, z + v * (label / SPEED - STEPS * STEP)
 
@@ -98,10 +115,13 @@ def test_the_section_of_a_window_holds_the_motion_and_the_sections_of_its_labels
 
 @pytest.mark.parametrize("thinned", [False, True])
 @pytest.mark.parametrize("seed", range(6))
-def test_the_extremes_of_a_window_are_concave_and_tend_to_those_of_its_labels(seed: int, thinned: bool) -> None:
+def test_the_extremes_of_a_window_are_concave_and_tend_to_those_of_its_labels(
+    seed: int, thinned: bool
+) -> None:
     past, label, _ = flight(seed, 1)
     windows = past._replace(thinned=thinned)
-    widths, excess = (3e4, 300.0, 0.03), []
+    widths = (3e4, 300.0, 0.03)
+    excess = []
     for width in widths:
         labels: NDArray[np.float64] = np.linspace(label - width / 2, label + width / 2, 9)
         found = [extremes(each, labels[0], labels[-1], windows) for each in labels]

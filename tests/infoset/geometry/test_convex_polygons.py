@@ -1,4 +1,6 @@
-"""Batches: shapes, broadcasting, indexing, errors, what a person sees; polygons from points and from shapely."""
+"""Batches: shapes, broadcasting, indexing, errors, what a person sees; polygons from points and
+from shapely.
+"""
 
 from __future__ import annotations
 
@@ -17,9 +19,12 @@ from tests.rationals import Fraction
 def boxes(shape: tuple[int, ...]) -> ConvexPolygons:
     """A batch of boxes [0, k + 1] x [0, 1], k counting the batch."""
     widths = np.arange(1.0, math.prod(shape) + 1.0).reshape(shape)
-    zeros, ones = np.zeros(shape), np.ones(shape)
+    zeros = np.zeros(shape)
+    ones = np.ones(shape)
     corners = [(zeros, zeros), (widths, zeros), (widths, ones), (zeros, ones)]
-    return ConvexPolygons(np.stack([np.stack(c, axis=-1) for c in corners], axis=-2), np.full(shape, 4))
+    return ConvexPolygons(
+        np.stack([np.stack(c, axis=-1) for c in corners], axis=-2), np.full(shape, 4)
+    )
 
 
 def square() -> ConvexPolygons:
@@ -30,7 +35,8 @@ def segment() -> ConvexPolygons:
     return ConvexPolygons([(0.0, 0.0), (3.0, 4.0)], 2)
 
 
-# Batches --------------------------------------------------------------------------------------------------------
+# Batches
+# --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("shape", [(3,), (2, 3)])
@@ -38,7 +44,8 @@ def test_a_batch_gives_what_its_members_give(shape: tuple[int, ...]) -> None:
     batch = boxes(shape)
     random = np.random.default_rng(1)
     vectors = random.normal(size=(*shape, 2))
-    lower, upper = random.uniform(-0.5, 0.2, shape), random.uniform(0.3, 2.0, shape)
+    lower = random.uniform(-0.5, 0.2, shape)
+    upper = random.uniform(0.3, 2.0, shape)
     matrices = random.normal(size=(*shape, 2, 2))
     operations: list[Callable[..., Any]] = [
         lambda sets, _, *vector: sets.cut(*vector),
@@ -55,9 +62,11 @@ def test_a_batch_gives_what_its_members_give(shape: tuple[int, ...]) -> None:
     for operation in operations:
         whole = operation(*arguments)
         for index in np.ndindex(shape):
-            many, alone = whole[index], operation(*(each[index] for each in arguments))
+            many = whole[index]
+            alone = operation(*(each[index] for each in arguments))
             if isinstance(alone, ConvexPolygons):
-                many, alone = many.polygon(), alone.polygon()
+                many = many.polygon()
+                alone = alone.polygon()
             np.testing.assert_array_equal(many, alone)
 
 
@@ -92,11 +101,12 @@ def test_indexing_slicing_masking_and_iteration() -> None:
         batch[2]
 
 
-# Empty sets -----------------------------------------------------------------------------------------------------
+# Empty sets
+# --------------------------------------------------------------------------------------------------
 
 
-# Here and below a case is a function that returns a set: kernels are compiled when tests run, not when they are
-# collected.
+# Here and below a case is a function that returns a set: kernels are compiled when tests run, not
+# when they are collected.
 @pytest.mark.parametrize(
     "make", [ConvexPolygons.empty, lambda: square().cut((1.0, 0.0), 5.0, 6.0)], ids=["made", "cut"]
 )
@@ -122,7 +132,11 @@ def test_operations_on_the_empty_set_are_empty(make: Callable[[], ConvexPolygons
 
 @pytest.mark.parametrize(
     "measure",
-    [ConvexPolygons.centroid, lambda p: np.ma.stack(p.bounding_box()), lambda p: p.support_vector((1.0, 0.0))],
+    [
+        ConvexPolygons.centroid,
+        lambda p: np.ma.stack(p.bounding_box()),
+        lambda p: p.support_vector((1.0, 0.0)),
+    ],
     ids=["centroid", "bounding_box", "support_vector"],
 )
 def test_the_empty_set_has_no_points_to_give(measure: Callable[[ConvexPolygons], object]) -> None:
@@ -149,7 +163,8 @@ def test_results_of_a_batch_are_arguments_of_it_although_masked_for_empty_polygo
         assert (0.0, 0.0) in batch
 
 
-# From points, to shapely and back ---------------------------------------------------------------------------------
+# From points, to shapely and back
+# --------------------------------------------------------------------------------------------------
 
 
 def around(vertices: np.ndarray) -> list[tuple[float, float]]:
@@ -181,7 +196,9 @@ STAR = [(math.cos(turn), math.sin(turn)) for turn in 0.8 * math.pi * np.arange(5
         (STAR, 3),
     ],
 )
-def test_a_ring_is_refused_where_it_is_not_convex_and_the_constructor_takes_its_hull(ring: Any, vertex: int) -> None:
+def test_a_ring_is_refused_where_it_is_not_convex_and_the_constructor_takes_its_hull(
+    ring: Any, vertex: int
+) -> None:
     with pytest.raises(ValueError, match=f"the ring is not convex: vertex {vertex},"):
         ConvexPolygons.from_vertices(ring)
     with pytest.raises(ValueError, match=rf"vertex {vertex} of polygon \[1\]"):
@@ -200,7 +217,9 @@ def test_a_ring_is_refused_where_it_is_not_convex_and_the_constructor_takes_its_
         ([(0.0, 3.0), (0.0, 1.0), (0.0, 2.0)], [(0.0, 1.0), (0.0, 3.0)]),
     ],
 )
-def test_from_points_of_a_degenerate_set(points: list[tuple[float, float]], wanted: list[tuple[float, float]]) -> None:
+def test_from_points_of_a_degenerate_set(
+    points: list[tuple[float, float]], wanted: list[tuple[float, float]]
+) -> None:
     hull = ConvexPolygons.from_points(points)
     assert hull.shape == ()
     assert sorted(map(tuple, hull.polygon().tolist())) == wanted
@@ -233,7 +252,9 @@ def test_from_shapely_orients_and_refuses() -> None:
     clockwise = shapely.Polygon([(0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)])
     assert ConvexPolygons.from_shapely(clockwise).area() == 1.0
     with pytest.raises(ValueError, match="not convex"):
-        ConvexPolygons.from_shapely(shapely.Polygon([(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (3.0, 1.0)]))
+        ConvexPolygons.from_shapely(
+            shapely.Polygon([(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (3.0, 1.0)])
+        )
     with pytest.raises(ValueError, match="is needed"):
         ConvexPolygons.from_shapely(shapely.MultiPoint([(0.0, 0.0), (1.0, 0.0)]))
     with pytest.raises(ValueError, match="choose one with an index"):
@@ -242,7 +263,8 @@ def test_from_shapely_orients_and_refuses() -> None:
 
 @pytest.mark.parametrize("kind", [ConvexPolygons, Polytope])
 @pytest.mark.parametrize(
-    "value", [[(0.0, 0.0), (1.0, 0.0)], "POINT (1 2)", None, shapely.LinearRing([(0, 0), (1, 0), (0, 1)])]
+    "value",
+    [[(0.0, 0.0), (1.0, 0.0)], "POINT (1 2)", None, shapely.LinearRing([(0, 0), (1, 0), (0, 1)])],
 )
 def test_from_shapely_names_the_geometries_that_it_takes(kind: Any, value: Any) -> None:
     with pytest.raises(ValueError, match="a Point, a LineString or a Polygon is needed: got"):
@@ -266,11 +288,17 @@ def test_preimage_under_a_singular_matrix_is_unbounded_if_its_range_meets_the_po
 
 def test_preimage_under_a_singular_matrix_is_empty_if_its_range_misses_the_polygon() -> None:
     """Formerly 'unbounded'."""
-    assert ConvexPolygons.from_points([[4, -1], [3, 4], [2, -1]]).preimage([[3, -2], [6, -4]]).is_empty
+    assert (
+        ConvexPolygons.from_points([[4, -1], [3, 4], [2, -1]]).preimage([[3, -2], [6, -4]]).is_empty
+    )
 
 
-@pytest.mark.parametrize(("point", "is_empty"), [((0.5, 0.5), False), ((1.0, 1.0), False), ((1.5, 0.5), True)])
-def test_preimage_under_the_zero_matrix_is_decided_by_the_offset(point: tuple[float, float], is_empty: bool) -> None:
+@pytest.mark.parametrize(
+    ("point", "is_empty"), [((0.5, 0.5), False), ((1.0, 1.0), False), ((1.5, 0.5), True)]
+)
+def test_preimage_under_the_zero_matrix_is_decided_by_the_offset(
+    point: tuple[float, float], is_empty: bool
+) -> None:
     if is_empty:
         assert square().preimage(np.zeros((2, 2)), point).is_empty
     else:
@@ -279,7 +307,8 @@ def test_preimage_under_the_zero_matrix_is_decided_by_the_offset(point: tuple[fl
 
 
 def test_preimage_of_a_batch_has_empty_members_and_names_an_unbounded_one() -> None:
-    regular, singular = np.array([[2.0, 0.0], [0.0, 2.0]]), np.array([[1.0, 0.0], [0.0, 0.0]])
+    regular = np.array([[2.0, 0.0], [0.0, 2.0]])
+    singular = np.array([[1.0, 0.0], [0.0, 0.0]])
     batch = boxes((2,))
 
     missed = batch.preimage([regular, singular], [[0.0, 0.0], [0.0, 5.0]])

@@ -73,7 +73,9 @@ def test_batch_is_drawn_member_by_member_without_the_empty_ones() -> None:
     assert first.get_facecolor() != second.get_facecolor()
 
 
-@pytest.mark.parametrize("empty", [ConvexPolygons.empty(), ConvexPolygons.empty((2,)), Polytope.empty(2)])
+@pytest.mark.parametrize(
+    "empty", [ConvexPolygons.empty(), ConvexPolygons.empty((2,)), Polytope.empty(2)]
+)
 def test_empty_set_of_the_plane_has_no_artist(empty: Any) -> None:
     ax = axes_of(2)
 
@@ -106,8 +108,12 @@ def test_empty_set_of_space_has_no_artist() -> None:
         "square in space", "tetrahedron",
     ],
 )  # fmt: skip
-@pytest.mark.parametrize("style", [{}, {"color": "black"}, {"facecolor": "red"}, {"alpha": 0.5, "linewidth": 2.0}])
-def test_set_of_any_dimension_is_visible(points: list[tuple[float, ...]], style: dict[str, Any]) -> None:
+@pytest.mark.parametrize(
+    "style", [{}, {"color": "black"}, {"facecolor": "red"}, {"alpha": 0.5, "linewidth": 2.0}]
+)
+def test_set_of_any_dimension_is_visible(
+    points: list[tuple[float, ...]], style: dict[str, Any]
+) -> None:
     """Formerly nothing was visible of points, segments and slivers."""
     space = len(points[0])
     sets: list[Any] = [Polytope.from_vertices(points)]
@@ -152,7 +158,9 @@ def test_order_around_a_polygon_in_space_is_that_of_its_angles_in_the_plane(seed
 
 @pytest.mark.parametrize("seed", range(5))
 def test_edges_of_facets_join_vertices_with_two_common_facets(seed: int) -> None:
-    """The order around a facet agrees with the incidence: neighbours in it are on another common facet."""
+    """The order around a facet agrees with the incidence: neighbours in it are on another common
+    facet.
+    """
     random = np.random.default_rng(seed)
     polytope = Zonotope([0, 0, 0], random.normal(size=(4, 3))).polytope()
 
@@ -191,7 +199,11 @@ def test_sets_in_space_have_different_colours_and_are_within_the_limits() -> Non
     ax.figure.canvas.draw()
 
     assert len({tuple(artist.get_edgecolor()[0]) for artist in (first, second, third)}) == 3
-    for low, high, ends in [(10, 15, ax.get_xlim()), (20, 29, ax.get_ylim()), (30, 31, ax.get_zlim())]:
+    for low, high, ends in [
+        (10, 15, ax.get_xlim()),
+        (20, 29, ax.get_ylim()),
+        (30, 31, ax.get_zlim()),
+    ]:
         assert low - 1 < ends[0] <= low
         assert high <= ends[1] < high + 1
 
@@ -238,7 +250,10 @@ def test_axes_are_made_in_a_new_figure(dimension: int) -> None:
 )
 def test_axes_of_another_dimension_are_refused(make: Callable[[], Any], space: int) -> None:
     each = make()
-    with pytest.raises(ValueError, match=rf"a set of R\^{5 - space} is drawn on axes of {5 - space} dimensions: got"):
+    with pytest.raises(
+        ValueError,
+        match=rf"a set of R\^{5 - space} is drawn on axes of {5 - space} dimensions: got",
+    ):
         each.plot(axes_of(space))
 
 
@@ -258,5 +273,8 @@ def test_argument_that_is_no_axes_is_refused(make: Callable[[], Any]) -> None:
     ],
 )
 def test_set_of_another_space_says_what_to_do(space: int, instead: str) -> None:
-    with pytest.raises(ValueError, match=rf"sets of R\^2 and R\^3 are drawn, and this one is of R\^{space}: {instead}"):
+    with pytest.raises(
+        ValueError,
+        match=rf"sets of R\^2 and R\^3 are drawn, and this one is of R\^{space}: {instead}",
+    ):
         Polytope.from_box([0] * space, [1] * space).plot()

@@ -24,7 +24,9 @@ class Arguments(NamedTuple):
     other: ConvexPolygons
 
     def of(self, index: tuple[int, ...]) -> Arguments:
-        return Arguments(self.vector[index], self.matrix[index], self.number[index], self.other[index])
+        return Arguments(
+            self.vector[index], self.matrix[index], self.number[index], self.other[index]
+        )
 
 
 Operation = Callable[[ConvexPolygons, Arguments], Any]
@@ -79,7 +81,9 @@ OTHERS = {
     "empty": "makes empty sets",
     "unchecked": "takes arrays of kernels",
     **dict.fromkeys(["vertices", "counts", "shape", "space"], "attributes"),
-    **dict.fromkeys(["from_vertices", "from_points", "from_constraints", "from_box"], "make sets of numbers"),
+    **dict.fromkeys(
+        ["from_vertices", "from_points", "from_constraints", "from_box"], "make sets of numbers"
+    ),
     **dict.fromkeys(["from_ball", "from_zonotope", "from_shapely"], "make sets of numbers"),
     **dict.fromkeys(["polygon", "polytope", "to_shapely"], "of a single polygon"),
     "stack": "makes all batches of this module",
@@ -88,19 +92,28 @@ OTHERS = {
 """Other public names, and why they are not among the cases."""
 
 
-def random_batch(random: np.random.Generator, shape: tuple[int, ...], empty_share: float) -> ConvexPolygons:
+def random_batch(
+    random: np.random.Generator, shape: tuple[int, ...], empty_share: float
+) -> ConvexPolygons:
     """A batch of polygons, segments, points and empty sets."""
     members = []
     for _ in range(math.prod(shape)):
         size = 0 if random.random() < empty_share else int(random.choice([1, 2, 3, 5, 8]))
         members.append(ConvexPolygons.from_points(random.uniform(-1.0, 1.0, (size, 2))))
     flat = ConvexPolygons.stack(members)
-    return ConvexPolygons.unchecked(flat.vertices.reshape(*shape, *flat.vertices.shape[1:]), flat.counts.reshape(shape))
+    return ConvexPolygons.unchecked(
+        flat.vertices.reshape(*shape, *flat.vertices.shape[1:]), flat.counts.reshape(shape)
+    )
 
 
-def random_arguments(random: np.random.Generator, shape: tuple[int, ...], other: ConvexPolygons) -> Arguments:
+def random_arguments(
+    random: np.random.Generator, shape: tuple[int, ...], other: ConvexPolygons
+) -> Arguments:
     return Arguments(
-        random.normal(size=(*shape, 2)), random.normal(size=(*shape, 2, 2)), random.uniform(0.0, 0.3, shape), other
+        random.normal(size=(*shape, 2)),
+        random.normal(size=(*shape, 2, 2)),
+        random.uniform(0.0, 0.3, shape),
+        other,
     )
 
 
@@ -155,7 +168,9 @@ def test_members_give_what_they_give_alone(name: str, seed: int) -> None:
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("share", [0.5, 1.0])
 @pytest.mark.parametrize("name", CASES)
-def test_empty_members_give_what_the_empty_set_gives(name: str, share: float, shape: tuple[int, ...]) -> None:
+def test_empty_members_give_what_the_empty_set_gives(
+    name: str, share: float, shape: tuple[int, ...]
+) -> None:
     random = np.random.default_rng(5)
     square = ConvexPolygons.from_box([-2.0, -2.0], [2.0, 2.0])
     batch = random_batch(random, shape, share)
@@ -185,7 +200,9 @@ def test_empty_members_give_what_the_empty_set_gives(name: str, share: float, sh
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("shape", SHAPES)
-def test_values_may_be_masked_for_empty_members_as_results_are(name: str, shape: tuple[int, ...]) -> None:
+def test_values_may_be_masked_for_empty_members_as_results_are(
+    name: str, shape: tuple[int, ...]
+) -> None:
     """Formerly an error of distance, affine_map, preimage and, for its normals, cut."""
     random = np.random.default_rng(6)
     batch = random_batch(random, shape, 0.5)
@@ -204,9 +221,13 @@ def test_values_may_be_masked_for_empty_members_as_results_are(name: str, shape:
             assert_same(masked, operation(batch[index], given.of(index)), index)
 
 
-@pytest.mark.parametrize("name", ["distance from points", "affine_map", "preimage", "translate", "contains"])
+@pytest.mark.parametrize(
+    "name", ["distance from points", "affine_map", "preimage", "translate", "contains"]
+)
 def test_value_that_is_masked_for_a_set_with_points_is_refused(name: str) -> None:
-    batch = ConvexPolygons.stack([ConvexPolygons.empty(), ConvexPolygons.from_box([0.0, 0.0], [1.0, 1.0])])
+    batch = ConvexPolygons.stack(
+        [ConvexPolygons.empty(), ConvexPolygons.from_box([0.0, 0.0], [1.0, 1.0])]
+    )
     hidden = np.ma.masked_array(np.zeros((2, 2)), [[True, True], [False, True]])
     arguments = random_arguments(np.random.default_rng(0), (2,), batch)._replace(vector=hidden)
 
@@ -215,7 +236,9 @@ def test_value_that_is_masked_for_a_set_with_points_is_refused(name: str) -> Non
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_samples_of_a_batch_are_in_its_members_and_masked_for_empty_ones(shape: tuple[int, ...]) -> None:
+def test_samples_of_a_batch_are_in_its_members_and_masked_for_empty_ones(
+    shape: tuple[int, ...],
+) -> None:
     batch = random_batch(np.random.default_rng(7), shape, 0.5)
 
     points = batch.sample(9)
@@ -244,5 +267,6 @@ def test_constraints_of_a_batch_make_it_again(shape: tuple[int, ...]) -> None:
         sides = normals[tuple(index)][: batch.counts[tuple(index)]]
         before = np.roll(sides, 1, axis=0)
         assert np.abs(before[:, 0] * sides[:, 1] - before[:, 1] * sides[:, 0]).min() > 0.2
-    # Coordinates and offsets below 2 are known to less than 10 roundings, and the crossings of sides to 5 times that.
+    # Coordinates and offsets below 2 are known to less than 10 roundings, and the crossings of
+    # sides to 5 times that.
     assert (again.hausdorff_distance(batch)[solid] < 50.0 * np.finfo(float).eps).all()

@@ -66,13 +66,17 @@ def set_of(given: dict[str, Any]) -> AnySet:
     if "lower" in given:
         return Polytope.from_box(given["lower"], given["upper"])
     if "points" in given:
-        return Polytope.from_rays(given["points"], given.get("directions", ()), given.get("lines", ()))
+        return Polytope.from_rays(
+            given["points"], given.get("directions", ()), given.get("lines", ())
+        )
     if "generators" in given:
         return Zonotope(given["centre"], given["generators"])
     space = space_of(given)
     normals = numbers(given["normals"]).reshape(-1, space)
     across = numbers(given.get("across", [])).reshape(-1, space)
-    return Polytope.from_constraints(normals, numbers(given["offsets"]), across, given.get("levels", []))
+    return Polytope.from_constraints(
+        normals, numbers(given["offsets"]), across, given.get("levels", [])
+    )
 
 
 def facets_of(one: AnySet) -> Floats:
@@ -156,7 +160,10 @@ OPERATIONS: dict[str, Callable[..., Any]] = {
     "support": lambda one, directions: one.support_function(directions),
     "support vector": lambda one, direction: one.support_vector(direction),
     "equal supports": lambda one, other, directions: np.allclose(
-        one.support_function(directions), other.support_function(directions), rtol=0.0, atol=TOLERANCE
+        one.support_function(directions),
+        other.support_function(directions),
+        rtol=0.0,
+        atol=TOLERANCE,
     ),
     # Rows in any order.
     "vertices": lambda one: one.vertices,
@@ -164,7 +171,12 @@ OPERATIONS: dict[str, Callable[..., Any]] = {
     "half-spaces": facets_of,
     "half-spaces of the projection": lambda one, axes: facets_of(one.project(axes)),
 }
-IN_ANY_ORDER = ["vertices", "vertices of the half-spaces", "half-spaces", "half-spaces of the projection"]
+IN_ANY_ORDER = [
+    "vertices",
+    "vertices of the half-spaces",
+    "half-spaces",
+    "half-spaces of the projection",
+]
 
 
 def assert_same_sets(found: AnySet, expected: AnySet) -> None:
@@ -211,7 +223,9 @@ def test_answer_is_that_of_the_other_project_or_its_difference_is_explained(numb
     elif case["operation"] in IN_ANY_ORDER:
         assert_same_rows(found, numbers(expected))
     else:
-        np.testing.assert_allclose(np.asarray(found, float), numbers(expected), rtol=near, atol=near)
+        np.testing.assert_allclose(
+            np.asarray(found, float), numbers(expected), rtol=near, atol=near
+        )
 
 
 def test_each_difference_has_a_reason_and_is_one() -> None:

@@ -1,8 +1,9 @@
 """Every operation on convex polygons against exact rational arithmetic.
 
-Tolerances come from rounding alone. `U` is the unit of rounding of a double; an operation that rounds each coordinate
-a few times errs by a few `U` times the maximum value of *that* coordinate, so sets are compared up to a small box,
-not a disc: nothing is hidden when x is a billion times y. Inputs are exactly convex: hulls taken in rationals.
+Tolerances come from rounding alone. `U` is the unit of rounding of a double; an operation that
+rounds each coordinate a few times errs by a few `U` times the maximum value of *that* coordinate,
+so sets are compared up to a small box, not a disc: nothing is hidden when x is a billion times y.
+Inputs are exactly convex: hulls taken in rationals.
 """
 
 from __future__ import annotations
@@ -25,12 +26,15 @@ Exact = tuple[Fraction, Fraction]
 ORIGIN: Exact = (Fraction(0), Fraction(0))
 Vertices = list[tuple[float, float]]
 SOME = settings(
-    max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large]
+    max_examples=30,
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
 )
 FEWER = settings(SOME, max_examples=20)
 
 
-# The oracle -----------------------------------------------------------------------------------------------------
+# The oracle
+# --------------------------------------------------------------------------------------------------
 
 
 def exact(points: Sequence[Sequence[float] | np.ndarray] | np.ndarray) -> list[Exact]:
@@ -73,12 +77,15 @@ AXES: list[Exact] = [(Fraction(x), Fraction(y)) for x, y in ((1, 0), (0, 1), (-1
 def outside_by(points: Sequence[Exact], polygon: Sequence[Exact], box: Exact) -> Exact | None:
     """Return a point that is not in the polygon enlarged by [-box, box], if there is one.
 
-    The normals of that sum are those of the polygon and the axes: to test these is to test containment.
+    The normals of that sum are those of the polygon and the axes: to test these is to test
+    containment.
     """
     if not polygon:
         return points[0] if points else None
     for normal in normals_of(polygon) + AXES:
-        reach = max(dot(normal, p) for p in polygon) + abs(normal[0]) * box[0] + abs(normal[1]) * box[1]
+        reach = (
+            max(dot(normal, p) for p in polygon) + abs(normal[0]) * box[0] + abs(normal[1]) * box[1]
+        )
         for point in points:
             if dot(normal, point) > reach:
                 return point
@@ -91,10 +98,14 @@ def assert_same_set(got: ConvexPolygons, wanted: Sequence[Exact], box: Exact) ->
     lost = outside_by(wanted, hull(result), box)
     assert lost is None, f"lost {[float(c) for c in lost]} from {got.polygon().tolist()}"
     extra = outside_by(result, hull(wanted), box)
-    assert extra is None, f"{[float(c) for c in extra]} of {got.polygon().tolist()} is not in the exact set"
+    assert extra is None, (
+        f"{[float(c) for c in extra]} of {got.polygon().tolist()} is not in the exact set"
+    )
 
 
-def exact_clip(polygon: Sequence[Exact], normal: Exact, lower: Fraction | None, upper: Fraction | None) -> list[Exact]:
+def exact_clip(
+    polygon: Sequence[Exact], normal: Exact, lower: Fraction | None, upper: Fraction | None
+) -> list[Exact]:
     """Intersection with the band; None is no bound."""
     kept = list(polygon)
     for sign, bound in ((1, lower), (-1, upper)):
@@ -103,10 +114,14 @@ def exact_clip(polygon: Sequence[Exact], normal: Exact, lower: Fraction | None, 
         heights = [sign * (dot(normal, p) - bound) for p in kept]
         cut: list[Exact] = []
         for i, here in enumerate(kept):
-            before, h_before, h = kept[i - 1], heights[i - 1], heights[i]
+            before = kept[i - 1]
+            h_before = heights[i - 1]
+            h = heights[i]
             if h_before * h < 0:
                 f = h_before / (h_before - h)
-                cut.append((before[0] + f * (here[0] - before[0]), before[1] + f * (here[1] - before[1])))
+                cut.append(
+                    (before[0] + f * (here[0] - before[0]), before[1] + f * (here[1] - before[1]))
+                )
             if h >= 0:
                 cut.append(here)
         kept = hull(cut)
@@ -114,20 +129,30 @@ def exact_clip(polygon: Sequence[Exact], normal: Exact, lower: Fraction | None, 
 
 
 def exact_area(polygon: Sequence[Exact]) -> Fraction:
-    return sum((turn(polygon[0], polygon[i], polygon[i + 1]) for i in range(1, len(polygon) - 1)), Fraction(0)) / 2
+    return (
+        sum(
+            (turn(polygon[0], polygon[i], polygon[i + 1]) for i in range(1, len(polygon) - 1)),
+            Fraction(0),
+        )
+        / 2
+    )
 
 
 def exact_centroid(polygon: Sequence[Exact]) -> Exact:
-    total, x, y = Fraction(0), Fraction(0), Fraction(0)
+    total = Fraction(0)
+    x = Fraction(0)
+    y = Fraction(0)
     for i in range(1, len(polygon) - 1):
-        b, c = polygon[i], polygon[i + 1]
+        b = polygon[i]
+        c = polygon[i + 1]
         weight = turn(polygon[0], b, c)
         total += weight
         x += weight * (polygon[0][0] + b[0] + c[0]) / 3
         y += weight * (polygon[0][1] + b[1] + c[1]) / 3
     if total:
         return x / total, y / total
-    first, last = polygon[0], polygon[-1]
+    first = polygon[0]
+    last = polygon[-1]
     return (first[0] + last[0]) / 2, (first[1] + last[1]) / 2
 
 
@@ -135,7 +160,8 @@ def exact_distance(polygon: Sequence[Exact], point: Exact) -> float:
     """Distance to the boundary, rounded once or twice."""
     minimum: Fraction | None = None
     for a, b in zip(polygon, [*polygon[1:], polygon[0]], strict=True):
-        edge, away = (b[0] - a[0], b[1] - a[1]), (point[0] - a[0], point[1] - a[1])
+        edge = (b[0] - a[0], b[1] - a[1])
+        away = (point[0] - a[0], point[1] - a[1])
         length = dot(edge, edge)
         f = min(Fraction(1), max(Fraction(0), dot(edge, away) / length)) if length else Fraction(0)
         gap = (away[0] - f * edge[0], away[1] - f * edge[1])
@@ -146,10 +172,13 @@ def exact_distance(polygon: Sequence[Exact], point: Exact) -> float:
 
 def strictly_inside(polygon: Sequence[Exact], point: Exact) -> bool:
     around = [*polygon[1:], polygon[0]]
-    return len(polygon) > 2 and all(turn(a, b, point) > 0 for a, b in zip(polygon, around, strict=True))
+    return len(polygon) > 2 and all(
+        turn(a, b, point) > 0 for a, b in zip(polygon, around, strict=True)
+    )
 
 
-# What is tested -------------------------------------------------------------------------------------------------
+# What is tested
+# --------------------------------------------------------------------------------------------------
 
 
 class Case(NamedTuple):
@@ -165,7 +194,8 @@ class Case(NamedTuple):
 
     @property
     def extent(self) -> Exact:
-        xs, ys = [p[0] for p in self.exact], [p[1] for p in self.exact]
+        xs = [p[0] for p in self.exact]
+        ys = [p[1] for p in self.exact]
         return max(xs) - min(xs), max(ys) - min(ys)
 
     def box(self, more: Exact = ORIGIN, few: int = FEW) -> Exact:
@@ -178,8 +208,12 @@ def case_of(points: Vertices) -> Case:
     return Case(ConvexPolygons(vertices, len(vertices)), corners)
 
 
-# On a lattice, so that coincidences happen, and numbers below 1e-12 of the scale do not: underflow is not the subject.
-UNIT = st.one_of(st.integers(-(2**40), 2**40).map(lambda i: i / 2**40), st.sampled_from([-1.0, -0.5, 0.0, 0.5, 1.0]))
+# On a lattice, so that coincidences happen, and numbers below 1e-12 of the scale do not: underflow
+# is not the subject.
+UNIT = st.one_of(
+    st.integers(-(2**40), 2**40).map(lambda i: i / 2**40),
+    st.sampled_from([-1.0, -0.5, 0.0, 0.5, 1.0]),
+)
 ANGLE = st.floats(0.0, 2.0 * math.pi)
 SCALE = st.integers(-5, 4).map(lambda k: 10.0**k)  # nine decades
 
@@ -187,11 +221,14 @@ SCALE = st.integers(-5, 4).map(lambda k: 10.0**k)  # nine decades
 @st.composite
 def points_of_polygon(draw: st.DrawFn, minimum: int = 1) -> Vertices:
     unit = draw(st.lists(st.tuples(UNIT, UNIT), min_size=minimum, max_size=9))
-    kind = draw(st.sampled_from(["plain", "round", "thin", "tiny", "mixed", "each", "segment", "point"]))
+    kind = draw(
+        st.sampled_from(["plain", "round", "thin", "tiny", "mixed", "each", "segment", "point"])
+    )
     if minimum > 2 and kind in ("segment", "point"):
         kind = "plain"
     angle = draw(ANGLE)
-    c, s = math.cos(angle), math.sin(angle)
+    c = math.cos(angle)
+    s = math.sin(angle)
     if kind == "round":
         turns = [math.pi * (x + 1.0) for x, _ in unit]
         return [(3.0 * math.cos(t), 3.0 * math.sin(t) + 1.0) for t in turns]
@@ -201,7 +238,9 @@ def points_of_polygon(draw: st.DrawFn, minimum: int = 1) -> Vertices:
         at = draw(st.tuples(UNIT, UNIT))
         return [(1e4 * at[0] + 1e-9 * x, 1e4 * at[1] + 1e-9 * y) for x, y in unit]
     if kind == "mixed":
-        across, up, away = draw(SCALE), draw(SCALE), draw(st.sampled_from([0.0, 1.0, 1e3]))
+        across = draw(SCALE)
+        up = draw(SCALE)
+        away = draw(st.sampled_from([0.0, 1.0, 1e3]))
         return [(across * (x + away), up * (y - away)) for x, y in unit]
     if kind == "each":
         return [(draw(SCALE) * x, draw(SCALE) * y) for x, y in unit]
@@ -229,7 +268,9 @@ def directions(draw: st.DrawFn, case: Case) -> tuple[float, float]:
         return float(x), float(y)
     angle = draw(ANGLE)
     if kind == "weighed":
-        return math.cos(angle) / float(case.extent[0] or 1), math.sin(angle) / float(case.extent[1] or 1)
+        return math.cos(angle) / float(case.extent[0] or 1), math.sin(angle) / float(
+            case.extent[1] or 1
+        )
     return math.cos(angle), math.sin(angle)
 
 
@@ -238,19 +279,30 @@ def bands(draw: st.DrawFn, case: Case) -> tuple[tuple[float, float], float, floa
     """Through vertices and edges, across, of no width, reversed, infinite, beside the polygon."""
     normal = draw(directions(case))
     heights = [normal[0] * float(x) + normal[1] * float(y) for x, y in case.exact]
-    low, high = min(heights), max(heights)
+    low = min(heights)
+    high = max(heights)
     width = high - low or 1.0
     level = st.one_of(
         st.sampled_from(heights),
         UNIT.map(lambda f: low + 0.5 * (f + 1.0) * (high - low)),
-        st.sampled_from([low - width, high + width, math.nextafter(low, -math.inf), math.nextafter(high, math.inf)]),
+        st.sampled_from(
+            [
+                low - width,
+                high + width,
+                math.nextafter(low, -math.inf),
+                math.nextafter(high, math.inf),
+            ]
+        ),
     )
     kind = draw(st.sampled_from(["any", "any", "any", "reversed", "zero width", "infinite"]))
-    lower, upper = draw(level), draw(level)
+    lower = draw(level)
+    upper = draw(level)
     if kind == "zero width":
         upper = lower
     elif kind == "infinite":
-        lower, upper = draw(st.sampled_from([(-math.inf, upper), (lower, math.inf), (-math.inf, math.inf)]))
+        lower, upper = draw(
+            st.sampled_from([(-math.inf, upper), (lower, math.inf), (-math.inf, math.inf)])
+        )
     elif (lower > upper) != (kind == "reversed"):
         lower, upper = upper, lower
     return normal, lower, upper
@@ -260,24 +312,31 @@ def bound(value: float, by: Fraction) -> Fraction | None:
     return None if math.isinf(value) else Fraction(value) + by
 
 
-# Cuts -----------------------------------------------------------------------------------------------------------
+# Cuts
+# --------------------------------------------------------------------------------------------------
 
 
 @SOME
 @given(CASES, st.data())
 def test_clip_is_the_exact_intersection_up_to_rounding(case: Case, data: st.DataObject) -> None:
-    """A crossing lies on its edge up to a few ulp, at a height that is right up to rounding of normal . p.
+    """A crossing lies on its edge up to a few ulp, at a height that is right up to rounding of
+    normal . p.
 
-    Heights of slanted bands are themselves rounded, by up to `slack`; where an edge is nearly parallel to the band
-    that moves the crossing far along the edge (the condition of the problem), so it is the *band* that is known up to
-    `slack`: the result lies between the cuts by the bands narrower and wider by it. Heights in axis-parallel bands
-    whose normal is a power of two are exact: no slack, and no tolerance along the normal.
+    Heights of slanted bands are themselves rounded, by up to `slack`; where an edge is nearly
+    parallel to the band that moves the crossing far along the edge (the condition of the problem),
+    so it is the *band* that is known up to `slack`: the result lies between the cuts by the bands
+    narrower and wider by it. Heights in axis-parallel bands whose normal is a power of two are
+    exact: no slack, and no tolerance along the normal.
     """
     normal, lower, upper = data.draw(bands(case))
     got = case.polygon.cut(normal, lower, upper)
     direction = (Fraction(normal[0]), Fraction(normal[1]))
     aligned = min(map(abs, normal)) == 0.0 and max(map(abs, normal)) in (1.0, 2.0)
-    slack = Fraction(0) if aligned else FEW * U * (abs(direction[0]) * case.size[0] + abs(direction[1]) * case.size[1])
+    slack = (
+        Fraction(0)
+        if aligned
+        else FEW * U * (abs(direction[0]) * case.size[0] + abs(direction[1]) * case.size[1])
+    )
     box = case.box()
     if aligned:
         box = (Fraction(0), box[1]) if normal[0] else (box[0], Fraction(0))
@@ -286,7 +345,11 @@ def test_clip_is_the_exact_intersection_up_to_rounding(case: Case, data: st.Data
         assert got.is_empty
         return
     narrow = exact_clip(case.exact, direction, bound(lower, slack), bound(upper, -slack))
-    if slack and not (math.isinf(lower) or math.isinf(upper)) and Fraction(lower) + slack > Fraction(upper) - slack:
+    if (
+        slack
+        and not (math.isinf(lower) or math.isinf(upper))
+        and Fraction(lower) + slack > Fraction(upper) - slack
+    ):
         narrow = []
     lost = outside_by(narrow, hull(result), box)
     assert lost is None, f"lost {[float(c) for c in lost]}"
@@ -310,14 +373,19 @@ def test_axis_parallel_clip_leaves_vertices_exactly_on_its_line(
         assert tuple(vertex) in given_vertices or vertex[axis] in (lower / length, upper / length)
 
 
-# Maps and sums --------------------------------------------------------------------------------------------------
+# Maps and sums
+# --------------------------------------------------------------------------------------------------
 
 ENTRY = st.one_of(UNIT, st.builds(lambda scale, x: scale * x, SCALE, UNIT))
 
 
 @st.composite
 def matrices(draw: st.DrawFn) -> list[list[float]]:
-    kind = draw(st.sampled_from(["any", "reflection", "shear", "rank one", "nearly rank one", "projection", "zero"]))
+    kind = draw(
+        st.sampled_from(
+            ["any", "reflection", "shear", "rank one", "nearly rank one", "projection", "zero"]
+        )
+    )
     a, b, c, d = (draw(ENTRY) for _ in range(4))
     if kind == "reflection":
         return [[0.0, a], [a, 0.0]]
@@ -328,7 +396,9 @@ def matrices(draw: st.DrawFn) -> list[list[float]]:
     if kind == "nearly rank one":
         return [[a * b, a * c], [d * b, d * c]]
     if kind == "projection":
-        return draw(st.sampled_from([[[a, 0.0], [0.0, 0.0]], [[0.0, 0.0], [a, b]], [[0.0, a], [0.0, b]]]))
+        return draw(
+            st.sampled_from([[[a, 0.0], [0.0, 0.0]], [[0.0, 0.0], [a, b]], [[0.0, a], [0.0, b]]])
+        )
     return [[0.0, 0.0], [0.0, 0.0]] if kind == "zero" else [[a, b], [c, d]]
 
 
@@ -355,7 +425,8 @@ def test_linear_map(case: Case, matrix: list[list[float]]) -> None:
 @FEWER
 @given(CASES, st.tuples(ENTRY, ENTRY))
 def test_translation(case: Case, offset: tuple[float, float]) -> None:
-    dx, dy = Fraction(offset[0]), Fraction(offset[1])
+    dx = Fraction(offset[0])
+    dy = Fraction(offset[1])
     moved = [(x + dx, y + dy) for x, y in case.exact]
     assert_same_set(case.polygon.translate(offset), moved, case.box((abs(dx), abs(dy)), few=1))
 
@@ -369,13 +440,16 @@ def halves(draw: st.DrawFn, case: Case) -> tuple[float, float]:
         return -float(y), float(x)
     if kind == "zero":
         return 0.0, 0.0
-    a, b = draw(ENTRY), draw(ENTRY)
+    a = draw(ENTRY)
+    b = draw(ENTRY)
     return draw(st.sampled_from([(a, 0.0), (0.0, a)])) if kind == "axis" else (a, b)
 
 
 @st.composite
 def uneven_polygons(draw: st.DrawFn) -> Case:
-    """As rounding leaves them: vertices repeated, or torn apart by an ulp, with tiny edges that turn the wrong way."""
+    """As rounding leaves them: vertices repeated, or torn apart by an ulp, with tiny edges that
+    turn the wrong way.
+    """
     even = draw(CASES)
     corners = [(float(x), float(y)) for x, y in even.exact]
     ulps = [float(2 * U * size) for size in even.size]
@@ -383,7 +457,9 @@ def uneven_polygons(draw: st.DrawFn) -> Case:
     for corner in corners:
         for _ in range(draw(st.integers(1, 3))):
             steps = draw(st.tuples(st.integers(-1, 1), st.integers(-1, 1)))
-            vertices.append(tuple(v + s * ulp for v, s, ulp in zip(corner, steps, ulps, strict=True)))
+            vertices.append(
+                tuple(v + s * ulp for v, s, ulp in zip(corner, steps, ulps, strict=True))
+            )
     polygon = ConvexPolygons.unchecked(np.array(vertices), np.array(len(vertices)))
     return Case(polygon, hull(exact(vertices)))
 
@@ -393,7 +469,9 @@ def moved_polygons(draw: st.DrawFn) -> Case:
     """Moved or mapped, so that vertices may coincide."""
     before = draw(CASES).polygon
     after = (
-        before.translate(draw(st.tuples(ENTRY, ENTRY))) if draw(st.booleans()) else before.linear_map(draw(matrices()))
+        before.translate(draw(st.tuples(ENTRY, ENTRY)))
+        if draw(st.booleans())
+        else before.linear_map(draw(matrices()))
     )
     return Case(after, hull(exact(after.polygon())))
 
@@ -405,7 +483,8 @@ UNEVEN = st.one_of(uneven_polygons(), moved_polygons())
 @given(st.one_of(CASES, UNEVEN), st.data())
 def test_sum_with_a_segment(case: Case, data: st.DataObject) -> None:
     half = data.draw(halves(case))
-    hx, hy = Fraction(half[0]), Fraction(half[1])
+    hx = Fraction(half[0])
+    hy = Fraction(half[1])
     wanted = [(x + sign * hx, y + sign * hy) for x, y in case.exact for sign in (-1, 1)]
     assert_same_set(case.polygon.add_segment(half), hull(wanted), case.box((abs(hx), abs(hy))))
 
@@ -431,7 +510,9 @@ def test_sum_of_a_needle_that_turns_the_wrong_way_with_a_segment_along_it() -> N
 @SOME
 @given(UNEVEN, st.data())
 def test_clip_of_an_uneven_polygon(case: Case, data: st.DataObject) -> None:
-    """As for exactly convex ones, but that an edge of an ulp in the wrong place is also a slack of the band."""
+    """As for exactly convex ones, but that an edge of an ulp in the wrong place is also a slack of
+    the band.
+    """
     normal, lower, upper = data.draw(bands(case))
     direction = (Fraction(normal[0]), Fraction(normal[1]))
     slack = FEW * U * (abs(direction[0]) * case.size[0] + abs(direction[1]) * case.size[1])
@@ -464,20 +545,27 @@ def test_measures_of_an_uneven_polygon(case: Case, data: st.DataObject) -> None:
     ulps = 2 * n * FEW * (case.box(few=1)[0] * case.extent[1] + case.box(few=1)[1] * case.extent[0])
     ulps += 4 * n * FEW * case.box(few=1)[0] * case.box(few=1)[1]
     assert abs(Fraction(float(case.polygon.area())) - exact_area(case.exact)) <= ulps
-    assert outside_by(exact([case.polygon.centroid().tolist()]), case.exact, case.box(few=n * FEW)) is None
+    assert (
+        outside_by(exact([case.polygon.centroid().tolist()]), case.exact, case.box(few=n * FEW))
+        is None
+    )
 
 
-# Measures -------------------------------------------------------------------------------------------------------
+# Measures
+# --------------------------------------------------------------------------------------------------
 
 
 @SOME
 @given(CASES, st.data())
 def test_support_function_and_vector(case: Case, data: st.DataObject) -> None:
     x, y = data.draw(directions(case))
-    value, vector = float(case.polygon.support_function((x, y))), case.polygon.support_vector((x, y))
+    value = float(case.polygon.support_function((x, y)))
+    vector = case.polygon.support_vector((x, y))
     direction = (Fraction(x), Fraction(y))
     wanted = max(dot(direction, p) for p in case.exact)
-    slack = FEW * (U * (abs(direction[0]) * case.size[0] + abs(direction[1]) * case.size[1]) + MINIMUM)
+    slack = FEW * (
+        U * (abs(direction[0]) * case.size[0] + abs(direction[1]) * case.size[1]) + MINIMUM
+    )
     assert abs(Fraction(value) - wanted) <= slack
     assert exact([vector.tolist()])[0] in case.exact
     assert dot(direction, exact([vector.tolist()])[0]) >= wanted - slack
@@ -491,9 +579,11 @@ def test_support_function_and_vector(case: Case, data: st.DataObject) -> None:
 def probes(draw: st.DrawFn, case: Case) -> tuple[float, float]:
     """Vertices, points of edges and next to them, the middle, anywhere near."""
     corners = [(float(x), float(y)) for x, y in case.exact]
-    a, b = draw(st.sampled_from(corners)), draw(st.sampled_from(corners))
+    a = draw(st.sampled_from(corners))
+    b = draw(st.sampled_from(corners))
     f = draw(UNIT)
-    x, y = a[0] + f * (b[0] - a[0]), a[1] + f * (b[1] - a[1])
+    x = a[0] + f * (b[0] - a[0])
+    y = a[1] + f * (b[1] - a[1])
     if draw(st.booleans()):
         x += draw(UNIT) * float(case.extent[0])
         y += draw(UNIT) * float(case.extent[1])
@@ -505,7 +595,9 @@ def probes(draw: st.DrawFn, case: Case) -> tuple[float, float]:
 @SOME
 @given(CASES, st.data())
 def test_margin(case: Case, data: st.DataObject) -> None:
-    """Only differences of coordinates are rounded: the error scales with the set and the way to it, not with place."""
+    """Only differences of coordinates are rounded: the error scales with the set and the way to it,
+    not with place.
+    """
     probe = data.draw(probes(case))
     point = exact([probe])[0]
     got = float(case.polygon.margin(probe))
@@ -525,7 +617,9 @@ def area_tolerance(case: Case) -> Fraction:
 @SOME
 @given(CASES)
 def test_area(case: Case) -> None:
-    assert abs(Fraction(float(case.polygon.area())) - exact_area(case.exact)) <= area_tolerance(case)
+    assert abs(Fraction(float(case.polygon.area())) - exact_area(case.exact)) <= area_tolerance(
+        case
+    )
 
 
 @SOME
@@ -540,7 +634,8 @@ def test_centroid(case: Case) -> None:
     assert outside_by([got], case.exact, box) is None
     area = exact_area(case.exact)
     if area == 0 or area > 64 * area_tolerance(case):
-        # The weights are wrong by area_tolerance / area, relatively, and move the centroid by that much of the extent.
+        # The weights are wrong by area_tolerance / area, relatively, and move the centroid by that
+        # much of the extent.
         doubt = 4 * area_tolerance(case) / area if area else Fraction(0)
         wanted = exact_centroid(case.exact)
         for k in (0, 1):
@@ -566,5 +661,8 @@ def test_outward_reduction(case: Case, cap: int) -> None:
     assert got.counts <= cap
     result = exact(got.polygon())
     after = Case(got, result)
-    assert outside_by(case.exact, hull(result), after.box(case.size, few=FEW * len(case.exact))) is None
+    assert (
+        outside_by(case.exact, hull(result), after.box(case.size, few=FEW * len(case.exact)))
+        is None
+    )
     assert np.isfinite(got.polygon()).all()

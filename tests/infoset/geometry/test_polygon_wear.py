@@ -1,6 +1,8 @@
-"""Kernels on polygons as thin as rounding, which a thousand operations leave: ends of needles, and edges to remove.
+"""Kernels on polygons as thin as rounding, which a thousand operations leave: ends of needles, and
+edges to remove.
 
-`test_polygon_oracle.py` has the operations on exactly convex polygons and on those with vertices moved by an ulp.
+`test_polygon_oracle.py` has the operations on exactly convex polygons and on those with vertices
+moved by an ulp.
 """
 
 from __future__ import annotations
@@ -28,11 +30,14 @@ def reach(*arrays: Floats) -> Fraction:
 @pytest.mark.thorough
 @pytest.mark.parametrize(("distance", "thickness"), [(0.0, 1e-16), (1.0, 1e-15), (1e4, 1e-12)])
 def test_a_sliver_along_the_segment_keeps_its_ends(distance: float, thickness: float) -> None:
-    """Where heights agree within rounding, the lowest vertex may be found on the upper side: an end would be lost."""
+    """Where heights agree within rounding, the lowest vertex may be found on the upper side: an end
+    would be lost.
+    """
     rng = np.random.default_rng(1)
     for trial in range(8000):
         angle = rng.uniform(0.0, 2.0 * np.pi)
-        along, across = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+        along = np.array([np.cos(angle), np.sin(angle)])
+        across = np.array([-np.sin(angle), np.cos(angle)])
         parts, sides = rng.uniform(-1.0, 1.0, (2, 10))
         offsets = thickness * 10.0 ** rng.uniform(-1.0, 2.0) * sides * (1.0 - parts**2)
         cloud = distance + parts[:, np.newaxis] * along + offsets[:, np.newaxis] * across
@@ -45,7 +50,8 @@ def test_a_sliver_along_the_segment_keeps_its_ends(distance: float, thickness: f
             assert abs(grown - 0.1) <= 16 * float(EPS) * (1.0 + distance)
         if trial % 200 == 0:
             right = exact_sum(hull(exact(corners)), exact([0.1 * along, -0.1 * along]))
-            box, ends = (11 * EPS * (reach(corners) + 1),) * 2, hull(exact(made))
+            box = (11 * EPS * (reach(corners) + 1),) * 2
+            ends = hull(exact(made))
             assert outside_by(ends, right, box) is None
             assert outside_by(right, ends, box) is None
 
@@ -66,7 +72,9 @@ def test_reduction_of_a_set_as_thin_as_rounding_contains_it() -> None:
 
 
 def test_the_edge_that_adds_the_min_area_is_removed_first() -> None:
-    """The reference computes all areas again after each removal; the lengths are equal in pairs, so that areas tie."""
+    """The reference computes all areas again after each removal; the lengths are equal in pairs, so
+    that areas tie.
+    """
     rng = np.random.default_rng(2)
     work = np.empty((128, 2))
     for count in (5, 16, 33, 60):
@@ -79,7 +87,8 @@ def test_the_edge_that_adds_the_min_area_is_removed_first() -> None:
         expected = path.copy()
         while len(expected) > 4:
             removals = [
-                polygon_reduction.removed_edge(expected, i - 1, i, i + 1, i + 2) for i in range(1, len(expected) - 2)
+                polygon_reduction.removed_edge(expected, i - 1, i, i + 1, i + 2)
+                for i in range(1, len(expected) - 2)
             ]
             first = min(range(len(removals)), key=lambda i: removals[i][0])
             expected[first + 1] = removals[first][1:]

@@ -1,4 +1,5 @@
-"""Operations that two polygons, or their constraints, take part in: against exact rationals, and in batches.
+"""Operations that two polygons, or their constraints, take part in: against exact rationals, and in
+batches.
 
 The oracle, the cases and the meaning of tolerances are those of `test_polygon_oracle`.
 """
@@ -57,7 +58,9 @@ def exact_intersection(one: Sequence[Exact], other: Sequence[Exact]) -> list[Exa
 
 
 def exact_difference(one: Sequence[Exact], other: Sequence[Exact]) -> list[Exact]:
-    """Return the Pontryagin difference: the intersection of the translates by the vertices of the other polygon."""
+    """Return the Pontryagin difference: the intersection of the translates by the vertices of the
+    other polygon.
+    """
     kept: list[Exact] | None = None
     for x, y in other:
         moved = [(p[0] - x, p[1] - y) for p in one]
@@ -72,37 +75,53 @@ def holds(polygon: Sequence[Exact], point: Exact) -> bool:
 
 @st.composite
 def partners(draw: st.DrawFn, case: Case) -> Case:
-    """A polygon that meets another one: it shares vertices and parts of sides, touches it, lies in it, crosses it."""
+    """A polygon that meets another one: it shares vertices and parts of sides, touches it, lies in
+    it, crosses it.
+    """
     corners = [(float(x), float(y)) for x, y in case.exact]
-    low, high = np.min(corners, axis=0), np.max(corners, axis=0)
+    low = np.min(corners, axis=0)
+    high = np.max(corners, axis=0)
     kind = draw(st.sampled_from(["any", "shared", "inside", "across", "sliver", "moved"]))
     if kind == "any":
         return draw(CASES)
     if kind == "moved":
-        dx, dy = draw(UNIT) * (high[0] - low[0]), draw(UNIT) * (high[1] - low[1])
+        dx = draw(UNIT) * (high[0] - low[0])
+        dy = draw(UNIT) * (high[1] - low[1])
         return case_of([(x + dx, y + dy) for x, y in corners])
     unit = draw(st.lists(st.tuples(UNIT, UNIT), min_size=1, max_size=7))
-    within = [(low[0] + abs(x) * (high[0] - low[0]), low[1] + abs(y) * (high[1] - low[1])) for x, y in unit]
+    within = [
+        (low[0] + abs(x) * (high[0] - low[0]), low[1] + abs(y) * (high[1] - low[1]))
+        for x, y in unit
+    ]
     if kind == "inside":
         return case_of(within)
     if kind == "shared":
         i = draw(st.integers(0, len(corners) - 1))
-        a, b = corners[i - 1], corners[i]
+        a = corners[i - 1]
+        b = corners[i]
         return case_of([a, (0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])), *within[:3]])
-    wide = [(x + 3.0 * draw(UNIT) * (high[0] - low[0]), y + 3.0 * draw(UNIT) * (high[1] - low[1])) for x, y in within]
+    wide = [
+        (x + 3.0 * draw(UNIT) * (high[0] - low[0]), y + 3.0 * draw(UNIT) * (high[1] - low[1]))
+        for x, y in within
+    ]
     if kind == "across":
         return case_of(wide)
-    # A sliver through points of the polygon: its ends torn apart by a few units of rounding or by 1e-12 of its length.
+    # A sliver through points of the polygon: its ends torn apart by a few units of rounding or by
+    # 1e-12 of its length.
     part = draw(st.sampled_from([1e-16, 1e-15, 1e-12, 1e-7]))
-    a, b = wide[0], within[-1]
+    a = wide[0]
+    b = within[-1]
     across = (part * (b[1] - a[1]), -part * (b[0] - a[0]))
-    return case_of([a, b, (a[0] + across[0], a[1] + across[1]), (b[0] + across[0], b[1] + across[1])])
+    return case_of(
+        [a, b, (a[0] + across[0], a[1] + across[1]), (b[0] + across[0], b[1] + across[1])]
+    )
 
 
 PAIRS = CASES.flatmap(lambda case: st.tuples(st.just(case), partners(case)))
 
 
-# Two polygons -----------------------------------------------------------------------------------------------------
+# Two polygons
+# --------------------------------------------------------------------------------------------------
 
 
 @SOME
@@ -121,17 +140,27 @@ def test_intersection(pair: tuple[Case, Case]) -> None:
 @st.composite
 def slivers(draw: st.DrawFn) -> Case:
     """A triangle or a quadrangle a few units of rounding to 1e-6 of its length thick."""
-    angle, thickness = draw(ANGLE), draw(st.sampled_from([1e-16, 1e-15, 1e-14, 1e-12, 1e-9, 1e-6]))
-    x, y = draw(UNIT), draw(UNIT)
-    c, s = math.cos(angle), math.sin(angle)
-    local = [(-2.0, 0.0), (2.0, 0.0), (draw(UNIT), thickness), (draw(UNIT), -thickness * abs(draw(UNIT)))]
+    angle = draw(ANGLE)
+    thickness = draw(st.sampled_from([1e-16, 1e-15, 1e-14, 1e-12, 1e-9, 1e-6]))
+    x = draw(UNIT)
+    y = draw(UNIT)
+    c = math.cos(angle)
+    s = math.sin(angle)
+    local = [
+        (-2.0, 0.0),
+        (2.0, 0.0),
+        (draw(UNIT), thickness),
+        (draw(UNIT), -thickness * abs(draw(UNIT))),
+    ]
     return case_of([(x + c * u - s * v, y + s * u + c * v) for u, v in local])
 
 
 @SOME
 @given(slivers(), slivers())
 def test_intersection_of_slivers(one: Case, other: Case) -> None:
-    """Within 16 units of rounding of the coordinates of both: where one is on an axis, the other gives the scale."""
+    """Within 16 units of rounding of the coordinates of both: where one is on an axis, the other
+    gives the scale.
+    """
     wanted = exact_intersection(one.exact, other.exact)
     got = one.polygon & other.polygon
     assert got.is_empty == (not wanted)
@@ -154,7 +183,11 @@ def test_subsets_and_equality_are_decided_exactly(pair: tuple[Case, Case]) -> No
 @given(CASES, st.data())
 def test_contains_is_decided_exactly(case: Case, data: st.DataObject) -> None:
     probe = data.draw(probes(case))
-    assert case.polygon.contains(probe) == (probe in case.polygon) == holds(case.exact, exact([probe])[0])
+    assert (
+        case.polygon.contains(probe)
+        == (probe in case.polygon)
+        == holds(case.exact, exact([probe])[0])
+    )
     reach = float(max(*case.size, abs(Fraction(probe[0])), abs(Fraction(probe[1]))))
     away = float(case.polygon.distance(probe))
     assert case.polygon.contains(probe, tolerance=away + 1e-15 * reach)
@@ -185,7 +218,8 @@ def two_digits(values: ArrayLike) -> Floats:
 
 
 def test_a_difference_of_sets_that_touch_is_decided_exactly() -> None:
-    """Parallelograms with coordinates of two digits, and three of their vertices or a side, moved or not.
+    """Parallelograms with coordinates of two digits, and three of their vertices or a side, moved
+    or not.
 
     Formerly rounding made a third of such differences empty that are a point, or nearly so.
     """
@@ -201,7 +235,8 @@ def test_a_difference_of_sets_that_touch_is_decided_exactly() -> None:
         if len(set(map(tuple, ring))) < 4 or turn(*exact(ring[:3])) == 0:
             continue
         share = two_digits(ring[: 3 - number % 2] + (offset if number % 3 == 0 else 0.0))
-        outer, inner = ConvexPolygons.from_points(ring), ConvexPolygons.from_points(share)
+        outer = ConvexPolygons.from_points(ring)
+        inner = ConvexPolygons.from_points(share)
         wanted = exact_difference(exact(outer.polygon()), exact(inner.polygon()))
         got = outer.minkowski_difference(inner)
         assert got.is_empty == (not wanted)
@@ -245,7 +280,11 @@ def test_distances(pair: tuple[Case, Case]) -> None:
     spread = max(exact_distance_between([p], other.exact) for p in one.exact)
     spread = max([spread, *(exact_distance_between([p], one.exact) for p in other.exact)])
     assert abs(float(one.polygon.hausdorff_distance(other.polygon)) - spread) <= tolerance
-    far = max(dot((a[0] - b[0], a[1] - b[1]), (a[0] - b[0], a[1] - b[1])) for a in one.exact for b in one.exact)
+    far = max(
+        dot((a[0] - b[0], a[1] - b[1]), (a[0] - b[0], a[1] - b[1]))
+        for a in one.exact
+        for b in one.exact
+    )
     assert float(one.polygon.diameter()) == pytest.approx(math.sqrt(far), rel=1e-14)
     for point in other.polygon.polygon():
         near = one.polygon.closest_point(point)
@@ -254,7 +293,8 @@ def test_distances(pair: tuple[Case, Case]) -> None:
         assert abs(math.hypot(*(near - point)) - direct) <= tolerance
 
 
-# Constraints --------------------------------------------------------------------------------------------------------
+# Constraints
+# --------------------------------------------------------------------------------------------------
 
 
 @st.composite
@@ -264,10 +304,14 @@ def half_planes(draw: st.DrawFn) -> list[tuple[float, float, float]]:
     at = draw(st.tuples(UNIT, UNIT))
     for _ in range(draw(st.integers(1, 7))):
         angle = draw(st.one_of(ANGLE, st.integers(0, 7).map(lambda k: k * math.pi / 4)))
-        a, b = math.cos(angle), math.sin(angle)
+        a = math.cos(angle)
+        b = math.sin(angle)
         if draw(st.booleans()):
-            a, b = round(a, 1), round(b, 1)
-        a, b = (value if abs(value) > 1e-100 else 0.0 for value in (a, b))  # smaller numbers are outside the limits
+            a = round(a, 1)
+            b = round(b, 1)
+        a, b = (
+            value if abs(value) > 1e-100 else 0.0 for value in (a, b)
+        )  # smaller numbers are outside the limits
         scale = draw(SCALE)
         c = a * at[0] + b * at[1] + draw(st.sampled_from([0.0, 1.0, 1e-9, 1e3, -1e-3, 0.1]))
         rows.append((a * scale, b * scale, c * scale))
@@ -284,7 +328,11 @@ def test_from_constraints(rows: list[tuple[float, float, float]]) -> None:
     far = Fraction(10) ** 40
     wanted: list[Exact] = [(-far, -far), (far, -far), (far, far), (-far, far)]
     for a, b, c in rows:
-        wanted = exact_clip(wanted, (Fraction(a), Fraction(b)), None, Fraction(c)) if (a, b) != (0.0, 0.0) else wanted
+        wanted = (
+            exact_clip(wanted, (Fraction(a), Fraction(b)), None, Fraction(c))
+            if (a, b) != (0.0, 0.0)
+            else wanted
+        )
         wanted = wanted if wanted and ((a, b) != (0.0, 0.0) or c >= 0.0) else []
     array = np.array(rows)
     if any(max(abs(x), abs(y)) == far for x, y in wanted):
@@ -294,7 +342,13 @@ def test_from_constraints(rows: list[tuple[float, float, float]]) -> None:
     got = ConvexPolygons.from_constraints(array[:, :2], array[:, 2])
     assert got.is_empty == (not wanted)
     for point in exact(got.polygon()):
-        assert min(max(abs(point[0] - x) - 4 * U * abs(x), abs(point[1] - y) - 4 * U * abs(y)) for x, y in wanted) <= 0
+        assert (
+            min(
+                max(abs(point[0] - x) - 4 * U * abs(x), abs(point[1] - y) - 4 * U * abs(y))
+                for x, y in wanted
+            )
+            <= 0
+        )
     if wanted:
         size = max(abs(x) for x, _ in wanted), max(abs(y) for _, y in wanted)
         assert_same_set(got, wanted, (4 * U * size[0], 4 * U * size[1]))
@@ -305,7 +359,9 @@ def test_from_constraints(rows: list[tuple[float, float, float]]) -> None:
 def test_constraints_describe_the_set(case: Case) -> None:
     normals, offsets = case.polygon.constraints()
     assert np.hypot(*normals.T) == pytest.approx(1.0)
-    assert float((case.polygon.polygon() @ normals.T - offsets).max()) <= 1e-15 * float(max(case.size))
+    assert float((case.polygon.polygon() @ normals.T - offsets).max()) <= 1e-15 * float(
+        max(case.size)
+    )
     length = math.hypot(*case.extent)
     if len(case.exact) > 2 and float(abs(turn(*case.exact[:3]))) > 1e-3 * length**2:
         again = ConvexPolygons.from_constraints(normals, offsets)
@@ -315,14 +371,21 @@ def test_constraints_describe_the_set(case: Case) -> None:
 @SOME
 @given(FAT_CASES, st.tuples(UNIT, UNIT, UNIT, UNIT), st.tuples(UNIT, UNIT))
 def test_preimage(case: Case, entries: tuple[float, ...], offset: tuple[float, float]) -> None:
-    """The image of the preimage is the set, to rounding; the preimage under a singular matrix is unbounded."""
+    """The image of the preimage is the set, to rounding; the preimage under a singular matrix is
+    unbounded.
+    """
     matrix = np.array([[2.0 + entries[0], entries[1]], [entries[2], 2.0 + entries[3]]])
     assume(abs(float(np.linalg.det(matrix))) > 0.5)
     size = float(max(*case.size, *(abs(Fraction(x)) for x in offset)))
     back = case.polygon.preimage(matrix, offset)
-    for image in (back.affine_map(matrix, offset), case.polygon.affine_map(matrix, offset).preimage(matrix, offset)):
+    for image in (
+        back.affine_map(matrix, offset),
+        case.polygon.affine_map(matrix, offset).preimage(matrix, offset),
+    ):
         box = (Fraction(64 * size) * U * 8, Fraction(64 * size) * U * 8)
-        wide = exact_sum(case.exact, [(x * box[0], y * box[1]) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
+        wide = exact_sum(
+            case.exact, [(x * box[0], y * box[1]) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        )
         assert outside_by(exact(image.polygon()), wide, box) is None
         if float(case.polygon.area()) > 1e-3 * size**2:
             assert float(image.hausdorff_distance(case.polygon)) <= 1e-6 * size
@@ -330,21 +393,32 @@ def test_preimage(case: Case, entries: tuple[float, ...], offset: tuple[float, f
         case.polygon.translate(-case.polygon.centroid()).preimage([[1.0, 0.0], [0.0, 0.0]])
 
 
-# One polygon --------------------------------------------------------------------------------------------------------
+# One polygon
+# --------------------------------------------------------------------------------------------------
 
 
 @SOME
 @given(CASES)
 @example(
-    case_of([(0.0, 0.0), (-8.270011920337144e-25, -3.784833429991908e-25), (-0.2080734182735712, 0.454648713412840)])
+    case_of(
+        [
+            (0.0, 0.0),
+            (-8.270011920337144e-25, -3.784833429991908e-25),
+            (-0.2080734182735712, 0.454648713412840),
+        ]
+    )
 )
 def test_max_disc(case: Case) -> None:
-    """The disc lies in the set, and no larger one does: linear programs about a corner, in units of the extent."""
+    """The disc lies in the set, and no larger one does: linear programs about a corner, in units of
+    the extent.
+    """
     centre, radius = case.polygon.chebyshev_centre()
     size = float(max(case.size))
     assert outside_by(exact([centre]), case.exact, case.box(few=64)) is None
     assert float(case.polygon.margin(centre)) >= float(radius) - 64 * float(U) * size
-    corners = np.array([[float(x - case.exact[0][0]), float(y - case.exact[0][1])] for x, y in case.exact])
+    corners = np.array(
+        [[float(x - case.exact[0][0]), float(y - case.exact[0][1])] for x, y in case.exact]
+    )
     width = float(np.abs(corners).max())
     if len(case.exact) < 3:
         assert radius == 0.0
@@ -363,7 +437,10 @@ def test_max_disc(case: Case) -> None:
 @given(CASES, st.integers(0, 1), UNIT)
 def test_projection_slice_and_samples(case: Case, axis: int, part: float) -> None:
     lower, upper = (float(end) for end in case.polygon.project(axis))
-    assert (lower, upper) == (float(min(p[axis] for p in case.exact)), float(max(p[axis] for p in case.exact)))
+    assert (lower, upper) == (
+        float(min(p[axis] for p in case.exact)),
+        float(max(p[axis] for p in case.exact)),
+    )
     value = lower + abs(part) * (upper - lower)
     normal = AXES[axis]
     line = exact_clip(case.exact, normal, Fraction(value), Fraction(value))
@@ -379,7 +456,9 @@ def test_projection_slice_and_samples(case: Case, axis: int, part: float) -> Non
 @pytest.mark.parametrize("sides", [3, 4, 7, 64])
 def test_balls_and_zonotopes(sides: int) -> None:
     centre = (1.0, -2.0)
-    outer, inner = (ConvexPolygons.from_ball(centre, 3.0, sides, outer=outer) for outer in (True, False))
+    outer, inner = (
+        ConvexPolygons.from_ball(centre, 3.0, sides, outer=outer) for outer in (True, False)
+    )
     assert float(outer.margin(centre)) == pytest.approx(3.0, rel=1e-14)
     assert np.hypot(*(inner.polygon() - centre).T) == pytest.approx(3.0, rel=1e-14)
     assert (int(outer.counts), int(inner.counts)) == (sides, sides)
@@ -388,18 +467,23 @@ def test_balls_and_zonotopes(sides: int) -> None:
     assert int(zonotope.counts) == 2 * sides
     directions = np.random.default_rng(1).normal(size=(20, 2))
     wanted = directions @ centre + np.abs(directions @ generators.T).sum(axis=1)
-    np.testing.assert_allclose(zonotope.broadcast_to((20,)).support_function(directions), wanted, rtol=1e-14)
+    np.testing.assert_allclose(
+        zonotope.broadcast_to((20,)).support_function(directions), wanted, rtol=1e-14
+    )
     np.testing.assert_allclose(zonotope.area(), Zonotope(centre, generators).volume(), rtol=1e-13)
     assert ConvexPolygons.from_zonotope(Zonotope(centre, [])).polygon().tolist() == [list(centre)]
 
 
-# Rings ----------------------------------------------------------------------------------------------------------------
+# Rings
+# --------------------------------------------------------------------------------------------------
 
 
 @SOME
 @given(FAT_CASES, st.data())
 def test_rings_of_both_orders_are_taken(case: Case, data: st.DataObject) -> None:
-    """Clockwise rings, closed rings, repeated vertices, and vertices along a side are no obstacle."""
+    """Clockwise rings, closed rings, repeated vertices, and vertices along a side are no
+    obstacle.
+    """
     assume(len(case.exact) > 2)
     ring = [tuple(map(float, p)) for p in case.exact]
     start = data.draw(st.integers(0, len(ring) - 1))
@@ -415,7 +499,8 @@ def test_rings_of_both_orders_are_taken(case: Case, data: st.DataObject) -> None
         assert ConvexPolygons(order, len(order)).convex_hull(polygon).equals(polygon)
 
 
-# Batches ----------------------------------------------------------------------------------------------------------
+# Batches
+# --------------------------------------------------------------------------------------------------
 
 BINARY: list[Callable[[ConvexPolygons, ConvexPolygons], Any]] = [
     ConvexPolygons.intersection,
@@ -452,7 +537,9 @@ def mixed_batch(seed: int) -> ConvexPolygons:
     """Polygons, a segment, a point, and an empty set."""
     random = np.random.default_rng(seed)
     sizes = [8, 5, 2, 1, 0, 6, 0]
-    return ConvexPolygons.stack([ConvexPolygons.from_points(random.uniform(-1.0, 1.0, (size, 2))) for size in sizes])
+    return ConvexPolygons.stack(
+        [ConvexPolygons.from_points(random.uniform(-1.0, 1.0, (size, 2))) for size in sizes]
+    )
 
 
 @pytest.mark.parametrize("number", range(len(UNARY) + len(BINARY)))
@@ -462,20 +549,26 @@ def test_empty_members_do_not_affect_the_others(number: int) -> None:
     if number >= len(UNARY):
         binary = BINARY[number - len(UNARY)]
         if binary is ConvexPolygons.minkowski_difference:
-            batch = ConvexPolygons.stack([*list(batch)[:4], ConvexPolygons.empty(), batch[5], ConvexPolygons.empty()])
+            batch = ConvexPolygons.stack(
+                [*list(batch)[:4], ConvexPolygons.empty(), batch[5], ConvexPolygons.empty()]
+            )
         whole = binary(batch, partner)
         singles = [binary(batch[i], partner[i]) for i in range(len(batch))]
     else:
         operation = UNARY[number]
         whole = operation(batch)
         missing = (
-            batch.is_empty if isinstance(whole, ConvexPolygons) else np.ma.getmaskarray(whole).reshape(7, -1)[:, 0]
+            batch.is_empty
+            if isinstance(whole, ConvexPolygons)
+            else np.ma.getmaskarray(whole).reshape(7, -1)[:, 0]
         )
         singles = [None if missing[i] else operation(batch[i]) for i in range(len(batch))]
         assert whole.shape[0] == len(batch)
     for i, alone in enumerate(singles):
         if isinstance(whole, ConvexPolygons):
-            assert whole[i].polygon().tolist() == (alone.polygon().tolist() if alone is not None else [])
+            assert whole[i].polygon().tolist() == (
+                alone.polygon().tolist() if alone is not None else []
+            )
         elif alone is not None and not np.ma.is_masked(whole[i]):
             np.testing.assert_array_equal(np.ma.getdata(whole[i]), alone)
         elif alone is None and np.ma.isMaskedArray(whole):

@@ -1,4 +1,6 @@
-"""`ConvexPolygons`, `Polytope` and `Zonotope` share names, and each operation refuses mistaken arguments clearly."""
+"""`ConvexPolygons`, `Polytope` and `Zonotope` share names, and each operation refuses mistaken
+arguments clearly.
+"""
 
 from __future__ import annotations
 
@@ -21,20 +23,38 @@ VOCABULARY = {
 """The names of both classes."""
 
 ONLY_POLYGONS = {
-    **dict.fromkeys(["counts", "shape", "stack", "broadcast_to"], "a Polytope is a single set, not a batch"),
+    **dict.fromkeys(
+        ["counts", "shape", "stack", "broadcast_to"], "a Polytope is a single set, not a batch"
+    ),
     "polygon": "the vertices of a member of a batch; those of a Polytope are .vertices",
     "from_points": "from_vertices of a Polytope is a hull of points in any order; a ring has an order",
     "unchecked": "for arrays of kernels, which only polygons have",
 }
 ONLY_POLYTOPES = {
-    **dict.fromkeys(["normals", "offsets", "across", "levels"], "stored facets and affine hull; polygons compute them"),
+    **dict.fromkeys(
+        ["normals", "offsets", "across", "levels"],
+        "stored facets and affine hull; polygons compute them",
+    ),
     "dimension": "the number of vertices of a polygon shows its dimension",
     "needed": "the set itself, or an error: members of a batch that are empty are masked",
-    **dict.fromkeys(["points", "facets", "equations", "incidence", "centre", "scale"], "arrays in scaled coordinates"),
+    **dict.fromkeys(
+        ["points", "facets", "equations", "incidence", "centre", "scale"],
+        "arrays in scaled coordinates",
+    ),
     "separating_direction": "a witness; polygons decide exactly whether they meet",
     "enlarged": "outward by given errors; kernels of polygons do this at each step",
     **dict.fromkeys(
-        ["space_of", "halfspace", "from_rays", "is_bounded", "directions", "lines", "recession", "bounded", "exact"],
+        [
+            "space_of",
+            "halfspace",
+            "from_rays",
+            "is_bounded",
+            "directions",
+            "lines",
+            "recession",
+            "bounded",
+            "exact",
+        ],
         "a polygon is bounded: an unbounded set of the plane is a Polytope",
     ),
 }
@@ -59,32 +79,50 @@ def test_both_classes_have_the_same_names() -> None:
 
 def test_zonotopes_have_names_of_polytopes() -> None:
     assert names(Zonotope) - names(Polytope) == set(ONLY_ZONOTOPES)
-    assert names(Zonotope) - set(ONLY_ZONOTOPES) >= {"affine_map", "cut", "enlarged", "reduce_outward", "volume"}
+    assert names(Zonotope) - set(ONLY_ZONOTOPES) >= {
+        "affine_map",
+        "cut",
+        "enlarged",
+        "reduce_outward",
+        "volume",
+    }
 
 
 def test_projections_and_slices_take_a_number_or_several() -> None:
-    square, cube = ConvexPolygons.from_box([0, 1], [2, 5]), Polytope.from_box([0, 1, 2], [3, 5, 7])
+    square = ConvexPolygons.from_box([0, 1], [2, 5])
+    cube = Polytope.from_box([0, 1, 2], [3, 5, 7])
     number: Any
     for number in (1, [1], (1,), np.array([1]), np.int64(1)):
         assert [float(end) for end in square.project(number)] == [1.0, 5.0]
         assert [end.tolist() for end in cube.project(number).bounding_box()] == [[1.0], [5.0]]
         assert [float(end) for end in square.slice(number, 2.0)] == [0.0, 2.0]
         for values in (2.0, [2.0]):
-            assert np.ravel(cube.slice(number, values).bounding_box()) == pytest.approx([0.0, 2.0, 3.0, 7.0], abs=1e-15)
-    assert [end.tolist() for end in square.project([1, 0]).bounding_box()] == [[1.0, 0.0], [5.0, 2.0]]
+            assert np.ravel(cube.slice(number, values).bounding_box()) == pytest.approx(
+                [0.0, 2.0, 3.0, 7.0], abs=1e-15
+            )
+    assert [end.tolist() for end in square.project([1, 0]).bounding_box()] == [
+        [1.0, 0.0],
+        [5.0, 2.0],
+    ]
     assert [end.tolist() for end in cube.project([2, 0]).bounding_box()] == [[2.0, 0.0], [7.0, 3.0]]
 
 
 def test_polytopes_from_and_to_shapely() -> None:
     triangle = shapely.Polygon([(0, 0), (0, 2), (1, 0)])
-    for geometry, dimension in ((triangle, 2), (shapely.LineString([(0, 0), (1, 2)]), 1), (shapely.Point(1, 2), 0)):
+    for geometry, dimension in (
+        (triangle, 2),
+        (shapely.LineString([(0, 0), (1, 2)]), 1),
+        (shapely.Point(1, 2), 0),
+    ):
         one = Polytope.from_shapely(geometry)
         assert (one.space, one.dimension) == (2, dimension)
         assert one.area() == pytest.approx(geometry.area)
         assert one.to_shapely().normalize().equals_exact(geometry.normalize(), 1e-15)
     assert Polytope.from_shapely(shapely.Polygon()).is_empty
     assert Polytope.empty(2).to_shapely().is_empty
-    with pytest.raises(ValueError, match="the Polygon is not convex: its area and that of its hull differ by 4"):
+    with pytest.raises(
+        ValueError, match="the Polygon is not convex: its area and that of its hull differ by 4"
+    ):
         Polytope.from_shapely(shapely.Polygon([(0, 0), (4, 0), (4, 4), (3, 1)]))
     for operation in (Polytope.area, Polytope.to_shapely):
         with pytest.raises(ValueError, match=r"a set of R\^2 is needed: project this one, of R\^3"):
@@ -92,7 +130,8 @@ def test_polytopes_from_and_to_shapely() -> None:
 
 
 def test_a_single_polygon_takes_many_points_and_directions() -> None:
-    square, points = ConvexPolygons.from_box([0, 0], [2, 2]), np.array([[[1.0, 1.0], [3.0, 1.0], [5.0, 6.0]]])
+    square = ConvexPolygons.from_box([0, 0], [2, 2])
+    points = np.array([[[1.0, 1.0], [3.0, 1.0], [5.0, 6.0]]])
     assert square.contains(points).tolist() == [[True, False, False]]
     assert square.margin(points).tolist() == [[1.0, -1.0, -5.0]]
     assert square.closest_point(points).tolist() == [[[1.0, 1.0], [2.0, 1.0], [2.0, 2.0]]]
@@ -107,7 +146,8 @@ def test_a_single_polygon_takes_many_points_and_directions() -> None:
 
 @pytest.mark.parametrize("kind", [ConvexPolygons, Polytope])
 def test_multiples_of_sets_and_disjoint_sets(kind: Any) -> None:
-    square, far = kind.from_box([0, 1], [2, 5]), kind.from_box([2, 7], [3, 8])
+    square = kind.from_box([0, 1], [2, 5])
+    far = kind.from_box([2, 7], [3, 8])
     wanted = kind.from_box([0, 2], [4, 10])
     for doubled in (2 * square, square * 2.0, np.float64(2.0) * square):
         assert bool(np.all(doubled.equals(wanted, 1e-12)))
@@ -116,14 +156,14 @@ def test_multiples_of_sets_and_disjoint_sets(kind: Any) -> None:
         square * square
     assert bool(np.all(square.isdisjoint(far)))
     assert not np.any(square.isdisjoint(kind.from_box([2, 5], [3, 6])))  # they touch
-    assert bool(np.all(square.isdisjoint(kind.empty() if kind is ConvexPolygons else kind.empty(2))))
+    assert bool(
+        np.all(square.isdisjoint(kind.empty() if kind is ConvexPolygons else kind.empty(2)))
+    )
 
 
 def test_a_witness_of_disjoint_sets() -> None:
-    one, two = (
-        Polytope.from_box([0, 0, 0], [1, 1, 1]),
-        Polytope.from_vertices([[2, 2, 2], [3, 2, 2], [2, 3, 2], [2, 2, 3]]),
-    )
+    one = Polytope.from_box([0, 0, 0], [1, 1, 1])
+    two = Polytope.from_vertices([[2, 2, 2], [3, 2, 2], [2, 3, 2], [2, 2, 3]])
     direction = one.separating_direction(two)
     assert direction == pytest.approx(np.ones(3) / np.sqrt(3.0), abs=1e-12)
     assert one.separating_direction(one) is None

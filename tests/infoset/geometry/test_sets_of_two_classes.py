@@ -12,9 +12,10 @@ import pytest
 from infoset import ConvexPolygons, Polytope
 
 NEAR = 1e-8
-"""Distance between results of the two classes. The sets are less than 32 wide, and a polytope exceeds the exact set by
-about 1e-12 of its size. Sides between integer points at most 12 apart meet at angles above 1/144, which moves their
-crossing by 144 times as much; different results are farther apart than 1/144."""
+"""Distance between results of the two classes. The sets are less than 32 wide, and a polytope
+exceeds the exact set by about 1e-12 of its size. Sides between integer points at most 12 apart meet
+at angles above 1/144, which moves their crossing by 144 times as much; different results are
+farther apart than 1/144."""
 
 SETS: list[str] = ["intersection", "minkowski_sum", "minkowski_difference", "convex_hull"]
 NUMBERS: list[str] = ["distance", "hausdorff_distance"]
@@ -22,7 +23,9 @@ ANSWERS: list[str] = ["is_subset", "equals", "isdisjoint"]
 
 
 def some_polygon(random: np.random.Generator) -> ConvexPolygons:
-    """A polygon, a segment or a point with small integer coordinates: different sets are far apart."""
+    """A polygon, a segment or a point with small integer coordinates: different sets are far
+    apart.
+    """
     size = random.choice([1, 2, 3, 4, 6])
     return ConvexPolygons.from_points(random.integers(-4, 5, (size, 2)))
 
@@ -34,11 +37,15 @@ def in_both_orders(one: ConvexPolygons, other: ConvexPolygons) -> list[tuple[Any
 
 @pytest.mark.parametrize("seed", range(25))
 @pytest.mark.parametrize("name", SETS)
-def test_set_made_from_polygon_and_polytope_is_the_exact_one_to_rounding(name: str, seed: int) -> None:
+def test_set_made_from_polygon_and_polytope_is_the_exact_one_to_rounding(
+    name: str, seed: int
+) -> None:
     random = np.random.default_rng(seed)
-    one, other = some_polygon(random), some_polygon(random)
+    one = some_polygon(random)
+    other = some_polygon(random)
     if name == "minkowski_difference":
-        # A difference with an interior, or certainly none: rounding decides about a flat one of polytopes.
+        # A difference with an interior, or certainly none: rounding decides about a flat one of
+        # polytopes.
         box = ConvexPolygons.from_box([-1, -1], [1, 1])
         one, other = (one + other + box, other) if seed % 2 else (one, other + 9 * box)
     exact = getattr(one, name)(other)
@@ -53,9 +60,12 @@ def test_set_made_from_polygon_and_polytope_is_the_exact_one_to_rounding(name: s
 
 @pytest.mark.parametrize("seed", range(25))
 @pytest.mark.parametrize("name", NUMBERS)
-def test_distance_of_polygon_and_polytope_is_the_exact_one_to_rounding(name: str, seed: int) -> None:
+def test_distance_of_polygon_and_polytope_is_the_exact_one_to_rounding(
+    name: str, seed: int
+) -> None:
     random = np.random.default_rng(seed)
-    one, other = some_polygon(random), some_polygon(random)
+    one = some_polygon(random)
+    other = some_polygon(random)
     exact = float(getattr(one, name)(other))
 
     for left, right in in_both_orders(one, other):
@@ -88,7 +98,8 @@ def test_operators_take_sets_of_both_classes(apply: Callable[[Any, Any], Any], n
     other = ConvexPolygons.from_box([1, 1], [3, 4])
 
     for left, right in in_both_orders(square, other):
-        made, wanted = apply(left, right), getattr(left, name)(right)
+        made = apply(left, right)
+        wanted = getattr(left, name)(right)
 
         if isinstance(wanted, Polytope):
             assert made.vertices.tolist() == wanted.vertices.tolist()
@@ -106,7 +117,9 @@ def test_polytope_takes_several_polygons_and_polytopes() -> None:
 
 
 def test_witness_separates_a_polytope_from_a_polygon() -> None:
-    direction = Polytope.from_box([0, 0], [1, 1]).separating_direction(ConvexPolygons.from_box([2, 0], [3, 1]))
+    direction = Polytope.from_box([0, 0], [1, 1]).separating_direction(
+        ConvexPolygons.from_box([2, 0], [3, 1])
+    )
 
     assert direction == pytest.approx([1.0, 0.0], abs=1e-15)
 
@@ -119,10 +132,13 @@ def test_empty_set_of_the_other_class_is_as_one_of_the_same_class(name: str) -> 
     for one, other in [(square, empty), (empty, square), (empty, empty)]:
         for left, right in in_both_orders(one, other):
             if name == "minkowski_difference" and one is square:
-                with pytest.raises(ValueError, match="the difference with an empty set is unbounded"):
+                with pytest.raises(
+                    ValueError, match="the difference with an empty set is unbounded"
+                ):
                     getattr(left, name)(right)
                 continue
-            found, wanted = getattr(left, name)(right), getattr(one, name)(other)
+            found = getattr(left, name)(right)
+            wanted = getattr(one, name)(other)
             if isinstance(found, Polytope):
                 assert ConvexPolygons.from_points(found.vertices).equals(wanted)
             else:
@@ -136,7 +152,10 @@ def test_batch_and_polytope_of_another_space_are_refused(name: str) -> None:
     in_space = Polytope.from_box([0, 0, 0], [1, 1, 1])
 
     for left, right in [(batch, square.polytope()), (square.polytope(), batch)]:
-        with pytest.raises(ValueError, match=r"a batch of shape \(2,\) is no Polytope: choose one with an index first"):
+        with pytest.raises(
+            ValueError,
+            match=r"a batch of shape \(2,\) is no Polytope: choose one with an index first",
+        ):
             getattr(left, name)(right)
     for left, right, space in [(square, in_space, 2), (in_space, square, 3)]:
         with pytest.raises(ValueError, match=rf"other must be a set in R\^{space}, as this one"):

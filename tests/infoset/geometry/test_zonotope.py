@@ -1,4 +1,6 @@
-"""Zonotopes against exact rational numbers, determinants, linear programs and the operations of polytopes."""
+"""Zonotopes against exact rational numbers, determinants, linear programs and the operations of
+polytopes.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,8 @@ EPS = float(np.finfo(np.float64).eps)
 SOME = settings(max_examples=40, deadline=None)
 
 
-# Oracles --------------------------------------------------------------------------------------------------------------
+# Oracles
+# --------------------------------------------------------------------------------------------------
 
 
 def exact(numbers: Any) -> list[Fraction]:
@@ -52,7 +55,9 @@ def exact_volume(generators: Floats) -> Fraction:
     """Return 2^n times the sum of the determinants of n generators, without signs."""
     rows = [exact(row) for row in generators]
     space = generators.shape[1]
-    total = sum((abs(exact_determinant(list(part))) for part in combinations(rows, space)), Fraction(0))
+    total = sum(
+        (abs(exact_determinant(list(part))) for part in combinations(rows, space)), Fraction(0)
+    )
     return Fraction(2**space) * total
 
 
@@ -63,11 +68,15 @@ def sizes_of(zonotope: Zonotope) -> Floats:
 def directions_of(zonotope: Zonotope, count: int = 30) -> Floats:
     """Return directions in which all axes of a set count, shape (count, n)."""
     widths = np.abs(zonotope.generators).sum(axis=0)
-    return np.random.default_rng(1).normal(size=(count, zonotope.space)) / np.where(widths > 0.0, widths, 1.0)
+    return np.random.default_rng(1).normal(size=(count, zonotope.space)) / np.where(
+        widths > 0.0, widths, 1.0
+    )
 
 
 def assert_contains_and_fits(outer: Polytope, zonotope: Zonotope, excess: float = 1e-11) -> None:
-    """Check the supports: not below the exact ones by more than they round, nor above by more than `excess`."""
+    """Check the supports: not below the exact ones by more than they round, nor above by more than
+    `excess`.
+    """
     rows = directions_of(zonotope)
     wanted = np.array([float(exact_support(zonotope, exact(row))) for row in rows])
     terms = np.abs(rows) @ sizes_of(zonotope)
@@ -81,7 +90,9 @@ def assert_contains_and_fits(outer: Polytope, zonotope: Zonotope, excess: float 
 
 @st.composite
 def whole(draw: st.DrawFn) -> Zonotope:
-    """Return a zonotope of small integers in different units; flat ones and parallel generators are frequent."""
+    """Return a zonotope of small integers in different units; flat ones and parallel generators are
+    frequent.
+    """
     space = draw(st.integers(1, 4))
     entries = st.integers(-2, 2)
     rows = draw(st.lists(st.lists(entries, min_size=space, max_size=space), max_size=6))
@@ -93,18 +104,25 @@ def whole(draw: st.DrawFn) -> Zonotope:
 
 def rotated_boxes(count: int) -> Zonotope:
     random = np.random.default_rng(0)
-    boxes = [np.diag(random.uniform(0.1, 1.0, 3)) @ Rotation.random(random_state=k).as_matrix() for k in range(count)]
+    boxes = [
+        np.diag(random.uniform(0.1, 1.0, 3)) @ Rotation.random(random_state=k).as_matrix()
+        for k in range(count)
+    ]
     return Zonotope([1.0, 2.0, 3.0], np.vstack(boxes))
 
 
-# Operations on generators ---------------------------------------------------------------------------------------------
+# Operations on generators
+# --------------------------------------------------------------------------------------------------
 
 
 @SOME
 @given(whole(), st.integers(1, 4), st.integers(0, 1000))
-def test_maps_have_the_supports_of_the_set_along_mapped_directions(zonotope: Zonotope, rows: int, seed: int) -> None:
+def test_maps_have_the_supports_of_the_set_along_mapped_directions(
+    zonotope: Zonotope, rows: int, seed: int
+) -> None:
     random = np.random.default_rng(seed)
-    matrix, offset = random.normal(size=(rows, zonotope.space)), random.normal(size=rows)
+    matrix = random.normal(size=(rows, zonotope.space))
+    offset = random.normal(size=rows)
     image = zonotope.affine_map(matrix, offset)
     assert (image.space, len(image.generators)) == (rows, len(zonotope.generators))
     for direction in random.normal(size=(5, rows)):
@@ -126,7 +144,9 @@ def test_operators_have_exact_supports(zonotope: Zonotope) -> None:
     along = abs(exact_product(direction, exact(half)))
     assert exact_support(-zonotope, opposite) == support
     assert exact_support(2 * zonotope, direction) == 2 * support
-    assert exact_support(zonotope + Zonotope(0.0 * half, np.diag(half)), direction) == support + length
+    assert (
+        exact_support(zonotope + Zonotope(0.0 * half, np.diag(half)), direction) == support + length
+    )
     assert exact_support(zonotope.enlarged(half), direction) == support + length
     assert exact_support(zonotope.add_segment(half), direction) == support + along
     assert exact_support(zonotope.add_segment(0.0 * half), direction) == support
@@ -155,11 +175,15 @@ def test_support_function_and_vector_agree(zonotope: Zonotope) -> None:
     rows = np.vstack([directions_of(zonotope, 3), np.eye(zonotope.space), -np.eye(zonotope.space)])
     supports = zonotope.support_function(rows)
     for row, support in zip(rows, supports, strict=True):
-        rounding = (len(zonotope.generators) + zonotope.space + 2) * EPS * np.abs(row) @ sizes_of(zonotope)
+        rounding = (
+            (len(zonotope.generators) + zonotope.space + 2) * EPS * np.abs(row) @ sizes_of(zonotope)
+        )
         wanted = exact_support(zonotope, exact(row))
         point = zonotope.support_vector(row)
         assert abs(Fraction(float(support)) - wanted) <= Fraction(float(rounding))
-        assert abs(exact_product(exact(row), exact(point)) - wanted) <= Fraction(float(2.0 * rounding))
+        assert abs(exact_product(exact(row), exact(point)) - wanted) <= Fraction(
+            float(2.0 * rounding)
+        )
 
 
 def test_support_vector_across_opposite_generators_is_a_vertex() -> None:
@@ -181,14 +205,18 @@ def test_bounding_box_is_the_exact_one_rounded_outward(zonotope: Zonotope) -> No
 
 
 def test_box_has_its_ends_exactly() -> None:
-    lower, upper = [-1.0, 0.0, 2.0], [3.0, 0.5, 2.0]
+    lower = [-1.0, 0.0, 2.0]
+    upper = [3.0, 0.5, 2.0]
     box = Zonotope.box(lower, upper)
     assert [end.tolist() for end in box.bounding_box()] == [lower, upper]
     assert box.dimension == 2
-    assert sorted(box.polytope().vertices.tolist()) == sorted(Polytope.from_box(lower, upper).vertices.tolist())
+    assert sorted(box.polytope().vertices.tolist()) == sorted(
+        Polytope.from_box(lower, upper).vertices.tolist()
+    )
 
 
-# Polytopes ------------------------------------------------------------------------------------------------------------
+# Polytopes
+# --------------------------------------------------------------------------------------------------
 
 
 @SOME
@@ -197,12 +225,16 @@ def test_polytope_contains_the_zonotope_and_fits_it(zonotope: Zonotope) -> None:
     outer = zonotope.polytope()
     widths = np.abs(zonotope.generators).sum(axis=0)
     units = np.where(widths > 0.0, widths, 1.0)
-    rank = int(np.linalg.matrix_rank(zonotope.generators / units)) if len(zonotope.generators) else 0
+    rank = (
+        int(np.linalg.matrix_rank(zonotope.generators / units)) if len(zonotope.generators) else 0
+    )
     assert outer.dimension == zonotope.dimension == rank
     assert_contains_and_fits(outer, zonotope)
     assert zonotope.volume() == pytest.approx(outer.volume(), rel=1e-11)
     if rank == zonotope.space:
-        assert zonotope.volume() == pytest.approx(float(exact_volume(zonotope.generators)), rel=1e-13)
+        assert zonotope.volume() == pytest.approx(
+            float(exact_volume(zonotope.generators)), rel=1e-13
+        )
 
 
 @SOME
@@ -233,9 +265,13 @@ def test_facets_in_general_position_are_those_of_all_pairs(count: int) -> None:
 
 @pytest.mark.parametrize("count", [2, 3, 5, 8])
 def test_facets_hold_for_the_zonotope_exactly(count: int) -> None:
-    """The offset of a facet is at least the exact support along its stored normal, whatever the rounding."""
+    """The offset of a facet is at least the exact support along its stored normal, whatever the
+    rounding.
+    """
     for space in (2, 3):
-        zonotope = Zonotope(np.ones(space) / 3.0, np.random.default_rng(count).normal(size=(count + 1, space)))
+        zonotope = Zonotope(
+            np.ones(space) / 3.0, np.random.default_rng(count).normal(size=(count + 1, space))
+        )
         outer = zonotope.polytope()
         for facet in outer.facets:
             # a . y <= b with y = (x - centre) / scale is a / scale . x <= b + a / scale . centre.
@@ -263,11 +299,16 @@ def test_aligned_boxes_are_one_box() -> None:
 
 @pytest.mark.parametrize("seed", range(12))
 def test_generators_in_common_planes_give_facets_of_more_than_four_sides(seed: int) -> None:
-    """Rotated integers: rounding moves generators out of their common planes, and no sliver is left."""
+    """Rotated integers: rounding moves generators out of their common planes, and no sliver is
+    left.
+    """
     random = np.random.default_rng(seed)
-    whole_rows = np.array([[1, 0, 0], [0, 1, 0], [1, 1, 0], [1, -1, 0], [0, 0, 1], [1, 0, 1]], float)
+    whole_rows = np.array(
+        [[1, 0, 0], [0, 1, 0], [1, 1, 0], [1, -1, 0], [0, 0, 1], [1, 0, 1]], float
+    )
     turned = whole_rows @ Rotation.random(random_state=seed).as_matrix()
-    plain, rotated = Zonotope(np.zeros(3), whole_rows).polytope(), Zonotope(random.normal(size=3), turned).polytope()
+    plain = Zonotope(np.zeros(3), whole_rows).polytope()
+    rotated = Zonotope(random.normal(size=3), turned).polytope()
     assert len(rotated.vertices) == len(plain.vertices)
     assert sorted(rotated.incidence.sum(axis=0)) == sorted(plain.incidence.sum(axis=0))
     assert max(plain.incidence.sum(axis=0)) == 8
@@ -289,7 +330,9 @@ def test_nearly_coplanar_and_parallel_generators_lose_nothing(away: float, seed:
 def test_needle_has_the_volume_of_its_determinants(thin: float) -> None:
     """All generators are nearly parallel, and not along an axis."""
     random = np.random.default_rng(5)
-    generators = np.outer(random.normal(size=5), [1.0, 0.7, 0.3]) + thin * random.normal(size=(5, 3))
+    generators = np.outer(random.normal(size=5), [1.0, 0.7, 0.3]) + thin * random.normal(
+        size=(5, 3)
+    )
     zonotope = Zonotope(np.zeros(3), generators)
     assert zonotope.dimension == 3
     assert zonotope.volume() == pytest.approx(float(exact_volume(generators)), rel=1e-13)
@@ -307,14 +350,25 @@ FLAT_SETS = [
     (3, [[1, 0, 1], [0, 1, 0]], 2, 4, 4.0 * np.sqrt(2.0)),
     (3, [[1, 0, 1], [0, 1, 0], [1, 1, 1]], 2, 6, 12.0 * np.sqrt(2.0)),
     (5, [[1, 0, 0, 0, 0], [0, 1, 0, 1, 0], [0, 0, 0, 0, 2]], 3, 8, 16.0 * np.sqrt(2.0)),
-    (5, [[1, 0, 0, 0, 0], [0, 1, 0, 1, 0], [0, 0, 1, 0, 0], [0, 0, 0, 0, 1]], 4, 16, 16.0 * np.sqrt(2.0)),
+    (
+        5,
+        [[1, 0, 0, 0, 0], [0, 1, 0, 1, 0], [0, 0, 1, 0, 0], [0, 0, 0, 0, 1]],
+        4,
+        16,
+        16.0 * np.sqrt(2.0),
+    ),
 ]
 
 
 @pytest.mark.parametrize(("space", "generators", "dimension", "vertices", "volume"), FLAT_SETS)
 @pytest.mark.parametrize("far", [0.0, 1.0, 1e6])
 def test_flat_zonotopes(
-    space: int, generators: list[list[float]], dimension: int, vertices: int, volume: float, far: float
+    space: int,
+    generators: list[list[float]],
+    dimension: int,
+    vertices: int,
+    volume: float,
+    far: float,
 ) -> None:
     zonotope = Zonotope(far * np.arange(1.0, space + 1), generators)
     outer = zonotope.polytope()
@@ -330,7 +384,8 @@ def test_flat_zonotopes(
 def test_far_and_small_zonotope_keeps_its_shape() -> None:
     """The set is 1e-12 of its distance wide: vertices are exact in the scaled coordinates."""
     generators = 2.0**-40 * np.array([[1, 0, 0], [0, 1, 0], [1, 1, 1], [0, 1, 2]], float)
-    near, far = Zonotope(np.zeros(3), generators).polytope(), Zonotope([3.0, 5.0, 7.0], generators).polytope()
+    near = Zonotope(np.zeros(3), generators).polytope()
+    far = Zonotope([3.0, 5.0, 7.0], generators).polytope()
     assert (len(far.vertices), len(far.normals)) == (len(near.vertices), len(near.normals))
     assert far.volume() == pytest.approx(near.volume(), rel=1e-12)
 
@@ -353,7 +408,8 @@ def test_operations_are_those_of_polytopes(space: int) -> None:
     random = np.random.default_rng(space)
     one = Zonotope(random.normal(size=space), random.normal(size=(space + 1, space)))
     two = Zonotope(one.centre + 0.1, random.normal(size=(space, space)))
-    first, second = one.polytope(), two.polytope()
+    first = one.polytope()
+    second = two.polytope()
     matrix = random.normal(size=(2, space))
     small = Zonotope(np.zeros(space), 0.01 * np.eye(space))
     assert (one + two).polytope().equals(first + second, 1e-11)
@@ -368,7 +424,9 @@ def test_operations_are_those_of_polytopes(space: int) -> None:
     for part in (one & two, one & second, first & two, one.intersection(two, second)):
         assert part.equals(first & second, 1e-11)
     assert one.convex_hull(two).equals(first.convex_hull(second), 1e-11)
-    assert one.minkowski_difference(small).equals(first.minkowski_difference(small.polytope()), 1e-11)
+    assert one.minkowski_difference(small).equals(
+        first.minkowski_difference(small.polytope()), 1e-11
+    )
     assert small + one.centre <= one
     assert not one <= small
     assert one.equals(Zonotope(one.centre, -one.generators[::-1]), 1e-11)
@@ -386,7 +444,11 @@ def test_area_of_the_plane() -> None:
 def test_sum_with_a_set_of_another_class_is_a_polytope() -> None:
     box = Polytope.from_box([-1.0, -1.0], [2.0, 3.0])
 
-    for found in (SQUARE + box, box + SQUARE, SQUARE + ConvexPolygons.from_box([-1.0, -1.0], [2.0, 3.0])):
+    for found in (
+        SQUARE + box,
+        box + SQUARE,
+        SQUARE + ConvexPolygons.from_box([-1.0, -1.0], [2.0, 3.0]),
+    ):
         assert isinstance(found, Polytope)
         assert found.equals(SQUARE.polytope() + box, 1e-12)
 
@@ -407,13 +469,19 @@ def test_plot_returns_the_artists() -> None:
         rotated_boxes(1).plot(ax)
 
 
-# Membership -----------------------------------------------------------------------------------------------------------
+# Membership
+# --------------------------------------------------------------------------------------------------
 
 
 def boundary_points(zonotope: Zonotope, random: np.random.Generator) -> Floats:
-    """Return vertices, and the middles of facets: all generators but those in the plane of a facet at their ends."""
-    units = np.where(np.abs(zonotope.generators).sum(axis=0) > 0.0, np.abs(zonotope.generators).sum(axis=0), 1.0)
-    rows, space = zonotope.generators / units, zonotope.space
+    """Return vertices, and the middles of facets: all generators but those in the plane of a facet
+    at their ends.
+    """
+    units = np.where(
+        np.abs(zonotope.generators).sum(axis=0) > 0.0, np.abs(zonotope.generators).sum(axis=0), 1.0
+    )
+    rows = zonotope.generators / units
+    space = zonotope.space
     found = [zonotope.support_vector(row) for row in directions_of(zonotope, 5)]
     for _ in range(8):
         plane = rows[random.choice(len(rows), space - 1, replace=False)]
@@ -433,7 +501,8 @@ def test_boundary_is_inside_and_what_is_beyond_it_is_not(seed: int) -> None:
     rows = random.normal(size=(count, space))
     if seed % 3 == 0:  # many faces in common planes
         rows = (
-            np.vstack([np.eye(space), random.integers(-1, 2, (count - space, space))]) @ np.linalg.qr(rows[:space])[0]
+            np.vstack([np.eye(space), random.integers(-1, 2, (count - space, space))])
+            @ np.linalg.qr(rows[:space])[0]
         )
     units = 10.0 ** random.integers(-6, 7, space)
     zonotope = Zonotope(random.normal(size=space) * units, rows * units)
@@ -441,13 +510,16 @@ def test_boundary_is_inside_and_what_is_beyond_it_is_not(seed: int) -> None:
     assert zonotope.contains(points).all()
     assert zonotope.contains(0.5 * points + 0.5 * points[::-1]).all()
     for factor in (1e-3, 1e-6, 1e-9, 1e-11):
-        assert not zonotope.contains(zonotope.centre + (1.0 + factor) * (points - zonotope.centre)).any()
+        assert not zonotope.contains(
+            zonotope.centre + (1.0 + factor) * (points - zonotope.centre)
+        ).any()
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_membership_agrees_with_linear_programs(seed: int) -> None:
     random = np.random.default_rng(seed)
-    space, count = 3 + seed % 3, 7
+    space = 3 + seed % 3
+    count = 7
     zonotope = Zonotope(random.normal(size=space), random.normal(size=(count, space)))
     points = zonotope.centre + 2.0 * random.normal(size=(20, space))
     inside = zonotope.contains(points)
@@ -490,7 +562,8 @@ def test_points_of_a_flat_set_are_inside_and_points_across_are_not(rank: int, fa
     assert not zonotope.contains(inside + 1e-8 * across).any()
 
 
-# Outer sets -----------------------------------------------------------------------------------------------------------
+# Outer sets
+# --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("order", [1, 1.5, 2, 3])
@@ -513,7 +586,8 @@ def test_reduction_keeps_few_generators_as_they_are() -> None:
 
 
 def test_reduction_does_not_depend_on_units() -> None:
-    random, units = np.random.default_rng(0), 2.0 ** np.array([-20, 0, 13])
+    random = np.random.default_rng(0)
+    units = 2.0 ** np.array([-20, 0, 13])
     zonotope = Zonotope(np.zeros(3), random.normal(size=(20, 3)))
     scaled = Zonotope(np.zeros(3), zonotope.generators * units).reduce_outward(3)
     np.testing.assert_array_equal(scaled.generators, zonotope.reduce_outward(3).generators * units)
@@ -522,29 +596,36 @@ def test_reduction_does_not_depend_on_units() -> None:
 @pytest.mark.parametrize("seed", range(20))
 def test_cut_keeps_all_points_in_the_strips(seed: int) -> None:
     random = np.random.default_rng(seed)
-    space, count = 1 + seed % 4, 1 + seed % 3
+    space = 1 + seed % 4
+    count = 1 + seed % 3
     units = 10.0 ** random.integers(-4, 5, space)
-    zonotope = Zonotope(random.normal(size=space) * units, random.normal(size=(space + 3, space)) * units)
+    zonotope = Zonotope(
+        random.normal(size=space) * units, random.normal(size=(space + 3, space)) * units
+    )
     normals = random.normal(size=(count, space)) / units
     ends = random.choice([-1.0, 1.0], size=(400, space + 3))
     ends[::2] = random.uniform(-1.0, 1.0, (200, space + 3))
     points = zonotope.centre + ends @ zonotope.generators
     truth = points[0]
     half = np.abs(random.normal(size=count)) * (random.random(count) < 0.8)
-    lower, upper = normals @ truth - half, normals @ truth + half
+    lower = normals @ truth - half
+    upper = normals @ truth + half
     upper[random.random(count) < 0.2] = np.inf
     outer = zonotope.cut(normals, lower, upper, slack_ulp=8.0)
     inside = ((points @ normals.T >= lower) & (points @ normals.T <= upper)).all(axis=1)
     inside[0] = True
     assert outer.contains(points[inside]).all()
-    assert np.linalg.norm(outer.generators / units) <= np.linalg.norm(zonotope.generators / units) * (1.0 + 1e-9)
+    assert np.linalg.norm(outer.generators / units) <= np.linalg.norm(
+        zonotope.generators / units
+    ) * (1.0 + 1e-9)
 
 
 def test_gain_of_a_cut_has_the_smallest_sum_of_squares() -> None:
     """The same gain as a least-squares problem: |(I - K C) G|^2 + |K V|^2 over K."""
     random = np.random.default_rng(3)
     zonotope = Zonotope(random.normal(size=3), random.normal(size=(6, 3)))
-    normals, half = random.normal(size=(2, 3)), np.array([0.3, 0.2])
+    normals = random.normal(size=(2, 3))
+    half = np.array([0.3, 0.2])
     middle = normals @ zonotope.centre + [0.5, -0.4]
     images = zonotope.generators @ normals.T
     stacked = np.vstack([images, np.diag(half)])
@@ -586,7 +667,8 @@ def test_strip_that_misses_the_set_is_refused(lower: float, upper: float) -> Non
         zonotope.cut([[0, 1], [1, 0]], [-1.0, lower], [1.0, upper])
 
 
-# Mistaken arguments ---------------------------------------------------------------------------------------------------
+# Mistaken arguments
+# --------------------------------------------------------------------------------------------------
 
 SQUARE = Zonotope([0, 0], [[1, 0], [0, 1]])
 
@@ -597,7 +679,11 @@ SQUARE = Zonotope([0, 0], [[1, 0], [0, 1]])
         (lambda: Zonotope([0, 0], [[1, 0, 0]]), ValueError, "generators must have the shape"),
         (lambda: Zonotope([0, np.nan], []), ValueError, "centre must be finite"),
         (lambda: SQUARE + Zonotope([0], []), ValueError, r"other must be a set in R\^2"),
-        (lambda: SQUARE.intersection("x"), TypeError, r"other must be a set \(ConvexPolygons, Polytope or Zonotope\)"),  # type: ignore[arg-type]
+        (
+            lambda: SQUARE.intersection("x"),
+            TypeError,
+            r"other must be a set \(ConvexPolygons, Polytope or Zonotope\)",
+        ),  # type: ignore[arg-type]
         (lambda: SQUARE & rotated_boxes(1), ValueError, r"other must be a set in R\^2"),
         (lambda: SQUARE + np.ones(3), ValueError, r"offset must have the shape \(2,\)"),
         (lambda: np.eye(3) @ SQUARE, ValueError, "matrix must have the shape"),
@@ -607,10 +693,20 @@ SQUARE = Zonotope([0, 0], [[1, 0], [0, 1]])
         (lambda: SQUARE.contains([1, 2, 3]), ValueError, "points must have the shape"),
         (lambda: SQUARE.cut([1, 2, 3], 0, 1), ValueError, "normals must have the shape"),
         (lambda: SQUARE.cut([1, 0], np.nan, 1), ValueError, "lower must be a number"),
-        (lambda: Polytope.from_zonotope([0, 0]), TypeError, "zonotope must be of the type Zonotope"),  # type: ignore[arg-type]
-        (lambda: ConvexPolygons.from_zonotope(rotated_boxes(1)), ValueError, r"zonotope must be in R\^2"),
+        (
+            lambda: Polytope.from_zonotope([0, 0]),
+            TypeError,
+            "zonotope must be of the type Zonotope",
+        ),  # type: ignore[arg-type]
+        (
+            lambda: ConvexPolygons.from_zonotope(rotated_boxes(1)),
+            ValueError,
+            r"zonotope must be in R\^2",
+        ),
     ],
 )
-def test_mistaken_arguments_are_refused(operation: Any, error: type[Exception], message: str) -> None:
+def test_mistaken_arguments_are_refused(
+    operation: Any, error: type[Exception], message: str
+) -> None:
     with pytest.raises(error, match=message):
         operation()

@@ -1,4 +1,6 @@
-"""Observers of linear systems: exact sets, linear programs, and true states whose errors are at their bounds."""
+"""Observers of linear systems: exact sets, linear programs, and true states whose errors are at
+their bounds.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,9 @@ from tests.infoset.geometry.test_polygon_oracle import Exact, exact_clip, hull
 from tests.rationals import Fraction
 
 PUBLISHED: dict[str, Any] = json.loads(
-    (Path(__file__).parents[2] / "data" / "observer" / "alamo-2005.json").read_text(encoding="utf-8")
+    (Path(__file__).parents[2] / "data" / "observer" / "alamo-2005.json").read_text(
+        encoding="utf-8"
+    )
 )
 """Alamo, Bravo and Camacho (2005), with the measurements of the unit tests of CORA."""
 
@@ -51,7 +55,8 @@ def measurements() -> Floats:
 
 
 def test_vertices_of_an_estimate_have_no_rows_of_uninitialised_memory() -> None:
-    one, batch = published(), published(runs=3)
+    one = published()
+    batch = published(runs=3)
     for observer, y in ((one, measurements()[0]), (batch, [measurements()[0]] * 3)):
         observer.update(y)
         observer.predict()
@@ -59,7 +64,9 @@ def test_vertices_of_an_estimate_have_no_rows_of_uninitialised_memory() -> None:
     assert polygon.vertices.shape == (polygon.counts, 2)
     assert np.isfinite(polygon.vertices).all()
     # One run becomes empty, one is cut again: their rows after the vertices that are left are NaN.
-    again = np.stack([measurements()[1], measurements()[1] + 1e3, np.full(measurements()[1].shape, np.nan)])
+    again = np.stack(
+        [measurements()[1], measurements()[1] + 1e3, np.full(measurements()[1].shape, np.nan)]
+    )
     batch.update(again)
     polygons = batch.estimate().polygons
     assert len(set(polygons.counts.tolist())) == 3
@@ -70,7 +77,8 @@ def test_vertices_of_an_estimate_have_no_rows_of_uninitialised_memory() -> None:
     assert np.isnan(polygons.vertices[~used]).all()
 
 
-# Exact rational sets --------------------------------------------------------------------------------------------
+# Exact rational sets
+# --------------------------------------------------------------------------------------------------
 
 
 def exact_sets() -> list[list[Exact]]:
@@ -84,21 +92,27 @@ def exact_sets() -> list[list[Exact]]:
     for k, y in enumerate(Fraction(value) for value in PUBLISHED["y"][0]):
         if k:
             moved = [(a * x + b * z, c * x + d * z) for x, z in points]
-            points = hull([(x + sign * w[0], z + sign * w[1]) for x, z in moved for sign in (-1, 1)])
+            points = hull(
+                [(x + sign * w[0], z + sign * w[1]) for x, z in moved for sign in (-1, 1)]
+            )
         points = exact_clip(points, normal, y - half, y + half)
         sets.append(points)
     return sets
 
 
 def test_an_estimate_says_what_is_in_it() -> None:
-    box, still = Zonotope.box([0.0, -1.0], [0.0, 1.0]), np.eye(2)
+    box = Zonotope.box([0.0, -1.0], [0.0, 1.0])
+    still = np.eye(2)
     one = LinearObserver(still, [[0.0, 1.0]], box, noise=0.5)
     assert repr(one.estimate()) == "<estimate of 2 states at step 0: 0 to 0, -1 to 1>"
     one.update([9.0])
     assert repr(one.estimate()) == "<estimate of 2 states at step 0: no state is possible>"
     many = LinearObserver(still, [[0.0, 1.0]], box, noise=0.5, runs=2)
     many.update([[0.0], [9.0]])
-    assert repr(many.estimate()) == "<estimate of 2 states at step 0: 2 runs, 1 of them without a possible state>"
+    assert (
+        repr(many.estimate())
+        == "<estimate of 2 states at step 0: 2 runs, 1 of them without a possible state>"
+    )
 
 
 def test_the_sets_of_the_published_example_equal_the_exact_ones() -> None:
@@ -114,23 +128,33 @@ def test_the_sets_of_the_published_example_equal_the_exact_ones() -> None:
         assert ours.shape == wanted.shape
         first = int(np.abs(ours - wanted[0]).max(axis=1).argmin())
         np.testing.assert_allclose(np.roll(ours, -first, axis=0), wanted, rtol=0.0, atol=1e-12)
-        np.testing.assert_allclose([estimate.lower, estimate.upper], interval_hull, rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(
+            [estimate.lower, estimate.upper], interval_hull, rtol=0.0, atol=1e-12
+        )
         assert (estimate.lower <= wanted.min(axis=0)).all()
         assert (estimate.upper >= wanted.max(axis=0)).all()
 
 
-# Linear programs ------------------------------------------------------------------------------------------------
+# Linear programs
+# --------------------------------------------------------------------------------------------------
 
 
 class Programs:
-    """Bounds of the states of a system with A, B = 0, C and box disturbance generators, by linear programs."""
+    """Bounds of the states of a system with A, B = 0, C and box disturbance generators, by linear
+    programs.
+    """
 
-    def __init__(self, a: Floats, c: Floats, generators: Floats, half: Floats, noise: Floats, y: Floats) -> None:
-        states, steps = len(a), len(y)
+    def __init__(
+        self, a: Floats, c: Floats, generators: Floats, half: Floats, noise: Floats, y: Floats
+    ) -> None:
+        states = len(a)
+        steps = len(y)
         unknowns = states + len(generators) * (steps - 1)
         state = np.zeros((states, unknowns))
         state[:, :states] = np.diag(half)
-        self.states, rows, limits = [state], [], []
+        self.states = [state]
+        rows = []
+        limits = []
         for k in range(1, steps):
             state = a @ state
             first = states + len(generators) * (k - 1)
@@ -141,12 +165,15 @@ class Programs:
                 if not np.isnan(value):
                     rows += [row, -row]
                     limits += [value + width, width - value]
-        self.rows, self.limits = np.array(rows), np.array(limits)
+        self.rows = np.array(rows)
+        self.limits = np.array(limits)
 
     def farthest(self, step: int, direction: Floats) -> Floats:
         """Coefficients of a motion whose state at a step is farthest along a direction."""
         cost = -direction @ self.states[step]
-        optimum = linprog(cost, self.rows, self.limits, bounds=(-1.0, 1.0), method="highs", options=HIGHS)
+        optimum = linprog(
+            cost, self.rows, self.limits, bounds=(-1.0, 1.0), method="highs", options=HIGHS
+        )
         assert optimum.status == 0
         return np.asarray(optimum.x)
 
@@ -162,7 +189,9 @@ class Programs:
 
 
 def chain(axes: int, order: int) -> tuple[Floats, Floats, Floats]:
-    """A, C and disturbance generators of coupled chains of integrators, each measured at its first state."""
+    """A, C and disturbance generators of coupled chains of integrators, each measured at its first
+    state.
+    """
     step = 0.5
     block = np.eye(order) + step * np.eye(order, k=1)
     block[-1, -1] = 0.9
@@ -174,18 +203,28 @@ def chain(axes: int, order: int) -> tuple[Floats, Floats, Floats]:
 
 
 def simulated(
-    a: Floats, c: Floats, generators: Floats, noise: Floats, steps: int, generator: np.random.Generator
+    a: Floats,
+    c: Floats,
+    generators: Floats,
+    noise: Floats,
+    steps: int,
+    generator: np.random.Generator,
 ) -> tuple[Floats, Floats]:
     """States and measurements whose errors are at their bounds, from a corner of the unit box."""
-    states, measured = [generator.choice([-1.0, 1.0], len(a))], []
+    states = [generator.choice([-1.0, 1.0], len(a))]
+    measured = []
     for k in range(steps):
         if k:
-            states.append(a @ states[-1] + generator.choice([-1.0, 1.0], len(generators)) @ generators)
+            states.append(
+                a @ states[-1] + generator.choice([-1.0, 1.0], len(generators)) @ generators
+            )
         measured.append(c @ states[-1] + generator.choice([-1.0, 1.0], len(c)) * noise)
     return np.array(states), np.array(measured)
 
 
-@pytest.mark.parametrize(("axes", "order", "steps"), [(2, 3, 4), (1, 3, 8), (2, 2, 7), (1, 2, 9), (1, 1, 6)])
+@pytest.mark.parametrize(
+    ("axes", "order", "steps"), [(2, 3, 4), (1, 3, 8), (2, 2, 7), (1, 2, 9), (1, 1, 6)]
+)
 def test_hulls_equal_linear_programs(axes: int, order: int, steps: int) -> None:
     a, c, generators = chain(axes, order)
     noise = np.full(axes, 0.2)
@@ -194,12 +233,15 @@ def test_hulls_equal_linear_programs(axes: int, order: int, steps: int) -> None:
     y = states @ c.T + rng.uniform(-0.15, 0.15, (steps, axes))
     y[2, 0] = np.nan
     size = len(a)
-    start, disturbance = Zonotope.box(-np.ones(size), np.ones(size)), Zonotope(np.zeros(size), generators)
+    start = Zonotope.box(-np.ones(size), np.ones(size))
+    disturbance = Zonotope(np.zeros(size), generators)
     observer = LinearObserver(a, c, start, noise=noise, disturbance=disturbance, max_facets=None)
     estimates = observer.run(y)
     for step in (steps - 1, steps // 2):
         wanted = Programs(a, c, generators, np.ones(size), noise, y[: step + 1]).hull(step)
-        np.testing.assert_allclose([estimates[step].lower, estimates[step].upper], wanted, rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(
+            [estimates[step].lower, estimates[step].upper], wanted, rtol=0.0, atol=1e-9
+        )
     programs = Programs(a, c, generators, np.ones(size), noise, y)
     for estimate in observer.smooth(estimates):
         hulls = [estimate.lower, estimate.upper]
@@ -207,13 +249,16 @@ def test_hulls_equal_linear_programs(axes: int, order: int, steps: int) -> None:
 
 
 @pytest.mark.parametrize(
-    "units", [[1e9, 1.0, 1e-9] * 2, [1.0, 1e-9, 1e9, 1e-9, 1.0, 1e9], [1e9] * 3 + [1e-9] * 3, [1e-9] * 6]
+    "units",
+    [[1e9, 1.0, 1e-9] * 2, [1.0, 1e-9, 1e9, 1e-9, 1.0, 1e9], [1e9] * 3 + [1e-9] * 3, [1e-9] * 6],
 )
 def test_units_of_six_states_do_not_matter(units: list[float]) -> None:
     """Formerly sets in mixed units were too wide, with thousands of vertices after two steps."""
     a, c, generators = chain(2, 3)
     rng = np.random.default_rng(6)
-    y = simulated(a, c, generators, np.full(2, 0.2), 3, rng)[0] @ c.T + rng.uniform(-0.15, 0.15, (3, 2))
+    y = simulated(a, c, generators, np.full(2, 0.2), 3, rng)[0] @ c.T + rng.uniform(
+        -0.15, 0.15, (3, 2)
+    )
     hulls = []
     for scale in (np.ones(6), np.array(units)):
         observer = LinearObserver(
@@ -230,7 +275,8 @@ def test_units_of_six_states_do_not_matter(units: list[float]) -> None:
     np.testing.assert_allclose(hulls[1], hulls[0], rtol=0.0, atol=1e-9)
 
 
-# The true state -------------------------------------------------------------------------------------------------
+# The true state
+# --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("matrix", ["rotation", "shear", "singular", "mirror", "zero", "growing"])
@@ -243,8 +289,12 @@ def test_the_true_state_is_inside_for_other_systems(matrix: str) -> None:
         "zero": [[0.0, 0.0], [0.0, 0.0]],
         "growing": [[1.1, 0.3], [-0.2, 1.2]],
     }[matrix]
-    rng, runs, steps = np.random.default_rng(3), 300, 40
-    c, b, offset = np.array([[1.0, 0.0], [0.3, -1.0]]), np.array([[0.1], [1e3]]), np.array([1.0, -1e3])
+    rng = np.random.default_rng(3)
+    runs = 300
+    steps = 40
+    c = np.array([[1.0, 0.0], [0.3, -1.0]])
+    b = np.array([[0.1], [1e3]])
+    offset = np.array([1.0, -1e3])
     corners = np.array([[0.0, 0.0], [0.2, -0.1], [0.1, 0.3]])
     observer = LinearObserver(
         a,
@@ -283,12 +333,21 @@ DRIFT = [[1.0, 0.5], [0.0, 1.0]]
         (DRIFT, [0.0, 0.0], 1.0, [1e-3, 1e-2], 200),
         ([[1.3, 0.5], [0.0, 0.7]], [1.0, 1.0], 1.0, [0.1, 0.01], 60),
     ],
-    ids=["exact measurements", "no disturbance", "no errors", "unlike scales", "known start", "unstable"],
+    ids=[
+        "exact measurements",
+        "no disturbance",
+        "no errors",
+        "unlike scales",
+        "known start",
+        "unstable",
+    ],
 )
 def test_the_true_state_is_inside_thin_sets_of_many_steps(
     a: list[list[float]], half: list[float], noise: float, w: list[float], steps: int
 ) -> None:
-    rng, runs, matrix = np.random.default_rng(8), 100, np.array(a)
+    rng = np.random.default_rng(8)
+    runs = 100
+    matrix = np.array(a)
     observer = LinearObserver(
         a,
         [[1.0, 0.0]],
@@ -322,7 +381,8 @@ def test_polygons_of_many_vertices_contain_the_exact_set() -> None:
     assert estimate.polygons.counts == 512
     # The support of a sum is the sum of supports.
     for direction in ([1.0, 0.0], [0.3, -1.0], [-1.0, 2.0]):
-        wanted, d = 0.0, np.array(direction)
+        wanted = 0.0
+        d = np.array(direction)
         for _ in range(400):
             wanted += float(abs(d @ [1e-3, 1e-2]))
             d = d @ [[1.0, 0.1], [0.0, 1.0]]
@@ -333,8 +393,11 @@ def test_polygons_of_many_vertices_contain_the_exact_set() -> None:
 
 def test_the_true_state_is_inside_smoothed_sets() -> None:
     rng = np.random.default_rng(4)
-    a, c, w = np.array(PUBLISHED["A"]), np.array(PUBLISHED["C"]), np.array(PUBLISHED["disturbance_generators"])
-    runs, observer = 500, published(500)
+    a = np.array(PUBLISHED["A"])
+    c = np.array(PUBLISHED["C"])
+    w = np.array(PUBLISHED["disturbance_generators"])
+    runs = 500
+    observer = published(500)
     states = [rng.choice([-3.0, 3.0], (runs, 2))]
     for _ in range(14):
         states.append(states[-1] @ a.T + rng.choice([-1.0, 1.0], (runs, 1)) * w)
@@ -345,7 +408,9 @@ def test_the_true_state_is_inside_smoothed_sets() -> None:
 
 def test_a_section_of_the_interception_is_an_observer() -> None:
     step_s, limit = 0.5, 0.005
-    box = StateBox(z_m=(-2e3, 2e3), x_m=(5.5e6, 6.1e6), vz_m_s=(-100.0, 100.0), vx_m_s=(-59e3, -57e3))
+    box = StateBox(
+        z_m=(-2e3, 2e3), x_m=(5.5e6, 6.1e6), vz_m_s=(-100.0, 100.0), vx_m_s=(-59e3, -57e3)
+    )
     sensor = AngleSensor(
         period_s=step_s,
         error_at_nominal_range_rad=1.5e-4,
@@ -379,13 +444,33 @@ def test_a_section_of_the_interception_is_an_observer() -> None:
     assert section.polygons[0].hausdorff_distance(observer.estimate().polygons) < 1e-9
 
 
-# Formerly lost the true state: seeds 216 and 252, with exact measurements, a singular matrix and a flat initial set;
-# seeds 1949 and 3147, with initial sets whose known coordinates were rounding errors.
-# Seeds 100 to 372: a state that is zero at first, in units far from one.
-# Seeds 639, 1172, 1397, 1622, 1843, 1885 and 1948: sharp corners of a thin layer, which vertices with more than n
-# facets did not reach.
-# Seed 2217: a set between facets that are nearly opposite, whose sum with a segment rounding decides even for a box.
-HARD = [100, 122, 125, 216, 232, 244, 252, 280, 372, 639, 1172, 1397, 1622, 1843, 1885, 1948, 1949, 2217, 3147]
+# Formerly lost the true state: seeds 216 and 252, with exact measurements, a singular matrix and a
+# flat initial set; seeds 1949 and 3147, with initial sets whose known coordinates were rounding
+# errors. Seeds 100 to 372: a state that is zero at first, in units far from one. Seeds 639, 1172,
+# 1397, 1622, 1843, 1885 and 1948: sharp corners of a thin layer, which vertices with more than n
+# facets did not reach. Seed 2217: a set between facets that are nearly opposite, whose sum with a
+# segment rounding decides even for a box.
+HARD = [
+    100,
+    122,
+    125,
+    216,
+    232,
+    244,
+    252,
+    280,
+    372,
+    639,
+    1172,
+    1397,
+    1622,
+    1843,
+    1885,
+    1948,
+    1949,
+    2217,
+    3147,
+]
 
 
 @pytest.mark.parametrize(
@@ -394,13 +479,19 @@ HARD = [100, 122, 125, 216, 232, 244, 252, 280, 372, 639, 1172, 1397, 1622, 1843
         *range(8),
         *range(40, 48),
         *HARD,
-        *(pytest.param(seed, marks=pytest.mark.thorough) for seed in (*range(8, 20), *range(48, 60))),
+        *(
+            pytest.param(seed, marks=pytest.mark.thorough)
+            for seed in (*range(8, 20), *range(48, 60))
+        ),
     ],
 )
 def test_the_true_state_is_inside_for_any_matrices_of_other_numbers_of_states(seed: int) -> None:
-    """Singular and regular matrices, flat initial sets, exact measurements, gaps, units that differ by 1e18."""
+    """Singular and regular matrices, flat initial sets, exact measurements, gaps, units that differ
+    by 1e18.
+    """
     rng = np.random.default_rng(seed)
-    states, outputs = int(rng.choice([1, 3, 3, 4])), int(rng.integers(1, 3))
+    states = int(rng.choice([1, 3, 3, 4]))
+    outputs = int(rng.integers(1, 3))
     a = rng.normal(size=(states, states)) * rng.choice([0.3, 0.6])
     if seed % 4 == 0:
         a[-1] = 0.0
@@ -408,14 +499,24 @@ def test_the_true_state_is_inside_for_any_matrices_of_other_numbers_of_states(se
         a = np.round(2.0 * a) / 2.0
     c = np.eye(outputs, states) if seed % 3 == 0 else rng.normal(size=(outputs, states))
     generators = 0.1 * rng.normal(size=(int(rng.integers(0, 3)), states))
-    half, noise = rng.choice([0.0, 0.5, 1.0], states), float(rng.choice([0.0, 0.05, 0.5]))
+    half = rng.choice([0.0, 0.5, 1.0], states)
+    noise = float(rng.choice([0.0, 0.05, 0.5]))
     if seed >= 40:  # other units of the states
         units = 10.0 ** rng.integers(-9, 10, states)
-        a, c, generators, half = a * units[:, None] / units, c / units, generators * units, half * units
+        a = a * units[:, None] / units
+        c = c / units
+        generators = generators * units
+        half = half * units
     observer = LinearObserver(
-        a, c, Zonotope.box(-half, half), noise=noise, disturbance=Zonotope(np.zeros(states), generators)
+        a,
+        c,
+        Zonotope.box(-half, half),
+        noise=noise,
+        disturbance=Zonotope(np.zeros(states), generators),
     )
-    x, true, estimates = rng.choice([-1.0, 1.0], states) * half, [], []
+    x = rng.choice([-1.0, 1.0], states) * half
+    true = []
+    estimates = []
     for k in range(6):
         if k:
             observer.predict()
@@ -431,7 +532,9 @@ def test_the_true_state_is_inside_for_any_matrices_of_other_numbers_of_states(se
 
 @pytest.mark.parametrize("seed", [0, 2, 4, 12, 15, 20, 126, 388, 475])
 def test_many_states_that_are_singular_or_flat_are_kept(seed: int) -> None:
-    """Hulls of 700 points took minutes, and that of 388 was refused; thin sets were made flat, and lost 126 and 475."""
+    """Hulls of 700 points took minutes, and that of 388 was refused; thin sets were made flat, and
+    lost 126 and 475.
+    """
     from benchmarks.hard_observers import degenerate_case  # it imports this module
 
     observer, states, measured = degenerate_case(seed)
@@ -440,9 +543,13 @@ def test_many_states_that_are_singular_or_flat_are_kept(seed: int) -> None:
 
 
 def test_a_state_that_is_known_to_the_last_digit_leaves_the_others_as_they_are() -> None:
-    """The third state converges until rounding makes its interval a point; formerly the set lost the true state."""
+    """The third state converges until rounding makes its interval a point; formerly the set lost
+    the true state.
+    """
     box = Zonotope.box(-np.ones(3), np.ones(3))
-    observer = LinearObserver(np.diag([1.0, 1.0, 1e-5]), np.eye(3), box, noise=1.0, offset=[0.0, 0.0, 1.0])
+    observer = LinearObserver(
+        np.diag([1.0, 1.0, 1e-5]), np.eye(3), box, noise=1.0, offset=[0.0, 0.0, 1.0]
+    )
     state = np.ones(3)
     for _ in range(8):
         observer.predict()
@@ -451,16 +558,21 @@ def test_a_state_that_is_known_to_the_last_digit_leaves_the_others_as_they_are()
         assert estimate.polytopes[0].contains(state), estimate.step
     np.testing.assert_allclose(estimate.lower[:2], -1.0, rtol=0.0, atol=1e-4)
     np.testing.assert_allclose(estimate.upper[:2], 1.0, rtol=0.0, atol=1e-4)
-    np.testing.assert_allclose([estimate.lower[2], estimate.upper[2]], state[2], rtol=0.0, atol=1e-11)
+    np.testing.assert_allclose(
+        [estimate.lower[2], estimate.upper[2]], state[2], rtol=0.0, atol=1e-11
+    )
 
 
-# Interface ------------------------------------------------------------------------------------------------------
+# Interface
+# --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("states", [2, 3])
 def test_a_contradiction_is_located(states: int) -> None:
     c = np.eye(2, states)
-    observer = LinearObserver(np.eye(states), c, Zonotope.box(-np.ones(states), np.ones(states)), noise=[0.25, 0.5])
+    observer = LinearObserver(
+        np.eye(states), c, Zonotope.box(-np.ones(states), np.ones(states)), noise=[0.25, 0.5]
+    )
     estimates = observer.run([[0.5, 0.0], [0.5, 2.0], [0.0, 0.0]])
     assert [bool(estimate.is_empty) for estimate in estimates] == [False, True, True]
     where = observer.inconsistency
@@ -472,7 +584,8 @@ def test_a_contradiction_is_located(states: int) -> None:
 
 
 def test_matrices_may_change_with_the_step() -> None:
-    a, y = np.array(PUBLISHED["A"]), measurements()[:5]
+    a = np.array(PUBLISHED["A"])
+    y = measurements()[:5]
     constant = published().run(y)
     observer = LinearObserver(
         np.repeat(a[None], 4, axis=0),
@@ -490,9 +603,13 @@ def test_matrices_may_change_with_the_step() -> None:
 
 
 @pytest.mark.parametrize("missing", [None, 0, 1])
-def test_noise_in_a_polytope_keeps_its_projection_if_an_output_is_missing(missing: int | None) -> None:
+def test_noise_in_a_polytope_keeps_its_projection_if_an_output_is_missing(
+    missing: int | None,
+) -> None:
     diamond = Polytope.from_vertices([[1.0, 0.0], [0.0, 0.5], [-1.0, 0.0], [0.0, -0.5]])
-    observer = LinearObserver(np.eye(2), np.eye(2), Zonotope.box([-9.0, -9.0], [9.0, 9.0]), noise=diamond)
+    observer = LinearObserver(
+        np.eye(2), np.eye(2), Zonotope.box([-9.0, -9.0], [9.0, 9.0]), noise=diamond
+    )
     y = np.array([1.0, 2.0])
     wanted = {None: 1.0, 0: 18.0, 1: 2.0 * 18.0}[missing]
     if missing is not None:
@@ -501,7 +618,8 @@ def test_noise_in_a_polytope_keeps_its_projection_if_an_output_is_missing(missin
     np.testing.assert_allclose(observer.estimate().polygons.area(), wanted)
 
 
-# What varies with time, and what else is known --------------------------------------------------------------------
+# What varies with time, and what else is known
+# --------------------------------------------------------------------------------------------------
 
 
 def drifting(states: int, **options: Any) -> LinearObserver:
@@ -539,7 +657,11 @@ def test_noise_and_disturbance_of_each_step_equal_their_boxes_and_sets(states: i
 
 def test_sets_of_each_step_enter_the_exact_sum() -> None:
     observer = LinearObserver(
-        np.eye(2), np.eye(2), Zonotope([0.0, 0.0], []), noise=9.0, disturbance=[[0.5, 0.0], [0.25, 2.0]]
+        np.eye(2),
+        np.eye(2),
+        Zonotope([0.0, 0.0], []),
+        noise=9.0,
+        disturbance=[[0.5, 0.0], [0.25, 2.0]],
     )
     observer.predict()
     observer.predict()
@@ -556,7 +678,8 @@ def test_smoothing_uses_the_disturbance_of_a_prediction(states: int) -> None:
 
     smoothed = still.smooth(estimates)
 
-    # x1 + 0.5 x2 + w is at least 3 for w of at most 5: all initial states are possible; without w, none is.
+    # x1 + 0.5 x2 + w is at least 3 for w of at most 5: all initial states are possible; without w,
+    # none is.
     np.testing.assert_allclose(smoothed[0].lower, -1.0, rtol=0.0, atol=1e-6)
     assert not smoothed[0].is_empty
 
@@ -586,7 +709,9 @@ def test_none_is_a_missing_measurement() -> None:
     settings: dict[str, Any] = {"noise": 0.1, "disturbance": Zonotope([0.0, 0.0], [[0.0, 0.1]])}
     rows = [[0.5, None], None, [None, 0.2]]
     with_nan = [[0.5, np.nan], [np.nan, np.nan], [np.nan, 0.2]]
-    one, other = (LinearObserver(DRIFT, np.eye(2), box, **settings).run(y) for y in (rows, with_nan))
+    one, other = (
+        LinearObserver(DRIFT, np.eye(2), box, **settings).run(y) for y in (rows, with_nan)
+    )
     for ours, wanted in zip(one, other, strict=True):
         np.testing.assert_array_equal(ours.polygons.polygon(), wanted.polygons.polygon())
     single = LinearObserver(DRIFT, [[1.0, 0.0]], box, **settings)
@@ -597,13 +722,24 @@ def test_none_is_a_missing_measurement() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"noise": [[0.1, 0.2]]}, r"noise must be half-widths of at least 0, a number or of shape \(1,\) or \(K, 1\)"),
+        (
+            {"noise": [[0.1, 0.2]]},
+            r"noise must be half-widths of at least 0, a number or of shape \(1,\) or \(K, 1\)",
+        ),
         ({"noise": [-0.1]}, "noise must be half-widths of at least 0"),
-        ({"disturbance": [[0.1], [0.2]]}, r"disturbance must be a set, or half-widths of at least 0 of shape \(3,\)"),
-        ({"disturbance": [Zonotope([0.0], []), Zonotope([0.0], [])]}, "disturbance must have 3 coordinates"),
+        (
+            {"disturbance": [[0.1], [0.2]]},
+            r"disturbance must be a set, or half-widths of at least 0 of shape \(3,\)",
+        ),
+        (
+            {"disturbance": [Zonotope([0.0], []), Zonotope([0.0], [])]},
+            "disturbance must have 3 coordinates",
+        ),
     ],
 )
-def test_wrong_noise_or_disturbance_of_steps_is_refused(options: dict[str, Any], message: str) -> None:
+def test_wrong_noise_or_disturbance_of_steps_is_refused(
+    options: dict[str, Any], message: str
+) -> None:
     with pytest.raises(ValueError, match=message):
         drifting(3, **options)
 
@@ -618,7 +754,8 @@ def test_estimate_is_drawn_and_written(states: int) -> None:
     (artist,) = estimate.plot(Figure().subplots(), states=(1, 0), color="0.5")
 
     corners = artist.get_xy()
-    # The set is a box: within 0.7 to 1 of x1 and within -1 to 1 of x2. Of 7 states the polygon is around it.
+    # The set is a box: within 0.7 to 1 of x1 and within -1 to 1 of x2. Of 7 states the polygon is
+    # around it.
     inner = np.array([[-1.0, 0.7], [1.0, 1.0]])
     around = 1e-6 if states < 7 else 0.01
     assert (corners.min(axis=0) <= inner[0] + 1e-9).all()
@@ -645,14 +782,20 @@ def test_batch_is_drawn_and_written_run_by_run() -> None:
     assert written["vertices"][1] == []
 
 
-# The enlargement of a prediction --------------------------------------------------------------------------------
+# The enlargement of a prediction
+# --------------------------------------------------------------------------------------------------
 
 coordinates = st.integers(-4, 4).map(float) | st.floats(-1.0, 1.0, width=32)
 
 
 @settings(max_examples=100, deadline=None)
-@given(st.lists(st.tuples(coordinates, coordinates), min_size=1, max_size=9), st.sampled_from([1e-3, 1.0, 40.0]))
-def test_an_enlarged_polygon_contains_the_sum_with_the_box(points: list[tuple[float, float]], ratio: float) -> None:
+@given(
+    st.lists(st.tuples(coordinates, coordinates), min_size=1, max_size=9),
+    st.sampled_from([1e-3, 1.0, 40.0]),
+)
+def test_an_enlarged_polygon_contains_the_sum_with_the_box(
+    points: list[tuple[float, float]], ratio: float
+) -> None:
     polygon = ConvexPolygons.from_points(points).polygon()
     half = 2.0**-30, 2.0**-30 * ratio
     out = np.zeros((len(polygon) + 4, 2))
@@ -675,16 +818,20 @@ def test_a_polygon_of_an_observer_gains_no_vertices_from_slack() -> None:
     assert enlarge(ring, 4, 0.0, 0.0, SUM_SLACK, SUM_SLACK, out) == 4
 
 
-# A bounded number of facets --------------------------------------------------------------------------------------
+# A bounded number of facets
+# --------------------------------------------------------------------------------------------------
 
 
 def test_reduced_sets_contain_the_exact_ones_and_tell_how_much_wider_they_are() -> None:
     a, c, generators = chain(2, 2)
-    noise, steps, size = np.full(2, 0.2), 12, 4
+    noise = np.full(2, 0.2)
+    steps = 12
+    size = 4
     rng = np.random.default_rng(6)
     states, _ = simulated(a, c, generators, noise, steps, rng)
     y = states @ c.T + rng.uniform(-0.15, 0.15, (steps, 2))
-    start, disturbance = Zonotope.box(-np.ones(size), np.ones(size)), Zonotope(np.zeros(size), generators)
+    start = Zonotope.box(-np.ones(size), np.ones(size))
+    disturbance = Zonotope(np.zeros(size), generators)
     observer = LinearObserver(a, c, start, noise=noise, disturbance=disturbance, max_facets=20)
     estimates = observer.run(y)
     programs = Programs(a, c, generators, np.ones(size), noise, y)
@@ -695,16 +842,24 @@ def test_reduced_sets_contain_the_exact_ones_and_tell_how_much_wider_they_are() 
         hull = np.array(programs.hull(estimate.step))
         assert (estimate.lower <= hull[0] + 1e-9).all()
         assert (estimate.upper >= hull[1] - 1e-9).all()
-    wider = estimates[-1].upper - estimates[-1].lower - np.ptp(np.array(programs.hull(steps - 1)), axis=0)
+    wider = (
+        estimates[-1].upper
+        - estimates[-1].lower
+        - np.ptp(np.array(programs.hull(steps - 1)), axis=0)
+    )
     np.testing.assert_allclose(estimates[-1].excess_widths(), wider, rtol=0.0, atol=1e-8)
     assert (estimates[0].excess_widths() == 0.0).all()
 
 
 def test_numbers_of_one_output_and_a_wrong_bound() -> None:
     box = Zonotope.box([-1.0, -1.0, -1.0], [1.0, 1.0, 1.0])
-    observer = LinearObserver(np.eye(3), [[1.0, 0.0, 0.0]], box, noise=0.1, input_matrix=[[1.0], [0.0], [0.0]])
+    observer = LinearObserver(
+        np.eye(3), [[1.0, 0.0, 0.0]], box, noise=0.1, input_matrix=[[1.0], [0.0], [0.0]]
+    )
     observer.update(0.5)
     observer.predict(1.0)
-    np.testing.assert_allclose([observer.estimate().lower[0], observer.estimate().upper[0]], [1.4, 1.6], atol=1e-9)
+    np.testing.assert_allclose(
+        [observer.estimate().lower[0], observer.estimate().upper[0]], [1.4, 1.6], atol=1e-9
+    )
     with pytest.raises(ValueError, match="max_facets"):
         LinearObserver(np.eye(3), np.eye(3), box, noise=0.1, max_facets=5)

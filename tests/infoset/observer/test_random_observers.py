@@ -1,8 +1,8 @@
 """1 000 random observers of three and four states, 30 steps each, with the default bound on facets.
 
-The errors of all steps are at their bounds, which is the worst case for rounding. Witnesses are motions in exact
-rationals: those of linear programs, moved a little to one that is well inside, so that they satisfy all measurements.
-Their states must be in the sets, and in the smoothed sets.
+The errors of all steps are at their bounds, which is the worst case for rounding. Witnesses are
+motions in exact rationals: those of linear programs, moved a little to one that is well inside, so
+that they satisfy all measurements. Their states must be in the sets, and in the smoothed sets.
 """
 
 from __future__ import annotations
@@ -40,21 +40,25 @@ class System:
         self.noise = float(random.choice([1e-3, 0.05, 1.0]))
 
     def observer(self) -> LinearObserver:
-        start, disturbance = (
-            Zonotope.box(-np.ones(self.size), np.ones(self.size)),
-            Zonotope(np.zeros(self.size), self.generators),
-        )
+        start = Zonotope.box(-np.ones(self.size), np.ones(self.size))
+        disturbance = Zonotope(np.zeros(self.size), self.generators)
         return LinearObserver(self.a, self.c, start, noise=self.noise, disturbance=disturbance)
 
     def simulated(self, steps: int, part: float = 1.0) -> tuple[Floats, Floats]:
-        """Coefficients of the initial set and of the disturbances, and measurements, NaN where one is missing."""
+        """Coefficients of the initial set and of the disturbances, and measurements, NaN where one
+        is missing.
+        """
         choice = self.random.choice
         coefficients = part * choice([-1.0, 1.0], self.size + len(self.generators) * (steps - 1))
-        x, y = coefficients[: self.size], []
+        x = coefficients[: self.size]
+        y = []
         for k in range(steps):
             if k:
                 first = self.size + len(self.generators) * (k - 1)
-                x = self.a @ x + coefficients[first : first + len(self.generators)] @ self.generators
+                x = (
+                    self.a @ x
+                    + coefficients[first : first + len(self.generators)] @ self.generators
+                )
             y.append(self.c @ x + part * choice([-1.0, 1.0], len(self.c)) * self.noise)
         measured = np.array(y)
         measured[self.random.random(steps) < 0.1] = np.nan
@@ -62,7 +66,8 @@ class System:
 
     def states(self, coefficients: list[Fraction], steps: int) -> list[list[Fraction]]:
         """Exact states of coefficients."""
-        a, rows = exactly(self.a), exactly(self.generators)
+        a = exactly(self.a)
+        rows = exactly(self.generators)
         states = [coefficients[: self.size]]
         for k in range(1, steps):
             first = self.size + len(rows) * (k - 1)
@@ -82,16 +87,22 @@ def exactly(matrix: Floats) -> list[list[Fraction]]:
 
 
 def beyond(polytope: Polytope, state: list[Fraction]) -> float:
-    """Exact distance of a state beyond the facets of a set, relative to the terms of normal . x; at most 0 inside."""
+    """Exact distance of a state beyond the facets of a set, relative to the terms of normal . x; at
+    most 0 inside.
+    """
     if polytope.is_empty:
         return np.inf
     rows, limits = polytope.constraints()
     point = np.array(state, dtype=float)
     terms = np.abs(rows) @ np.abs(point) + np.abs(limits)
     worst = -np.inf
-    for row, limit, size, rough in zip(exactly(rows), limits.tolist(), terms, rows @ point - limits, strict=True):
+    for row, limit, size, rough in zip(
+        exactly(rows), limits.tolist(), terms, rows @ point - limits, strict=True
+    ):
         if rough > -1e-9 * size:
-            exact = sum((p * q for p, q in zip(row, state, strict=True)), Fraction(0)) - Fraction(limit)
+            exact = sum((p * q for p, q in zip(row, state, strict=True)), Fraction(0)) - Fraction(
+                limit
+            )
             worst = max(worst, float(exact) / float(size))
     return worst
 
@@ -102,12 +113,16 @@ def test_the_true_state_is_inside_at_every_step(first: int) -> None:
         system = System(seed)
         observer = system.observer()
         coefficients, measured = system.simulated(STEPS)
-        x, wrong = coefficients[: system.size], []
+        x = coefficients[: system.size]
+        wrong = []
         for k, y in enumerate(measured):
             if k:
                 observer.predict()
                 place = system.size + len(system.generators) * (k - 1)
-                x = system.a @ x + coefficients[place : place + len(system.generators)] @ system.generators
+                x = (
+                    system.a @ x
+                    + coefficients[place : place + len(system.generators)] @ system.generators
+                )
             observer.update(y)
             (polytope,) = observer.estimate().polytopes
             if not polytope.contains(x):
@@ -115,17 +130,25 @@ def test_the_true_state_is_inside_at_every_step(first: int) -> None:
         assert not wrong
 
 
-def witnesses(system: System, steps: int, count: int) -> tuple[Floats, list[tuple[int, list[list[Fraction]]]]]:
-    """Measurements, and motions that satisfy them exactly: with an extreme state at a step along a random direction."""
+def witnesses(
+    system: System, steps: int, count: int
+) -> tuple[Floats, list[tuple[int, list[list[Fraction]]]]]:
+    """Measurements, and motions that satisfy them exactly: with an extreme state at a step along a
+    random direction.
+    """
     inner, measured = system.simulated(steps, part=0.9)
-    half, noise = np.ones(system.size), np.full(len(system.c), system.noise)
+    half = np.ones(system.size)
+    noise = np.full(len(system.c), system.noise)
     programs = Programs(system.a, system.c, system.generators, half, noise, measured)
     found = []
     for _ in range(count):
         step = int(system.random.integers(steps))
         extreme = programs.farthest(step, system.random.normal(size=system.size))
         # Linear programs violate constraints by 1e-10; a motion nearer to the inner one does not.
-        coefficients = [Fraction(float(value)) for value in np.clip(extreme + 1e-6 * (inner - extreme), -1.0, 1.0)]
+        coefficients = [
+            Fraction(float(value))
+            for value in np.clip(extreme + 1e-6 * (inner - extreme), -1.0, 1.0)
+        ]
         states = system.states(coefficients, steps)
         for state, y in zip(states, measured, strict=True):
             for row, value in zip(exactly(system.c), y.tolist(), strict=True):
@@ -138,7 +161,9 @@ def witnesses(system: System, steps: int, count: int) -> tuple[Floats, list[tupl
 
 @pytest.mark.parametrize("first", range(0, 100, 10))
 def test_exact_witnesses_are_inside(first: int) -> None:
-    """Ten steps: states of witnesses for a step, with all measurements, are in its set and in its smoothed set."""
+    """Ten steps: states of witnesses for a step, with all measurements, are in its set and in its
+    smoothed set.
+    """
     for seed in range(first, first + 10):
         system = System(seed)
         measured, found = witnesses(system, 10, 20)
@@ -148,4 +173,8 @@ def test_exact_witnesses_are_inside(first: int) -> None:
         for _, states in found:
             for sets in (estimates, smoothed):
                 for estimate, state in zip(sets, states, strict=True):
-                    assert beyond(estimate.polytopes[0], state) <= 0.0, (seed, estimate.step, sets is smoothed)
+                    assert beyond(estimate.polytopes[0], state) <= 0.0, (
+                        seed,
+                        estimate.step,
+                        sets is smoothed,
+                    )

@@ -1,4 +1,6 @@
-"""Observers of five and more states: true states, linear programs of their own, contradictions, smoothing."""
+"""Observers of five and more states: true states, linear programs of their own, contradictions,
+smoothing.
+"""
 
 from __future__ import annotations
 
@@ -18,8 +20,8 @@ from infoset.observer.window import Windows
 from tests.infoset.observer.test_linear_observer import Programs, chain
 
 PROGRAM_GAP = 1e-7
-"""Difference of our bounds from the optima, in widths: both programs have tolerances of 1e-10, and multipliers of up to
-hundreds of them are added."""
+"""Difference of our bounds from the optima, in widths: both programs have tolerances of 1e-10, and
+multipliers of up to hundreds of them are added."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,9 @@ class WideSystem:
 
     @classmethod
     def random(cls, states: int, seed: int) -> WideSystem:
-        """Return a random system near the limit of stability, with half as many outputs as states."""
+        """Return a random system near the limit of stability, with half as many outputs as
+        states.
+        """
         random = np.random.default_rng([57, states, seed])
         a = random.normal(size=(states, states))
         a *= random.uniform(0.8, 1.02) / np.abs(np.linalg.eigvals(a)).max()
@@ -49,13 +53,16 @@ class WideSystem:
 
     @classmethod
     def springs(cls, states: int) -> WideSystem:
-        """Return undamped masses in a row between springs, of an even number of states; every other position is seen.
+        """Return undamped masses in a row between springs, of an even number of states; every other
+        position is seen.
 
         The slowest oscillation of four masses takes 34 steps.
         """
         masses = states // 2
         springs = 0.09 * (2.0 * np.eye(masses) - np.eye(masses, k=1) - np.eye(masses, k=-1))
-        rates = np.block([[np.zeros((masses, masses)), np.eye(masses)], [-springs, np.zeros((masses, masses))]])
+        rates = np.block(
+            [[np.zeros((masses, masses)), np.eye(masses)], [-springs, np.zeros((masses, masses))]]
+        )
         c = np.eye(states)[:masses:2]
         generators = 0.05 * np.eye(states)[masses:]
         return cls(expm(rates), c, generators, 0.2)
@@ -64,9 +71,13 @@ class WideSystem:
         states = len(self.a)
         box = Zonotope.box(-np.ones(states), np.ones(states))
         disturbance = Zonotope(np.zeros(states), self.generators)
-        return LinearObserver(self.a, self.c, box, noise=self.noise, disturbance=disturbance, **options)
+        return LinearObserver(
+            self.a, self.c, box, noise=self.noise, disturbance=disturbance, **options
+        )
 
-    def simulated(self, steps: int, seed: int, share: float = 1.0, *, extremal: bool = True) -> tuple[Floats, Floats]:
+    def simulated(
+        self, steps: int, seed: int, share: float = 1.0, *, extremal: bool = True
+    ) -> tuple[Floats, Floats]:
         """Return states and measurements with errors at a share of their bounds, or within it."""
         random = np.random.default_rng([seed, len(self.a)])
 
@@ -84,7 +95,9 @@ class WideSystem:
     def programs(self, measured: Floats) -> Programs:
         """Return linear programs that share no code with the observer."""
         half = np.ones(len(self.a))
-        return Programs(self.a, self.c, self.generators, half, np.full(len(self.c), self.noise), measured)
+        return Programs(
+            self.a, self.c, self.generators, half, np.full(len(self.c), self.noise), measured
+        )
 
 
 def need_inside(estimate: Estimate, state: Floats) -> None:
@@ -97,7 +110,8 @@ def geometric_mean(ratios: Floats) -> float:
     return float(np.exp(np.log(ratios).mean()))
 
 
-# The true state ---------------------------------------------------------------------------------------------------
+# The true state
+# --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -110,7 +124,9 @@ def geometric_mean(ratios: Floats) -> float:
         pytest.param(WideSystem.random(20, 1), marks=pytest.mark.thorough),
     ],
 )
-def test_true_state_with_errors_at_their_bounds_is_inside_the_window_bounds(system: WideSystem) -> None:
+def test_true_state_with_errors_at_their_bounds_is_inside_the_window_bounds(
+    system: WideSystem,
+) -> None:
     states, measured = system.simulated(14, 3)
     every = 1 if len(system.a) < 10 else 13
 
@@ -125,7 +141,9 @@ def test_true_state_with_errors_at_their_bounds_is_inside_the_window_bounds(syst
 
 
 def hard_system(seed: int) -> tuple[LinearObserver, Floats, Floats]:
-    """Return an observer of 7 to 9 states that may be singular, flat, exact, unstable or in different units."""
+    """Return an observer of 7 to 9 states that may be singular, flat, exact, unstable or in
+    different units.
+    """
     random = np.random.default_rng([571, seed])
     states = int(random.integers(7, 10))
     outputs = int(random.integers(1, 5))
@@ -153,7 +171,9 @@ def hard_system(seed: int) -> tuple[LinearObserver, Floats, Floats]:
         y[random.random(outputs) < 0.2] = np.nan
         measured.append(y)
     start = Zonotope.box(-half, half)
-    observer = LinearObserver(a, c, start, noise=noise, disturbance=Zonotope(np.zeros(states), generators))
+    observer = LinearObserver(
+        a, c, start, noise=noise, disturbance=Zonotope(np.zeros(states), generators)
+    )
     return observer, np.array(true), np.array(measured)
 
 
@@ -204,7 +224,8 @@ def test_bounds_do_not_depend_on_the_success_of_the_solver(monkeypatch: pytest.M
     assert int(observer.inconsistency.step) == -1
 
 
-# Other programs ---------------------------------------------------------------------------------------------------
+# Other programs
+# --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("system", [WideSystem.random(7, 3), WideSystem.chain(8)])
@@ -272,7 +293,8 @@ def test_runs_of_a_batch_equal_single_runs() -> None:
     assert batch.is_empty.tolist() == [False, False]
 
 
-# Contradictions ---------------------------------------------------------------------------------------------------
+# Contradictions
+# --------------------------------------------------------------------------------------------------
 
 
 def test_contradiction_that_only_a_program_shows_is_located_with_its_excess() -> None:
@@ -280,7 +302,8 @@ def test_contradiction_that_only_a_program_shows_is_located_with_its_excess() ->
     _, measured = system.simulated(10, 2, 0.5, extremal=False)
     exact = system.programs(measured[:6])
     step, output = 6, 1
-    # The farthest possible output at the step, before its own measurement, and a measurement just beyond it.
+    # The farthest possible output at the step, before its own measurement, and a measurement just
+    # beyond it.
     row = system.c[output]
     before = np.vstack([measured[:6], np.full((1, len(system.c)), np.nan)])
     before[6, :output] = measured[6, :output]
@@ -311,15 +334,23 @@ def test_contradiction_that_the_zonotope_shows_is_found_at_once() -> None:
     np.testing.assert_allclose(where.excess, 9.0 - 1.0 - 0.2)
     observer.predict()
     assert observer.estimate().is_empty
-    assert observer.estimate().to_dict() == {"step": 1, "is_empty": True, "lower": None, "upper": None}
+    assert observer.estimate().to_dict() == {
+        "step": 1,
+        "is_empty": True,
+        "lower": None,
+        "upper": None,
+    }
 
 
-# Interface --------------------------------------------------------------------------------------------------------
+# Interface
+# --------------------------------------------------------------------------------------------------
 
 
 def test_polytopes_of_many_states_are_refused() -> None:
     estimate = WideSystem.random(7, 1).observer().estimate()
-    with pytest.raises(ValueError, match=r"at most 4 states are possible: use \.lower, \.upper or \.output_hull"):
+    with pytest.raises(
+        ValueError, match=r"at most 4 states are possible: use \.lower, \.upper or \.output_hull"
+    ):
         _ = estimate.polytopes
     with pytest.raises(ValueError, match=r"not two: use \.lower, \.upper or \.output_hull"):
         _ = estimate.polygons
@@ -332,14 +363,20 @@ def test_polytopes_of_many_states_are_refused() -> None:
 @pytest.mark.thorough
 @pytest.mark.parametrize("states", range(7, 21))
 def test_true_states_of_many_systems_are_inside(states: int) -> None:
-    """About 730 checks for each number of states: both bounds of a few states at each step, and of one direction."""
+    """About 730 checks for each number of states: both bounds of a few states at each step, and of
+    one direction.
+    """
     for seed in range(6):
-        system = WideSystem.random(states, seed) if seed % 2 or states % 2 else WideSystem.chain(states)
+        system = (
+            WideSystem.random(states, seed) if seed % 2 or states % 2 else WideSystem.chain(states)
+        )
         true, measured = system.simulated(21, seed)
         observer = system.observer()
         random = np.random.default_rng(seed)
         for estimate, state in list(zip(observer.run(measured), true, strict=True))[::4]:
-            directions = np.vstack([np.eye(states)[random.choice(states, 5)], random.normal(size=(5, states))])
+            directions = np.vstack(
+                [np.eye(states)[random.choice(states, 5)], random.normal(size=(5, states))]
+            )
             lower, upper = estimate.output_hull(directions)
             assert (lower <= directions @ state).all(), (seed, estimate.step)
             assert (upper >= directions @ state).all(), (seed, estimate.step)

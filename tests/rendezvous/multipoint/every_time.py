@@ -1,4 +1,6 @@
-"""Minimum-energy visits at all increasing times of a grid: least squares in the velocities at flybys, many at once."""
+"""Minimum-energy visits at all increasing times of a grid: least squares in the velocities at
+flybys, many at once.
+"""
 
 from __future__ import annotations
 
@@ -13,21 +15,31 @@ CHUNK = 20_000
 
 
 class EveryTime:
-    """The costs of visits in the order of the targets, at all increasing times of a grid of equal steps from t = 0."""
+    """The costs of visits in the order of the targets, at all increasing times of a grid of equal
+    steps from t = 0.
+    """
 
     def __init__(self, tour: Tour, latest_s: float, size: int) -> None:
-        self.tour, self.time_s = tour, np.linspace(0.0, latest_s, size + 1)
-        self.count, self.size = len(tour.targets), size
-        motion, none = tour.motion, np.zeros(size)
+        self.tour = tour
+        self.time_s = np.linspace(0.0, latest_s, size + 1)
+        self.count = len(tour.targets)
+        self.size = size
+        motion = tour.motion
+        none = np.zeros(size)
         self.transition = motion.transition(none, self.time_s[1:])
         # The inverse of L, with the Gramian L L', whitens what is missing after a leg.
         self.whiten = np.linalg.inv(np.linalg.cholesky(motion.gramian(none, self.time_s[1:])))
-        states = [tour.target_states(np.full(size + 1, target), self.time_s) for target in range(self.count)]
+        states = [
+            tour.target_states(np.full(size + 1, target), self.time_s)
+            for target in range(self.count)
+        ]
         self.states = np.stack(states)
         self.flyby = np.array([target.meet is Meet.FLYBY for target in tour.targets])
 
     def minima(self, most: int) -> list[Floats]:
-        """Return the times of the lowest costs that are not above those of their neighbours on the grid."""
+        """Return the times of the lowest costs that are not above those of their neighbours on the
+        grid.
+        """
         places = self._places()
         around = np.full((self.size + 2,) * self.count, np.inf)
         for begin in range(0, len(places), CHUNK):
@@ -54,15 +66,20 @@ class EveryTime:
 
     def _costs(self, places: Integers) -> Floats:
         """Return the costs, shape (k,), of visits at the times numbered `places`, shape (k, n)."""
-        rows, columns = 6 * self.count, 3 * int(self.flyby.sum())
-        missing, slopes = np.zeros((len(places), rows)), np.zeros((len(places), rows, columns))
+        rows = 6 * self.count
+        columns = 3 * int(self.flyby.sum())
+        missing = np.zeros((len(places), rows))
+        slopes = np.zeros((len(places), rows, columns))
         begin = np.broadcast_to(self.tour.start_state, (len(places), 6))
-        before, free_before, column = np.zeros(len(places), dtype=int), None, 0
+        before = np.zeros(len(places), dtype=int)
+        free_before = None
+        column = 0
         for visit in range(self.count):
             leg = places[:, visit] - before - 1
             part = slice(6 * visit, 6 * visit + 6)
             end = self.states[visit, places[:, visit]].copy()
-            whiten, transition = self.whiten[leg], self.transition[leg]
+            whiten = self.whiten[leg]
+            transition = self.transition[leg]
             if free_before is not None:
                 slopes[:, part, free_before] = -(whiten @ transition)[:, :, 3:]
             free_before = None
@@ -73,7 +90,8 @@ class EveryTime:
                 column += 3
             error = end - (transition @ begin[:, :, None])[:, :, 0]
             missing[:, part] = (whiten @ error[:, :, None])[:, :, 0]
-            begin, before = end, places[:, visit]
+            begin = end
+            before = places[:, visit]
         across = np.swapaxes(slopes, 1, 2)
         velocities = np.linalg.solve(across @ slopes, -(across @ missing[:, :, None]))
         left = missing + (slopes @ velocities)[:, :, 0]

@@ -1,4 +1,6 @@
-"""The acceptance of the theory: two and three drifting targets, splines, and their misprinted conditions."""
+"""The acceptance of the theory: two and three drifting targets, splines, and their misprinted
+conditions.
+"""
 
 from __future__ import annotations
 
@@ -72,7 +74,8 @@ def test_flybys_at_given_times(tours: Make) -> None:
 
 
 def test_rendezvous_at_given_times(tours: Make) -> None:
-    times, count = np.array(THREE["ts"]), 3
+    times = np.array(THREE["ts"])
+    count = 3
     last = tours(count, [Meet.FLYBY] * (count - 1) + [Meet.RENDEZVOUS]).fly(range(count), times)
     assert last.cost == pytest.approx(THREE["I_rdv_last"], rel=NINE_DIGITS)
     every = tours(count, [Meet.RENDEZVOUS] * count).fly(range(count), times)
@@ -80,14 +83,17 @@ def test_rendezvous_at_given_times(tours: Make) -> None:
 
 
 def test_best_times(tours: Make) -> None:
-    times, count = np.array(THREE["ts"]), 3
+    times = np.array(THREE["ts"])
+    count = 3
     limits = TimeLimits(latest_s=float(times[-1]))
     found = best_times(tours(count), range(count), limits, [times])
     np.testing.assert_allclose(found.time_s, np.array(THREE["t_opt"]), rtol=NINE_DIGITS)
     assert found.path.cost == pytest.approx(THREE["I_opt"], rel=NINE_DIGITS)
     last = tours(count, [Meet.FLYBY] * (count - 1) + [Meet.RENDEZVOUS])
     cost = best_times(last, range(count), limits, [times]).path.cost
-    assert cost == pytest.approx(THREE["I_rdv_last_opt"], rel=5e-9)  # the theory prints 9 or 10 digits
+    assert cost == pytest.approx(
+        THREE["I_rdv_last_opt"], rel=5e-9
+    )  # the theory prints 9 or 10 digits
 
 
 def test_a_priced_last_time(tours: Make) -> None:
@@ -98,17 +104,22 @@ def test_a_priced_last_time(tours: Make) -> None:
 
 
 def test_the_order_that_is_worst_at_the_given_times_is_best_at_its_own(tours: Make) -> None:
-    tour, times = tours(3), np.array(THREE["ts"])
+    tour = tours(3)
+    times = np.array(THREE["ts"])
     at_slots = {order: tour.fly(order, times).cost for order in itertools.permutations(range(3))}
     assert max(at_slots, key=lambda order: at_slots[order]) == (2, 1, 0)
     assert at_slots[2, 1, 0] == pytest.approx(0.05442751, rel=1e-7)
-    assert best_order_of_slots(tour, times).order == min(at_slots, key=lambda order: at_slots[order])
+    assert best_order_of_slots(tour, times).order == min(
+        at_slots, key=lambda order: at_slots[order]
+    )
     found = best_order(tour, TimeLimits(latest_s=4000.0))
     assert found.order == (2, 1, 0)
     assert found.objective == pytest.approx(0.008734876263, rel=NINE_DIGITS)
 
 
-def double_integrator(positions: list[float], times: list[float]) -> tuple[TimeVaryingMotion, Nodes]:
+def double_integrator(
+    positions: list[float], times: list[float]
+) -> tuple[TimeVaryingMotion, Nodes]:
     matrix = np.zeros((6, 6))
     matrix[:3, 3:] = np.eye(3)
     motion = TimeVaryingMotion(lambda at: np.broadcast_to(matrix, (len(at), 6, 6)))
@@ -123,8 +134,12 @@ def test_free_space_is_a_cubic_spline() -> None:
     motion, nodes = double_integrator([1.0, -1.0, 2.0], [1.0, 2.0, 3.0])
     path = solve_segments(motion, 0.0, np.zeros(6), nodes)
     assert path.cost == pytest.approx(534.0 / 13.0, rel=1e-12)
-    np.testing.assert_allclose(path.jumps[:, 0], np.array([450.0, -366.0, 126.0]) / 13.0, rtol=1e-11)
-    np.testing.assert_allclose(path.arrival_states[:, 3], np.array([-9.0, -3.0, 60.0]) / 13.0, rtol=1e-11)
+    np.testing.assert_allclose(
+        path.jumps[:, 0], np.array([450.0, -366.0, 126.0]) / 13.0, rtol=1e-11
+    )
+    np.testing.assert_allclose(
+        path.arrival_states[:, 3], np.array([-9.0, -3.0, 60.0]) / 13.0, rtol=1e-11
+    )
     assert solve_dense(motion, 0.0, np.zeros(6), nodes)[0] == pytest.approx(534.0 / 13.0, rel=1e-11)
 
 

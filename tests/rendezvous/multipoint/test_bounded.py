@@ -46,7 +46,9 @@ def between(path: LinearPath, share: float) -> float:
 
 
 def flown(path: BoundedPath, start_state: Floats, breaks_s: Floats) -> Floats:
-    """State and cost, shape (7,), at the end of an integration (DOP853) under the control of a path."""
+    """State and cost, shape (7,), at the end of an integration (DOP853) under the control of a
+    path.
+    """
     inside = np.nextafter(breaks_s[-1], breaks_s[0])
 
     def rates(time_s: float, state: Floats) -> Floats:
@@ -64,7 +66,9 @@ def flown(path: BoundedPath, start_state: Floats, breaks_s: Floats) -> Floats:
 
 @pytest.mark.parametrize("meets", [(), RENDEZVOUS])
 @pytest.mark.parametrize("share", [0.9, 0.4, 0.02])
-def test_bounded_path_passes_its_nodes_and_keeps_the_bound(tours: Make, meets: tuple[Meet, ...], share: float) -> None:
+def test_bounded_path_passes_its_nodes_and_keeps_the_bound(
+    tours: Make, meets: tuple[Meet, ...], share: float
+) -> None:
     tour = tours(3, meets, [0.0, 300.0, 0.0] if meets else ())
     without = linear_path(tour, TIMES_S)
     bound = between(without, share)
@@ -81,10 +85,14 @@ def test_bounded_path_passes_its_nodes_and_keeps_the_bound(tours: Make, meets: t
         cost += float(state[6])
     assert cost == pytest.approx(path.cost, rel=1e-8)
     np.testing.assert_allclose(path.arrival_states[:, :3], path.nodes.arrive[:, :3], atol=1e-9)
-    np.testing.assert_allclose(path.state(path.nodes.arrive_s)[:, :3], path.nodes.arrive[:, :3], atol=1e-6)
+    np.testing.assert_allclose(
+        path.state(path.nodes.arrive_s)[:, :3], path.nodes.arrive[:, :3], atol=1e-6
+    )
     # The velocity does not jump at a flyby, and the costate of the velocity neither.
     flybys = ~path.nodes.rendezvous
-    np.testing.assert_allclose(path.jumps[flybys, 3:], 0.0, atol=1e-9 * np.abs(path.costate_before[:, 3:]).max())
+    np.testing.assert_allclose(
+        path.jumps[flybys, 3:], 0.0, atol=1e-9 * np.abs(path.costate_before[:, 3:]).max()
+    )
     if meets:
         np.testing.assert_allclose(path.arrival_states[1], path.nodes.arrive[1], atol=1e-9)
         assert (path.control(np.array([2700.0])) == 0.0).all()
@@ -120,7 +128,8 @@ def test_bound_below_the_smallest_one_is_refused(tours: Make) -> None:
 
 
 def test_best_times_with_a_bound_are_stationary(tours: Make) -> None:
-    tour, limits = tours(3), TimeLimits(latest_s=4200.0)
+    tour = tours(3)
+    limits = TimeLimits(latest_s=4200.0)
     timed = best_times(tour, (0, 1, 2), limits, [TIMES_S])
     assert isinstance(timed.path, LinearPath)
     bound = between(timed.path, 0.5)

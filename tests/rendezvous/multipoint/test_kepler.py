@@ -1,4 +1,6 @@
-"""Visits under a point's gravity: the acceptance, and what the nonlinear problem itself says of the answers."""
+"""Visits under a point's gravity: the acceptance, and what the nonlinear problem itself says of the
+answers.
+"""
 
 from __future__ import annotations
 
@@ -28,10 +30,14 @@ def circular(radius: float, phase: float, inclination: float) -> Floats:
     """Inertial state on a circle, mu = 1."""
     speed, (c, s) = radius**-0.5, (np.cos(phase), np.sin(phase))
     tilt = np.array([1.0, np.cos(inclination), np.sin(inclination)])
-    return np.concatenate([radius * np.array([c, s, s]) * tilt, speed * np.array([-s, c, c]) * tilt])
+    return np.concatenate(
+        [radius * np.array([c, s, s]) * tilt, speed * np.array([-s, c, c]) * tilt]
+    )
 
 
-def tour(meets: Sequence[Meet] = (Meet.FLYBY, Meet.FLYBY), dwell: float = 0.0, scale: float = 1.0) -> KeplerTour:
+def tour(
+    meets: Sequence[Meet] = (Meet.FLYBY, Meet.FLYBY), dwell: float = 0.0, scale: float = 1.0
+) -> KeplerTour:
     """The theory's case; `scale` moves the targets farther from the chaser's orbit."""
     states = np.array(
         [
@@ -40,13 +46,16 @@ def tour(meets: Sequence[Meet] = (Meet.FLYBY, Meet.FLYBY), dwell: float = 0.0, s
         ]
     )
     described = tuple(
-        Target(name, meet, dwell if meet is Meet.RENDEZVOUS else 0.0) for name, meet in zip("ab", meets, strict=True)
+        Target(name, meet, dwell if meet is Meet.RENDEZVOUS else 0.0)
+        for name, meet in zip("ab", meets, strict=True)
     )
     return KeplerTour(described, states, np.zeros(2), 1.0, START)
 
 
 def rates(_time: float, values: Floats) -> Floats:
-    """Derivatives of position, velocity and their costates with the control of the maximum principle."""
+    """Derivatives of position, velocity and their costates with the control of the maximum
+    principle.
+    """
     r, velocity, by_position, by_velocity = np.split(values, 4)
     cube = np.linalg.norm(r) ** 3
     pull = by_velocity / cube - 3.0 * (r @ by_velocity) * r / (cube * (r @ r))
@@ -54,15 +63,22 @@ def rates(_time: float, values: Floats) -> Floats:
 
 
 def missed(path: Path) -> float:
-    """How far a nonlinear flight with the path's costates, DOP853, ends from the nodes and from their costates."""
+    """How far a nonlinear flight with the path's costates, DOP853, ends from the nodes and from
+    their costates.
+    """
     worst = 0.0
     for index, (start, end) in enumerate(zip(path.starts_s, path.nodes.arrive_s, strict=True)):
         costate = path.costate_start if index == 0 else path.costate_after[index - 1]
         begin = np.concatenate([path.start_states[index], costate])
-        found = solve_ivp(rates, (start, end), begin, method="DOP853", rtol=1e-12, atol=1e-15).y[:, -1]
+        found = solve_ivp(rates, (start, end), begin, method="DOP853", rtol=1e-12, atol=1e-15).y[
+            :, -1
+        ]
         wanted = 6 if path.nodes.rendezvous[index] else 3
         worst = max(worst, float(np.abs(found[:6] - path.nodes.arrive[index])[:wanted].max()))
-        worst = max(worst, float(np.abs(found[6:] - path.costate_before[index]).max() / np.abs(costate).max()))
+        worst = max(
+            worst,
+            float(np.abs(found[6:] - path.costate_before[index]).max() / np.abs(costate).max()),
+        )
     return worst
 
 
@@ -80,7 +96,9 @@ def test_rendezvous_and_stays(meets: tuple[Meet, Meet]) -> None:
     inside = np.array([0.5, 1.9, 2.2, 3.0])
     states = path.state(inside)
     if meets[0] is Meet.RENDEZVOUS:
-        np.testing.assert_allclose(states[2], case.target_states(np.array([0]), np.array([2.2]))[0], atol=1e-9)
+        np.testing.assert_allclose(
+            states[2], case.target_states(np.array([0]), np.array([2.2]))[0], atol=1e-9
+        )
         assert not path.control(inside)[2].any()
 
 
@@ -90,10 +108,16 @@ def test_time_gradients_against_finite_differences() -> None:
     for index in range(2):
         step = np.zeros(2)
         step[index] = 1e-2
-        costs = {factor: case.fly((0, 1), np.array([2.0, 4.0]) + factor * step).cost for factor in (-2, -1, 1, 2)}
-        near, far = (costs[1] - costs[-1]) / 2e-2, (costs[2] - costs[-2]) / 4e-2
+        costs = {
+            factor: case.fly((0, 1), np.array([2.0, 4.0]) + factor * step).cost
+            for factor in (-2, -1, 1, 2)
+        }
+        near = (costs[1] - costs[-1]) / 2e-2
+        far = (costs[2] - costs[-2]) / 4e-2
         size = float(np.abs(path.time_gradient).max())
-        assert (4.0 * near - far) / 3.0 == pytest.approx(path.time_gradient[index], rel=1e-6, abs=1e-6 * size)
+        assert (4.0 * near - far) / 3.0 == pytest.approx(
+            path.time_gradient[index], rel=1e-6, abs=1e-6 * size
+        )
 
 
 @pytest.mark.parametrize("scale", [8.0, pytest.param(20.0, marks=pytest.mark.thorough)])
@@ -103,7 +127,9 @@ def test_targets_far_from_the_coasting_orbit(scale: float) -> None:
 
 
 ALLOWED = 1e-10
-"""Newton's method stops at residuals of 1e-11 of the distance; costates at the nodes are relative to the largest."""
+"""Newton's method stops at residuals of 1e-11 of the distance; costates at the nodes are relative
+to the largest.
+"""
 
 
 def test_flybys_shortly_one_after_another_are_met() -> None:
@@ -125,11 +151,18 @@ def random_visits(seed: int) -> tuple[KeplerTour, Floats]:
     size = min(0.5 * 10.0 ** random.uniform(-1.0, 2.7) * gap**2, 0.4)
     states = np.array(
         [
-            circular(1.0 + size * random.uniform(-1.0, 1.0), size * random.normal(), size * random.uniform(-1.0, 1.0))
+            circular(
+                1.0 + size * random.uniform(-1.0, 1.0),
+                size * random.normal(),
+                size * random.uniform(-1.0, 1.0),
+            )
             for _ in range(count)
         ]
     )
-    targets = tuple(Target(str(at), Meet.FLYBY if random.random() < 0.6 else Meet.RENDEZVOUS) for at in range(count))
+    targets = tuple(
+        Target(str(at), Meet.FLYBY if random.random() < 0.6 else Meet.RENDEZVOUS)
+        for at in range(count)
+    )
     times = random.uniform(0.02, 0.3) + gap * np.arange(count)
     return KeplerTour(targets, states, np.zeros(count), 1.0, START), times
 
@@ -148,7 +181,14 @@ def test_steps_follow_a_control_that_grows_from_zero() -> None:
 
     assert propagate(z, 0.05)
 
-    found = solve_ivp(rates, (0.0, 0.05), np.concatenate([START, costate]), method="DOP853", rtol=1e-13, atol=1e-13)
+    found = solve_ivp(
+        rates,
+        (0.0, 0.05),
+        np.concatenate([START, costate]),
+        method="DOP853",
+        rtol=1e-13,
+        atol=1e-13,
+    )
     size = np.repeat([1.0, 10.0, 2000.0, 100.0], 3)
     # Fifty steps of relative error 1e-13 at most.
     np.testing.assert_allclose(z[:12, 0] / size, found.y[:, -1] / size, rtol=0.0, atol=1e-11)
@@ -165,14 +205,18 @@ def test_a_flyer_goes_on_from_the_last_path() -> None:
 
 
 def relative_to_a_circle(x: float, y: float, x_rate: float, y_rate: float) -> Floats:
-    """Inertial state of a craft near one at (1, 0, 0) on a circular orbit, from its state in Hill's axes."""
+    """Inertial state of a craft near one at (1, 0, 0) on a circular orbit, from its state in Hill's
+    axes.
+    """
     return np.array([1.0 + x, y, 0.0, x_rate - y, 1.0 + x + y_rate, 0.0])
 
 
 @pytest.mark.parametrize(
     "start",
     [
-        relative_to_a_circle(0.2, 0.2, 0.1, 0.1),  # a published rendezvous: a hyperbola, refused as no ellipse
+        relative_to_a_circle(
+            0.2, 0.2, 0.1, 0.1
+        ),  # a published rendezvous: a hyperbola, refused as no ellipse
         np.array([1.0, 0.0, 0.0, 0.0, np.sqrt(2.0), 0.0]),  # a parabola
         np.array([1.2, 0.1, 0.1, -2.0, 0.5, 0.0]),  # a hyperbola, inward
         np.array([1.1, 0.0, 0.0, -0.1, 0.0, 0.0]),  # straight down, to the centre after the flight
@@ -219,7 +263,9 @@ def test_what_cannot_be_reached_is_told() -> None:
 
 @given(st.floats(0.0, 0.9), st.floats(-30.0, 30.0), st.integers(0, 1000))
 @settings(deadline=None)
-def test_coasting_keeps_energy_and_momentum_and_comes_back(eccentricity: float, duration: float, seed: int) -> None:
+def test_coasting_keeps_energy_and_momentum_and_comes_back(
+    eccentricity: float, duration: float, seed: int
+) -> None:
     random = np.random.default_rng(seed)
     axes = np.linalg.qr(random.normal(size=(3, 3)))[0]
     speed = np.sqrt(1.0 + eccentricity)
@@ -228,5 +274,7 @@ def test_coasting_keeps_energy_and_momentum_and_comes_back(eccentricity: float, 
     momentum = np.cross(state[:3], state[3:])
     np.testing.assert_allclose(np.cross(moved[:3], moved[3:]), momentum, atol=1e-11)
     energy = 0.5 * state[3:] @ state[3:] - 1.0
-    assert 0.5 * moved[3:] @ moved[3:] - 1.0 / np.linalg.norm(moved[:3]) == pytest.approx(energy, rel=1e-10)
+    assert 0.5 * moved[3:] @ moved[3:] - 1.0 / np.linalg.norm(moved[:3]) == pytest.approx(
+        energy, rel=1e-10
+    )
     np.testing.assert_allclose(coast(moved, -duration, 1.0), state, atol=1e-8)

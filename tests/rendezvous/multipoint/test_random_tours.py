@@ -18,7 +18,12 @@ from infoset.rendezvous.multipoint import (
     best_order,
     best_times,
 )
-from infoset.rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
+from infoset.rendezvous.relative_motion import (
+    ClohessyWiltshire,
+    EllipticOrbit,
+    LinearMotion,
+    TschaunerHempel,
+)
 
 pytestmark = pytest.mark.thorough
 
@@ -32,27 +37,37 @@ RESONANT = (4.493409457909, 11.06652863, 12.2010, 2.0 * np.pi, 4.0 * np.pi, np.p
 def some_tour(
     random: np.random.Generator, count: int, longest_rad: float, *, elliptic: float = 0.2
 ) -> tuple[Tour, Floats]:
-    """A tour and times: gaps from tiny to many revolutions, resonant ones, stays, targets and chaser that coincide."""
+    """A tour and times: gaps from tiny to many revolutions, resonant ones, stays, targets and
+    chaser that coincide.
+    """
     rate = 10.0 ** random.uniform(-5.0, -2.0)
     motion: LinearMotion = ClohessyWiltshire(rate)
     if random.random() < elliptic:
-        motion = TschaunerHempel(EllipticOrbit(rate, float(random.choice([0.0, 0.1, 0.5])), random.uniform(0.0, 6.0)))
+        motion = TschaunerHempel(
+            EllipticOrbit(rate, float(random.choice([0.0, 0.1, 0.5])), random.uniform(0.0, 6.0))
+        )
     kind = str(random.choice(["even", "wide", "resonant", "tiny"]))
     gaps = random.uniform(0.2, 2.5, size=count)
     if kind == "wide":
         gaps = 10.0 ** random.uniform(-2.0, np.log10(longest_rad), size=count)
     elif kind == "resonant":
-        gaps = random.choice(RESONANT, size=count) * (1.0 + random.choice([0.0, 1e-9, 1e-3], size=count))
+        gaps = random.choice(RESONANT, size=count) * (
+            1.0 + random.choice([0.0, 1e-9, 1e-3], size=count)
+        )
     elif kind == "tiny":
         gaps[random.integers(count)] = 10.0 ** random.uniform(-5.0, -3.0)
     gaps = np.minimum(gaps, longest_rad / count) / rate
     share = random.choice([0.0, 0.4, 1.0])
     meets = [Meet.RENDEZVOUS if random.random() < share else Meet.FLYBY for _ in range(count)]
     stays = np.array(
-        [random.choice([0.0, random.uniform(0.0, 1.0)]) / rate * (meet is Meet.RENDEZVOUS) for meet in meets]
+        [
+            random.choice([0.0, random.uniform(0.0, 1.0)]) / rate * (meet is Meet.RENDEZVOUS)
+            for meet in meets
+        ]
     )
     targets = tuple(
-        Target(str(at), meet, float(stay)) for at, (meet, stay) in enumerate(zip(meets, stays, strict=True))
+        Target(str(at), meet, float(stay))
+        for at, (meet, stay) in enumerate(zip(meets, stays, strict=True))
     )
     scale = np.array([1.0 / rate] * 3 + [1.0] * 3) * 10.0 ** random.uniform(-2.0, 1.0)
     states = random.normal(size=(count, 6)) * scale
@@ -77,7 +92,9 @@ def times_agree(seed: int) -> None:
         price = tour.fly(range(count), times).cost / room * 10.0 ** random.uniform(-2.0, 1.0)
     limits = TimeLimits(latest, minimum, price)
     found = best_times(tour, range(count), limits)
-    gaps = np.diff(np.concatenate([[tour.start_s], found.time_s])) - np.concatenate([[0.0], stays[:-1]])
+    gaps = np.diff(np.concatenate([[tour.start_s], found.time_s])) - np.concatenate(
+        [[0.0], stays[:-1]]
+    )
     floor = max(minimum, 1e-6 * room)
     assert (gaps >= floor * (1.0 - 1e-9)).all()
     assert found.time_s[-1] <= latest + 1e-9 * room
@@ -89,7 +106,8 @@ def times_agree(seed: int) -> None:
         at = tour.start_s + np.cumsum(each) + np.concatenate([[0.0], np.cumsum(stays[:-1])])
         return tour.fly(range(count), at).cost + price * float(at[-1] - tour.start_s)
 
-    # No sample of the simplex of gaps is better, nor a descent from the best of them without derivatives.
+    # No sample of the simplex of gaps is better, nor a descent from the best of them without
+    # derivatives.
     tried = random.dirichlet(np.ones(count + 1), size=60)[:, :count]
     values = [objective(each) for each in tried]
     begin = tried[int(np.argmin(values))]
@@ -99,7 +117,9 @@ def times_agree(seed: int) -> None:
             return 1e3 * (1.0 + float(np.abs(shares).sum())) * min(values)
         return objective(shares)
 
-    polished = minimize(walled, begin, method="Nelder-Mead", options={"xatol": 1e-8, "fatol": 0.0, "maxfev": 150})
+    polished = minimize(
+        walled, begin, method="Nelder-Mead", options={"xatol": 1e-8, "fatol": 0.0, "maxfev": 150}
+    )
     best = min(float(polished.fun), *values)
     # A chaser that starts on its target pays nothing, up to the rounding of states.
     states = found.path.nodes.arrive
@@ -144,7 +164,9 @@ def test_an_order_is_not_dropped_for_a_local_minimum_of_its_beginning(seed: int)
 
 
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
-def test_many_random_tours(check: Check, check_seeds: Callable[[Check, Iterable[int]], None]) -> None:
+def test_many_random_tours(
+    check: Check, check_seeds: Callable[[Check, Iterable[int]], None]
+) -> None:
     check_seeds(check, MANY)
 
 

@@ -18,19 +18,27 @@ from infoset.rendezvous.multipoint import (
     search_grid,
     time_grid,
 )
-from infoset.rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
+from infoset.rendezvous.relative_motion import (
+    ClohessyWiltshire,
+    EllipticOrbit,
+    LinearMotion,
+    TschaunerHempel,
+)
 from tests.rendezvous.multipoint.every_time import EveryTime
 
 FLYBY, RENDEZVOUS = Meet
 
 
-def random_tour(seed: int, meets: list[Meet], motion: LinearMotion | None = None, dwell_s: float = 0.0) -> Tour:
+def random_tour(
+    seed: int, meets: list[Meet], motion: LinearMotion | None = None, dwell_s: float = 0.0
+) -> Tour:
     """Targets of random states, of a motion of one radian a second."""
     random = np.random.default_rng(seed)
     states = random.normal(size=(len(meets), 6)) * np.array([0.3, 1.0, 0.3, 0.3, 0.3, 0.3])
     states[:, 4] = -2.0 * states[:, 0]
     targets = tuple(
-        Target(str(number), meet, dwell_s if meet is RENDEZVOUS else 0.0) for number, meet in enumerate(meets)
+        Target(str(number), meet, dwell_s if meet is RENDEZVOUS else 0.0)
+        for number, meet in enumerate(meets)
     )
     start = np.append(0.2 * random.normal(size=2), np.zeros(4))
     return Tour(motion or ClohessyWiltshire(1.0), targets, states, start)
@@ -49,10 +57,14 @@ TWO_FLYBYS = Tour(
 )
 LATEST_S, GAP_S = 151431.23337079378, 1514.3
 LIMITS = TimeLimits(LATEST_S, GAP_S)
-"""Two flybys within 4.8 revolutions. Descents from 48 starting points ended at 6.29e-8 and 7.73e-8 m^2/s^3."""
+"""Two flybys within 4.8 revolutions. Descents from 48 starting points ended at 6.29e-8 and 7.73e-8
+m^2/s^3.
+"""
 
 
-@pytest.mark.parametrize("guess", [None, (60000.0, 120000.0), (105000.0, 151000.0), (GAP_S, 2.0 * GAP_S)])
+@pytest.mark.parametrize(
+    "guess", [None, (60000.0, 120000.0), (105000.0, 151000.0), (GAP_S, 2.0 * GAP_S)]
+)
 @pytest.mark.parametrize(("order", "lowest"), [((0, 1), 4.634e-8), ((1, 0), 4.949e-8)])
 def test_best_times_do_not_depend_on_the_guess(
     order: tuple[int, int], lowest: float, guess: tuple[float, float] | None
@@ -95,12 +107,16 @@ def test_candidates_cost_what_their_paths_cost(
     assert found.candidates
     for candidate in found.candidates:
         path = tour.fly(candidate.order, candidate.time_s)
-        # The quadratics and the paths' band matrix are different orders of the same operations, with condition
-        # numbers below 1e6 for gaps of a tenth of a radian.
-        assert candidate.objective == pytest.approx(path.cost + 1e-3 * candidate.time_s[-1], rel=1e-9)
+        # The quadratics and the paths' band matrix are different orders of the same operations,
+        # with condition numbers below 1e6 for gaps of a tenth of a radian.
+        assert candidate.objective == pytest.approx(
+            path.cost + 1e-3 * candidate.time_s[-1], rel=1e-9
+        )
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.thorough) for seed in (1, 2))])
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(seed, marks=pytest.mark.thorough) for seed in (1, 2))]
+)
 @pytest.mark.parametrize("meets", MIXED[:2])
 @pytest.mark.parametrize("dwell_s", [0.0, 0.3])
 def test_lowest_candidate_is_the_minimum_on_the_grid_of_three_visits(
@@ -109,7 +125,9 @@ def test_lowest_candidate_is_the_minimum_on_the_grid_of_three_visits(
     # Few times, so that a flight for each combination takes less than a second.
     monkeypatch.setattr(time_grid, "MIN_TIMES", 7)
     monkeypatch.setattr(time_grid, "TIMES_PER_RADIAN", 0.1)
-    tour, latest_s, gap_s = random_tour(seed, meets, dwell_s=dwell_s), 9.0, 0.2
+    tour = random_tour(seed, meets, dwell_s=dwell_s)
+    latest_s = 9.0
+    gap_s = 0.2
     stays = 2.0 * tour.dwell_s[0]
     steps = np.linspace(0.0, latest_s - 3.0 * gap_s - stays, 7)
 
@@ -130,7 +148,8 @@ def lowest_of_every_time(tour: Tour, latest_s: float) -> float:
     count = len(tour.targets)
     a_revolution = 40 if count == 2 else 20
     every = EveryTime(tour, latest_s, int(a_revolution * latest_s / (2.0 * np.pi)) + 1)
-    fly, limits = tour.flyer(range(count)), TimeLimits(latest_s)
+    fly = tour.flyer(range(count))
+    limits = TimeLimits(latest_s)
     ends = [
         optimise_times(fly, 0.0, np.zeros(count), limits, [times], effort=Effort.VALLEY).objective
         for times in every.minima(200)
@@ -146,8 +165,12 @@ LONG = [(count, float(latest)) for count in (2, 3) for latest in np.geomspace(6.
     ("seed", "count", "latest_s"),
     [
         *(pytest.param(seed, *case) for seed, case in enumerate(QUICK)),
-        *(pytest.param(100 + seed, *case, marks=pytest.mark.thorough) for seed, case in enumerate(LONG)),
-        # One quadratic for two times, and one time of the visit before a last rendezvous, missed their minima.
+        *(
+            pytest.param(100 + seed, *case, marks=pytest.mark.thorough)
+            for seed, case in enumerate(LONG)
+        ),
+        # One quadratic for two times, and one time of the visit before a last rendezvous, missed
+        # their minima.
         *(pytest.param(200 + seed, 3, 58.0, marks=pytest.mark.thorough) for seed in range(6)),
     ],
 )
@@ -159,21 +182,30 @@ def test_best_times_are_those_of_every_time(seed: int, count: int, latest_s: flo
     assert found.objective <= 1.001 * lowest_of_every_time(tour, latest_s)
 
 
-ORDERS = [(0, 3, 10.0), *(pytest.param(seed, 4, 25.0, marks=pytest.mark.thorough) for seed in range(1, 5))]
+ORDERS = [
+    (0, 3, 10.0),
+    *(pytest.param(seed, 4, 25.0, marks=pytest.mark.thorough) for seed in range(1, 5)),
+]
 
 
 @pytest.mark.parametrize(("seed", "count", "latest_s"), ORDERS)
-def test_best_order_is_the_best_of_all_orders_at_their_best_times(seed: int, count: int, latest_s: float) -> None:
+def test_best_order_is_the_best_of_all_orders_at_their_best_times(
+    seed: int, count: int, latest_s: float
+) -> None:
     random = np.random.default_rng(seed)
     meets = [RENDEZVOUS if random.random() < 0.3 else FLYBY for _ in range(count)]
-    tour, limits = random_tour(seed, meets), TimeLimits(latest_s)
+    tour = random_tour(seed, meets)
+    limits = TimeLimits(latest_s)
     found = best_order(tour, limits)
-    each = [best_times(tour, order, limits).objective for order in itertools.permutations(range(count))]
+    each = [
+        best_times(tour, order, limits).objective for order in itertools.permutations(range(count))
+    ]
     assert found.objective <= min(each) * 1.001
 
 
 def test_latest_time_follows_from_a_price() -> None:
-    tour, price = random_tour(5, [FLYBY, FLYBY]), 1e-3
+    tour = random_tour(5, [FLYBY, FLYBY])
+    price = 1e-3
     long = best_times(tour, (0, 1), TimeLimits(60.0, price_per_s=price))
     found = best_times(tour, (0, 1), TimeLimits(price_per_s=price), [np.array([3.0, 6.0])])
     # Later than the guess, and before eight times the guess.

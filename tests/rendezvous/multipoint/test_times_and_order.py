@@ -21,25 +21,33 @@ from tests.rendezvous.multipoint.conftest import Make
 
 def by_brute_force(tour: Tour, limits: TimeLimits) -> float:
     count = len(tour.targets)
-    return min(best_times(tour, order, limits).objective for order in itertools.permutations(range(count)))
+    return min(
+        best_times(tour, order, limits).objective for order in itertools.permutations(range(count))
+    )
 
 
 def random_tour(seed: int, count: int, share: float) -> Tour:
-    random, motion = np.random.default_rng(seed), ClohessyWiltshire(1.1e-3)
+    random = np.random.default_rng(seed)
+    motion = ClohessyWiltshire(1.1e-3)
     targets = tuple(
-        Target(str(index), Meet.RENDEZVOUS if random.random() < share else Meet.FLYBY) for index in range(count)
+        Target(str(index), Meet.RENDEZVOUS if random.random() < share else Meet.FLYBY)
+        for index in range(count)
     )
     states = random.normal(size=(count, 6)) * np.array([300.0, 3000.0, 150.0, 0.1, 0.3, 0.1])
     states[:, 4] = -2.0 * 1.1e-3 * states[:, 0]
     return Tour(motion, targets, states, np.zeros(6))
 
 
-LARGE = [pytest.param(*case, marks=pytest.mark.thorough) for case in ((0, 4), (1, 4), (2, 5), (3, 5), (4, 6))]
+LARGE = [
+    pytest.param(*case, marks=pytest.mark.thorough)
+    for case in ((0, 4), (1, 4), (2, 5), (3, 5), (4, 6))
+]
 
 
 @pytest.mark.parametrize(("seed", "count"), [(0, 3), (1, 3), (2, 3), *LARGE])
 def test_branch_and_bound_finds_what_brute_force_finds(seed: int, count: int) -> None:
-    tour, limits = random_tour(seed, count, 0.3), TimeLimits(latest_s=1500.0 * count)
+    tour = random_tour(seed, count, 0.3)
+    limits = TimeLimits(latest_s=1500.0 * count)
     found = best_order(tour, limits)
     assert found.objective <= by_brute_force(tour, limits) * (1.0 + 1e-7)
     assert sorted(found.order) == [*range(count)]
@@ -48,7 +56,8 @@ def test_branch_and_bound_finds_what_brute_force_finds(seed: int, count: int) ->
 @pytest.mark.parametrize("count", [2, 5])
 @pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
 def test_orders_of_slots_against_brute_force(count: int, share: float) -> None:
-    tour, slots = random_tour(10 + count, count, share), 1200.0 * np.arange(1.0, count + 1.0)
+    tour = random_tour(10 + count, count, share)
+    slots = 1200.0 * np.arange(1.0, count + 1.0)
     found = best_order_of_slots(tour, slots)
     costs = {order: tour.fly(order, slots).cost for order in itertools.permutations(range(count))}
     assert found.objective == pytest.approx(min(costs.values()), rel=1e-12)
@@ -71,7 +80,9 @@ def with_a_stay(meet_all: Meet) -> Tour:
     stays = [0.0, 0.0, 2000.0, 0.0, 0.0]
     targets = tuple(
         Target(name, meet, stay)
-        for name, meet, stay in zip(["alpha", "charlie", "bravo", "delta", "echo"], meets, stays, strict=True)
+        for name, meet, stay in zip(
+            ["alpha", "charlie", "bravo", "delta", "echo"], meets, stays, strict=True
+        )
     )
     return Tour(motion, targets, states, np.array([0.0, -400.0, 0.0, 0.0, 0.0, 0.0]))
 
@@ -79,7 +90,8 @@ def with_a_stay(meet_all: Meet) -> Tour:
 @pytest.mark.parametrize("meet", list(Meet))
 def test_orders_that_do_not_fit_the_slots_are_left_out(meet: Meet) -> None:
     # The search failed as a whole where one order did not fit.
-    tour, slots = with_a_stay(meet), np.array([1500.0, 3000.0, 4500.0, 7000.0, 10000.0])
+    tour = with_a_stay(meet)
+    slots = np.array([1500.0, 3000.0, 4500.0, 7000.0, 10000.0])
     found = best_order_of_slots(tour, slots)
     fitting = {}
     for order in itertools.permutations(range(5)):
@@ -94,25 +106,33 @@ def test_orders_that_do_not_fit_the_slots_are_left_out(meet: Meet) -> None:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_visits_that_just_fit_are_not_refused_for_rounding(seed: int) -> None:
-    random, motion = np.random.default_rng(seed), ClohessyWiltshire(1.1e-3)
-    stays, gap = random.uniform(10.0, 900.0, size=3), float(random.uniform(10.0, 900.0))
+    random = np.random.default_rng(seed)
+    motion = ClohessyWiltshire(1.1e-3)
+    stays = random.uniform(10.0, 900.0, size=3)
+    gap = float(random.uniform(10.0, 900.0))
     start_s = float(random.uniform(-1e5, 0.0))
     targets = tuple(Target(str(at), Meet.RENDEZVOUS, float(stay)) for at, stay in enumerate(stays))
     tour = Tour(motion, targets, random.normal(size=(3, 6)), random.normal(size=6), start_s)
-    order = tuple(int(each) for each in np.argsort(stays))  # the longest stay last: the only ones that fit
+    order = tuple(
+        int(each) for each in np.argsort(stays)
+    )  # the longest stay last: the only ones that fit
     times = start_s + np.cumsum(np.full(3, gap)) + np.append(0.0, np.cumsum(stays[list(order)])[:2])
     found = best_order(tour, TimeLimits(float(times[-1]), gap))
     swapped = (order[1], order[0], order[2])
-    middle = start_s + np.cumsum(np.full(3, gap)) + np.append(0.0, np.cumsum(stays[list(swapped)])[:2])
+    middle = (
+        start_s + np.cumsum(np.full(3, gap)) + np.append(0.0, np.cumsum(stays[list(swapped)])[:2])
+    )
     minimum = min(tour.fly(order, times).cost, tour.fly(swapped, middle).cost)
     assert found.objective == pytest.approx(minimum, rel=1e-7)
 
 
 def test_a_price_counts_from_the_start() -> None:
     # A start before t = 0 made the objective negative, whose logarithm was minimised.
-    motion, start_s = ClohessyWiltshire(1e-3), -5000.0
+    motion = ClohessyWiltshire(1e-3)
+    start_s = -5000.0
     state = np.array([[100.0, 0.0, 0.0, 0.0, 0.0, 0.0]])
-    tour, limits = Tour(motion, (Target("T"),), state, np.zeros(6), start_s), TimeLimits(0.0, price_per_s=1e-8)
+    tour = Tour(motion, (Target("T"),), state, np.zeros(6), start_s)
+    limits = TimeLimits(0.0, price_per_s=1e-8)
     found = best_times(tour, (0,), limits)
     times = np.linspace(start_s + 10.0, 0.0, 2000)
     values = [tour.fly((0,), [each]).cost + 1e-8 * (each - start_s) for each in times]
@@ -133,17 +153,22 @@ def test_times_are_best_where_gaps_differ_by_orders_of_magnitude() -> None:
             [-15920.0, 54100.0, 90570.0, -1.975, -4.053, 16.37],
         ]
     )
-    start, price = np.array([-73820.0, 82590.0, -16610.0, 0.8657, 1.785, 9.601]), 3.024e12
+    start = np.array([-73820.0, 82590.0, -16610.0, 0.8657, 1.785, 9.601])
+    price = 3.024e12
     tour = Tour(motion, targets, states, start)
     guess = np.array([17230.0, 31560.0, 31560.1489, 45030.0])
     found = best_times(tour, range(4), TimeLimits(price_per_s=price), [guess])
     gaps = np.diff(np.concatenate([[0.0], found.time_s])) - np.array([0.0, *stays[:3]])
-    slope = np.cumsum((found.path.time_gradient + price * np.array([0.0, 0.0, 0.0, 1.0]))[::-1])[::-1]
+    slope = np.cumsum((found.path.time_gradient + price * np.array([0.0, 0.0, 0.0, 1.0]))[::-1])[
+        ::-1
+    ]
     assert (gaps > 0.05).all()
     assert (np.abs(slope * gaps) <= 1e-4 * found.objective).all()
 
 
-def test_times_that_are_no_minimum_are_no_answer(tours: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_times_that_are_no_minimum_are_no_answer(
+    tours: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("infoset.rendezvous.multipoint.times._descend", lambda _, begin, *__: begin)
     monkeypatch.setattr("infoset.rendezvous.multipoint.times._polish", lambda _, best, *__: best)
     with pytest.raises(NotSettledError, match="are no minimum"):

@@ -40,7 +40,8 @@ def total_cost(x_z_m: Floats, bound: float) -> float:
     meeting = np.array([x_z_m[0], 0.0, x_z_m[1], 0.0, 0.0, 0.0])
     missing = [meeting - MOTION.transition(0.0, 30.0) @ state for state in STATES]
     return sum(
-        float(solve_bounded([Arc(MOTION, 0.0, 30.0, each, np.zeros((6, 0)))], bound).energies[0]) for each in missing
+        float(solve_bounded([Arc(MOTION, 0.0, 30.0, each, np.zeros((6, 0)))], bound).energies[0])
+        for each in missing
     )
 
 
@@ -80,7 +81,8 @@ def test_bound_above_the_peak_changes_nothing() -> None:
 def test_needed_bound_is_that_of_the_best_meeting_for_it() -> None:
     needed = needed_bound(ENCOUNTER)
 
-    # The first craft has a margin; the other two decide, and their meeting is possible just above the bound.
+    # The first craft has a margin; the other two decide, and their meeting is possible just above
+    # the bound.
     assert needed.craft == (1, 2)
     bound_encounter(solve_encounter(ENCOUNTER), 1.001 * needed.value_m_s2)
     with pytest.raises(BoundTooSmallError):
@@ -90,7 +92,9 @@ def test_needed_bound_is_that_of_the_best_meeting_for_it() -> None:
 def test_craft_of_weight_zero_must_reach_the_meeting_of_the_others() -> None:
     without = replace(ENCOUNTER, craft=(CRAFT[0], CRAFT[1], replace(CRAFT[2], weight=0.0)))
     pair = solve_encounter(replace(ENCOUNTER, craft=CRAFT[:2]))
-    with pytest.raises(BoundTooSmallError, match="the craft c, of weight 0, does not reach the meeting"):
+    with pytest.raises(
+        BoundTooSmallError, match="the craft c, of weight 0, does not reach the meeting"
+    ):
         bound_encounter(solve_encounter(without), 1.0)
 
     found = bound_encounter(solve_encounter(without), 1.25)

@@ -32,9 +32,15 @@ POSITION = (Component.X, Component.Y, Component.Z)
 
 
 def some(
-    seed: int, count: int, free: tuple[Component, ...] = POSITION, *, own_starts: bool = False, **changes: object
+    seed: int,
+    count: int,
+    free: tuple[Component, ...] = POSITION,
+    *,
+    own_starts: bool = False,
+    **changes: object,
 ) -> EncounterSolution:
-    random, motion = np.random.default_rng(seed), ClohessyWiltshire(1.13e-3)
+    random = np.random.default_rng(seed)
+    motion = ClohessyWiltshire(1.13e-3)
     scale = np.array([300.0] * 3 + [1.0] * 3)
     craft = tuple(
         Craft(
@@ -55,13 +61,12 @@ SEEDS = st.integers(0, 2**32 - 1)
 @given(SEEDS, st.integers(2, 5), st.booleans())
 @settings(max_examples=20, deadline=None)
 def test_no_meeting_dominates_the_pareto_set(seed: int, count: int, own_starts: bool) -> None:
-    solution, random = some(seed, count, own_starts=own_starts), np.random.default_rng(seed)
+    solution = some(seed, count, own_starts=own_starts)
+    random = np.random.default_rng(seed)
     found = pareto_set(solution, simplex_weights(count, 20))
     spread = float(np.ptp(solution.ideals, axis=0).max())
-    elsewhere, excess = (
-        solution.excess(found[:, None] + random.normal(size=(len(found), 50, 3)) * spread),
-        solution.excess(found),
-    )
+    elsewhere = solution.excess(found[:, None] + random.normal(size=(len(found), 50, 3)) * spread)
+    excess = solution.excess(found)
     assert not (excess[:, None] - elsewhere > 1e-9 * excess.max()).all(axis=-1).any()
 
 
@@ -75,18 +80,26 @@ def test_the_front_of_two_in_closed_form() -> None:
 @given(SEEDS, st.integers(2, 5), st.booleans())
 @settings(max_examples=30, deadline=None)
 def test_the_nearest_meeting_of_one_matrix(seed: int, count: int, own_starts: bool) -> None:
-    free = POSITION[:1] if own_starts else POSITION  # the M of one component are multiples of each other
-    solution, random = some(seed, count, free, own_starts=own_starts), np.random.default_rng(seed)
-    root, ideals = solution.costs[0].root, solution.ideals
+    free = (
+        POSITION[:1] if own_starts else POSITION
+    )  # the M of one component are multiples of each other
+    solution = some(seed, count, free, own_starts=own_starts)
+    random = np.random.default_rng(seed)
+    root = solution.costs[0].root
+    ideals = solution.ideals
     preferred = ideals.mean(axis=0) + 2.0 * random.normal(size=len(free)) * np.ptp(ideals, axis=0)
-    points, target, near = (each @ root.T for each in (ideals, preferred, nearest_to(solution, preferred)))
+    points, target, near = (
+        each @ root.T for each in (ideals, preferred, nearest_to(solution, preferred))
+    )
     # The plane through the nearest point, across the way to the target, has the hull behind it.
     assert ((points - near) @ (target - near)).max() <= 1e-9 * np.abs(points - target).max() ** 2
 
 
 @given(SEEDS, st.integers(1, 5), st.booleans())
 @settings(max_examples=15, deadline=None)
-def test_coalitions_are_superadditive_and_shares_add_up(seed: int, count: int, own_starts: bool) -> None:
+def test_coalitions_are_superadditive_and_shares_add_up(
+    seed: int, count: int, own_starts: bool
+) -> None:
     solution = some(seed, count, own_starts=own_starts)
     found = analyse_coalitions(solution)
     worth = {each.members: each.excess for each in found.coalitions}
@@ -104,7 +117,8 @@ def test_coalitions_are_superadditive_and_shares_add_up(seed: int, count: int, o
     orders = list(permutations(range(count)))
     for order in orders:
         for place, member in enumerate(order):
-            joined, before = tuple(sorted(order[: place + 1])), tuple(sorted(order[:place]))
+            joined = tuple(sorted(order[: place + 1]))
+            before = tuple(sorted(order[:place]))
             added[member] += (worth[joined] - worth.get(before, 0.0)) / len(orders)
     np.testing.assert_allclose(found.shapley, added, rtol=1e-9, atol=1e-12)
 

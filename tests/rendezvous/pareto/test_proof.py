@@ -1,4 +1,6 @@
-"""Independent proof: a discretised quadratic program, and integration under the computed control."""
+"""Independent proof: a discretised quadratic program, and integration under the computed
+control.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,7 @@ from scipy.linalg import expm
 from scipy.sparse import csc_matrix
 
 from infoset.arrays import Floats
-from infoset.rendezvous.pareto import Component, Craft, Encounter, Meeting, solve_encounter
+from infoset.rendezvous.pareto import Component, Craft, Encounter, Meeting, Plan, solve_encounter
 from infoset.rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, TschaunerHempel
 
 NODES = 24
@@ -43,12 +45,15 @@ def quadratic_program(encounter: Encounter) -> tuple[Floats, Floats]:
     The transition comes from a plain matrix exponential, states are in units of the duration.
     """
     motion = encounter.craft[0].motion
-    duration, common = encounter.meeting_s, encounter.common
+    duration = encounter.meeting_s
+    common = encounter.common
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
-    times, weights = 0.5 * duration * (1.0 + nodes), 0.5 * weights
+    times = 0.5 * duration * (1.0 + nodes)
+    weights = 0.5 * weights
     matrix = motion.dynamics(0.0)
     scale = np.array([duration] * 3 + [1.0] * 3)
-    # Unknown are sqrt(weight) u a Gauss point times the duration, craft by craft, then the free values.
+    # Unknown are sqrt(weight) u a Gauss point times the duration, craft by craft, then the free
+    # values.
     effect = np.concatenate(
         [
             (expm(matrix * (duration - time)) / scale[:, None])[:common, 3:] * np.sqrt(weight)
@@ -56,7 +61,9 @@ def quadratic_program(encounter: Encounter) -> tuple[Floats, Floats]:
         ],
         axis=1,
     )
-    count, size, free = len(encounter.craft), 3 * NODES, len(encounter.free)
+    count = len(encounter.craft)
+    size = 3 * NODES
+    free = len(encounter.free)
     rows = np.zeros((count * common, count * size + free))
     right = np.zeros(count * common)
     opening = (encounter.opening / scale[:, None])[:common]
@@ -103,16 +110,26 @@ def test_flying_the_control_ends_at_the_meeting(encounter: Encounter) -> None:
     for index, craft in enumerate(encounter.craft):
         plan = solution.plan(index)
 
-        def rates(time: float, values: Floats) -> Floats:
-            control = plan.control(time)  # noqa: B023
-            moved = craft.motion.dynamics(time) @ values[:6] + np.concatenate([np.zeros(3), control])  # noqa: B023
+        def rates(time: float, values: Floats, craft: Craft = craft, plan: Plan = plan) -> Floats:
+            control = plan.control(time)
+            pushed = np.concatenate([np.zeros(3), control])
+            moved = craft.motion.dynamics(time) @ values[:6] + pushed
             return np.append(moved, control @ control)
 
         begin = np.append(craft.state, 0.0)
         atol = 1e-12 * np.append(scale, 1.0)
-        flown = solve_ivp(rates, (0.0, encounter.meeting_s), begin, method="DOP853", rtol=1e-12, atol=atol).y[:, -1]
+        flown = solve_ivp(
+            rates, (0.0, encounter.meeting_s), begin, method="DOP853", rtol=1e-12, atol=atol
+        ).y[:, -1]
         common = encounter.common
-        size = float(np.abs(np.concatenate([craft.state, solution.meeting_state()]) / np.tile(scale, 2)).max()) + 1.0
+        size = (
+            float(
+                np.abs(
+                    np.concatenate([craft.state, solution.meeting_state()]) / np.tile(scale, 2)
+                ).max()
+            )
+            + 1.0
+        )
         missed = (flown[:6] - solution.meeting_state()) / scale
         assert np.abs(missed[:common]).max() < 1e-8 * size
         assert np.abs((flown[:6] - plan.state(encounter.meeting_s)) / scale).max() < 1e-8 * size
@@ -125,13 +142,22 @@ def test_craft_with_their_own_starts_and_orbits_meet() -> None:
     orbit = EllipticOrbit(1.1e-3, 0.2, 0.5)
     craft = (
         Craft("long", np.array([500.0, 40.0, 10.0, 0.1, 0.0, 0.0]), TschaunerHempel(orbit)),
-        Craft("short", np.array([-300.0, 0.0, 0.0, 0.0, 0.2, 0.1]), TschaunerHempel(orbit), 2.0, 400.0),
+        Craft(
+            "short", np.array([-300.0, 0.0, 0.0, 0.0, 0.2, 0.1]), TschaunerHempel(orbit), 2.0, 400.0
+        ),
     )
     encounter = Encounter(craft, 1500.0, (Component.X, Component.Y, Component.Z), np.zeros(6))
     solution = solve_encounter(encounter)
     assert not solution.same_matrix
     for index in range(2):
-        np.testing.assert_allclose(solution.plan(index).state(1500.0), solution.meeting_state(), atol=1e-8)
+        np.testing.assert_allclose(
+            solution.plan(index).state(1500.0), solution.meeting_state(), atol=1e-8
+        )
     # The weighted sum of excesses is smallest: its gradient vanishes.
-    gradient = sum(each.craft.weight * each.matrix @ (solution.point - each.ideal) for each in solution.costs)
-    assert np.abs(gradient).max() < 1e-12 * np.abs(solution.costs[0].matrix @ solution.costs[0].ideal).max()
+    gradient = sum(
+        each.craft.weight * each.matrix @ (solution.point - each.ideal) for each in solution.costs
+    )
+    assert (
+        np.abs(gradient).max()
+        < 1e-12 * np.abs(solution.costs[0].matrix @ solution.costs[0].ideal).max()
+    )

@@ -21,30 +21,42 @@ from infoset.rendezvous.pareto import (
     minimax_excess,
     solve_encounter,
 )
-from infoset.rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
+from infoset.rendezvous.relative_motion import (
+    ClohessyWiltshire,
+    EllipticOrbit,
+    LinearMotion,
+    TschaunerHempel,
+)
 
 Check = Callable[[int], None]
 
-FEW, MANY = range(30), range(1000, 3000)
+FEW = range(30)
+MANY = range(1000, 3000)
 
 
 def some_motion(random: np.random.Generator, rate: float, *, elliptic: float = 0.2) -> LinearMotion:
     """A circular orbit, or an elliptic one."""
     if random.random() >= elliptic:
         return ClohessyWiltshire(rate)
-    orbit = EllipticOrbit(rate, float(random.choice([0.0, 0.1, 0.6, 0.8])), float(random.uniform(0.0, 6.0)))
+    orbit = EllipticOrbit(
+        rate, float(random.choice([0.0, 0.1, 0.6, 0.8])), float(random.uniform(0.0, 6.0))
+    )
     return TschaunerHempel(orbit)
 
 
 def some_encounter(seed: int, longest_rad: float = 20.0, max_craft: int = 5) -> Encounter:
-    """An encounter: weights of zero, one craft, craft that coincide, late starts, any free components."""
+    """An encounter: weights of zero, one craft, craft that coincide, late starts, any free
+    components.
+    """
     random = np.random.default_rng(seed)
     rate = 10.0 ** random.uniform(-5.0, -1.5)
     duration = 10.0 ** random.uniform(-3.0, np.log10(longest_rad)) / rate
     motion = some_motion(random, rate)
     meeting = Meeting.RENDEZVOUS if random.random() < 0.6 else Meeting.INTERCEPT
     components = list(Component)[: 6 if meeting is Meeting.RENDEZVOUS else 3]
-    count = len(components) if random.random() < 0.15 else int(random.integers(1, len(components) + 1))
+    count = (
+        len(components) if random.random() < 0.15 else int(random.integers(1, len(components) + 1))
+    )
     free = tuple(components[each] for each in random.permutation(len(components))[:count])
     scale = np.array([duration] * 3 + [1.0] * 3) * 10.0 ** random.uniform(-1.0, 1.0)
     starts = str(random.choice(["together", "apart", "late"]))
@@ -58,24 +70,35 @@ def some_encounter(seed: int, longest_rad: float = 20.0, max_craft: int = 5) -> 
             start = float(random.uniform(0.0, 0.9)) * duration
         elif starts == "late":
             start = duration * (1.0 - 10.0 ** random.uniform(-2.0, 0.0))
-        weight = 0.0 if random.random() < 0.2 else float(random.choice([1.0, 10.0 ** random.uniform(-1.5, 1.5)]))
+        weight = (
+            0.0
+            if random.random() < 0.2
+            else float(random.choice([1.0, 10.0 ** random.uniform(-1.5, 1.5)]))
+        )
         craft.append(Craft(str(index), state, motion, weight, start))
     if not any(each.weight > 0.0 for each in craft):
         craft[0] = Craft("0", craft[0].state, motion, 1.0, craft[0].start_s)
     return Encounter(tuple(craft), duration, free, random.normal(size=6) * scale, meeting)
 
 
-def cone_program(solution: EncounterSolution, weights: Floats, floors: Floats, *, one: bool) -> float:
+def cone_program(
+    solution: EncounterSolution, weights: Floats, floors: Floats, *, one: bool
+) -> float:
     """Minimum sum of w_i |(R_i (p - p_i*), floor_i)|, or the minimax of them, by clarabel."""
-    free, count = solution.point.size, len(solution.costs)
+    free = solution.point.size
+    count = len(solution.costs)
     counts = weights > 0.0
     middle = solution.ideals[counts].mean(axis=0)
-    root = np.linalg.cholesky(np.mean([each.matrix for each in np.array(solution.costs)[counts]], axis=0)).T
+    root = np.linalg.cholesky(
+        np.mean([each.matrix for each in np.array(solution.costs)[counts]], axis=0)
+    ).T
     back = np.linalg.inv(root)
     apart = np.linalg.norm((solution.ideals[counts] - middle) @ root.T, axis=1)
     size = max(float(apart.max()), float(floors[counts].max()), 1e-300)
     slack = 1 if one else count
-    rows, right, cones = [], [], []
+    rows = []
+    right = []
+    cones = []
     for index, cost in enumerate(solution.costs):
         if weights[index] == 0.0:
             continue
@@ -83,7 +106,11 @@ def cone_program(solution: EncounterSolution, weights: Floats, floors: Floats, *
         block[0, free + (0 if one else index)] = -1.0 / (weights[index] if one else 1.0)
         block[1 : free + 1, :free] = -cost.root @ back
         rows.append(block)
-        right.append(np.concatenate([[0.0], -cost.root @ (cost.ideal - middle) / size, [floors[index] / size]]))
+        right.append(
+            np.concatenate(
+                [[0.0], -cost.root @ (cost.ideal - middle) / size, [floors[index] / size]]
+            )
+        )
         cones.append(clarabel.SecondOrderConeT(free + 2))
     options = clarabel.DefaultSettings()
     options.verbose = False
@@ -91,7 +118,12 @@ def cone_program(solution: EncounterSolution, weights: Floats, floors: Floats, *
     goal = np.concatenate([np.zeros(free), np.ones(1) if one else weights])
     system = csc_matrix(np.concatenate(rows))
     solver = clarabel.DefaultSolver(
-        csc_matrix((free + slack, free + slack)), goal, system, np.concatenate(right), cones, options
+        csc_matrix((free + slack, free + slack)),
+        goal,
+        system,
+        np.concatenate(right),
+        cones,
+        options,
     )
     found = solver.solve()
     assert str(found.status) in ("Solved", "AlmostSolved")
@@ -101,7 +133,9 @@ def cone_program(solution: EncounterSolution, weights: Floats, floors: Floats, *
 def ideal_size(solution: EncounterSolution) -> float:
     """The maximum weighted size of an ideal in the norm of M."""
     pairs = zip(solution.encounter.weights, solution.costs, strict=True)
-    return max(float(np.sqrt(weight) * np.linalg.norm(cost.root @ cost.ideal)) for weight, cost in pairs)
+    return max(
+        float(np.sqrt(weight) * np.linalg.norm(cost.root @ cost.ideal)) for weight, cost in pairs
+    )
 
 
 def the_min_sum_agrees(seed: int) -> None:
@@ -110,7 +144,9 @@ def the_min_sum_agrees(seed: int) -> None:
     floors = np.sqrt([each.ideal_cost_squared for each in solution.costs])
     value = float(weights @ np.sqrt(solution.cost_squared(min_sum_of_costs(solution))))
     size = float(weights @ np.sqrt(solution.cost_squared())) + 1e-6 * ideal_size(solution)
-    assert value == pytest.approx(cone_program(solution, weights, floors, one=False), rel=1e-7, abs=1e-8 * size)
+    assert value == pytest.approx(
+        cone_program(solution, weights, floors, one=False), rel=1e-7, abs=1e-8 * size
+    )
 
 
 def the_min_max_agrees(seed: int) -> None:
@@ -125,9 +161,14 @@ def the_min_max_agrees(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", [28, 41, 98, 179, 585, 1080])
 def test_the_min_max_of_very_different_weights(seed: int) -> None:
-    """Sequential quadratic programming alone stops at 2 to 6e8 times the minimum; with the last step, 1e-4 above it."""
-    encounter, random = some_encounter(seed), np.random.default_rng(seed)
-    craft = tuple(replace(each, weight=float(10.0 ** random.uniform(-6.0, 6.0))) for each in encounter.craft)
+    """Sequential quadratic programming alone stops at 2 to 6e8 times the minimum; with the last
+    step, 1e-4 above it.
+    """
+    encounter = some_encounter(seed)
+    random = np.random.default_rng(seed)
+    craft = tuple(
+        replace(each, weight=float(10.0 ** random.uniform(-6.0, 6.0))) for each in encounter.craft
+    )
     solution = solve_encounter(replace(encounter, craft=craft))
     roots = np.sqrt(solution.encounter.weights)
     value = float((roots * np.sqrt(solution.excess(minimax_excess(solution)))).max())
@@ -146,11 +187,15 @@ def test_craft_of_weight_zero_have_no_influence_on_the_minimax_excess() -> None:
 
 
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
-def test_random_encounters(check: Check, check_seeds: Callable[[Check, Iterable[int]], None]) -> None:
+def test_random_encounters(
+    check: Check, check_seeds: Callable[[Check, Iterable[int]], None]
+) -> None:
     check_seeds(check, FEW)
 
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
-def test_many_random_encounters(check: Check, check_seeds: Callable[[Check, Iterable[int]], None]) -> None:
+def test_many_random_encounters(
+    check: Check, check_seeds: Callable[[Check, Iterable[int]], None]
+) -> None:
     check_seeds(check, MANY)

@@ -46,7 +46,14 @@ def slides() -> MakeGame:
     ) -> Game:
         return Game(
             Gravity(MU_M3_S2, EARTH_M),
-            player(20.0, eccentricity=0.00013, inclination_deg=1.565, raan_deg=47.0, anomaly_deg=350.0, dry_kg=dry_kg),
+            player(
+                20.0,
+                eccentricity=0.00013,
+                inclination_deg=1.565,
+                raan_deg=47.0,
+                anomaly_deg=350.0,
+                dry_kg=dry_kg,
+            ),
             player(
                 thrust_n,
                 eccentricity=0.00016,
@@ -63,7 +70,9 @@ def slides() -> MakeGame:
 
 @pytest.fixture(scope="session")
 def low() -> MakeGame:
-    """In low orbit, with J2 and a capture radius: the evader leads by some degrees, its thrust a share of 20 N."""
+    """In low orbit, with J2 and a capture radius: the evader leads by some degrees, its thrust a
+    share of 20 N.
+    """
 
     def make(lead_deg: float = 1.6, ratio: float = 0.5, *, j2: float = 1.08262668e-3) -> Game:
         players = []

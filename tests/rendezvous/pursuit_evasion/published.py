@@ -1,7 +1,9 @@
-"""Two cases of the slides at full precision, by the evader's thrust: nondimensional, mu = 1, the semi-major axis = 1.
+"""Two cases of the slides at full precision, by the evader's thrust: nondimensional, mu = 1, the
+semi-major axis = 1.
 
-`end` is r_f, v_P, v_E, nu, t_f; `costates` are lambda_r and lambda_v of the pursuer, then of the evader, at t = 0.
-Computed with two independent integrators; the slides (Wang; after Shen and Casalino, 2018) print no numbers.
+`end` is r_f, v_P, v_E, nu, t_f; `costates` are lambda_r and lambda_v of the pursuer, then of the
+evader, at t = 0. Computed with two independent integrators; the slides (Wang; after Shen and
+Casalino, 2018) print no numbers.
 """
 
 from __future__ import annotations

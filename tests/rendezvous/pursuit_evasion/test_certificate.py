@@ -30,7 +30,8 @@ def test_every_check_of_the_slides_cases_holds(case: Case, slides: MakeGame) -> 
 
 
 def test_oblateness_passes_the_second_integrator(low: MakeGame) -> None:
-    solution, round_planet = solve(low()), solve(low(j2=0.0))
+    solution = solve(low())
+    round_planet = solve(low(j2=0.0))
     certificate = certify(solution)
     assert certificate.failures == ()
     # It flies forward, with J2 as textbooks write it and the costates by a complex step of that.
@@ -60,7 +61,9 @@ def test_all_directions_are_looked_in(solved: Solution) -> None:
     assert certificate.max_excess_m < 1.0
 
 
-@pytest.mark.parametrize(("found", "is_claimed"), [(120, True), (73, True), (60, True), (59, False), (1, False)])
+@pytest.mark.parametrize(
+    ("found", "is_claimed"), [(120, True), (73, True), (60, True), (59, False), (1, False)]
+)
 def test_saddle_point_is_not_claimed_if_more_than_half_of_the_directions_are_undecided(
     found: int, is_claimed: bool, solved: Solution
 ) -> None:
@@ -70,7 +73,8 @@ def test_saddle_point_is_not_claimed_if_more_than_half_of_the_directions_are_und
 
 
 def test_a_pursuer_that_does_better_alone_is_told(slides: MakeGame) -> None:
-    # Close to equal thrusts l(T) stays above zero long after the planned path of the evader can be met.
+    # Close to equal thrusts l(T) stays above zero long after the planned path of the evader can be
+    # met.
     certificate = certify(solve(slides(18.0, anomaly_deg=324.0)))
     assert not certificate.claims_saddle_point
     assert certificate.pursuer_alone_s is not None
@@ -88,7 +92,9 @@ def test_a_capture_that_is_off_is_told(solved: Solution) -> None:
     assert any("second integrator" in each for each in failures)
 
 
-def test_a_path_that_turns_too_fast_is_told(solved: Solution, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_path_that_turns_too_fast_is_told(
+    solved: Solution, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("infoset.rendezvous.pursuit_evasion.paths._MAX_RATES", 100)
     evader = scaled_craft(solved.game.evader, solved.game.gravity, solved.units)
     with pytest.raises(PathError, match="turns too fast"):

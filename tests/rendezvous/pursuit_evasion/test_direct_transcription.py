@@ -1,4 +1,6 @@
-"""The pursuer against the evader's fixed optimal path, by SLSQP on its own steering: no adjoints, no extremals."""
+"""The pursuer against the evader's fixed optimal path, by SLSQP on its own steering: no adjoints,
+no extremals.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +16,12 @@ from infoset.rendezvous.pursuit_evasion.paths import extremal_paths
 NODES, STEPS = 16, 400
 
 
-def fly_batch(start: Floats, steering: Floats, duration: Floats, thrust: float, mass: float, flow: float) -> Floats:
-    """Fly many craft at once by Runge and Kutta's method: steering (B, NODES, 3) between nodes in time, ends (B, 6)."""
+def fly_batch(
+    start: Floats, steering: Floats, duration: Floats, thrust: float, mass: float, flow: float
+) -> Floats:
+    """Fly many craft at once by Runge and Kutta's method: steering (B, NODES, 3) between nodes in
+    time, ends (B, 6).
+    """
     state = np.repeat(start[None], len(steering), axis=0)
     step = (duration / STEPS)[:, None]
 
@@ -30,7 +36,9 @@ def fly_batch(start: Floats, steering: Floats, duration: Floats, thrust: float, 
         return np.concatenate([y[:, 3:], -r / cube + push[:, None] * u], axis=1)
 
     for i in range(STEPS):
-        a, b, c = i / STEPS, (i + 0.5) / STEPS, (i + 1.0) / STEPS
+        a = i / STEPS
+        b = (i + 0.5) / STEPS
+        c = (i + 1.0) / STEPS
         k1 = rates(a, state)
         k2 = rates(b, state + 0.5 * step * k1)
         k3 = rates(b, state + 0.5 * step * k2)
@@ -43,18 +51,24 @@ def fly_batch(start: Floats, steering: Floats, duration: Floats, thrust: float, 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_no_steering_captures_the_fixed_path_earlier(seed: int, solved: Solution) -> None:
     assert solved.capture is not None
-    game, units, node = solved.game, solved.units, solved.capture.extremal
+    game = solved.game
+    units = solved.units
+    node = solved.capture.extremal
     pursuer = scaled_craft(game.pursuer, game.gravity, units)
     path = extremal_paths(pursuer, scaled_craft(game.evader, game.gravity, units), node)[1]
     moves = 1e-7
 
     def gaps(unknowns: Floats) -> Floats:
         steering = unknowns[:, :-1].reshape(len(unknowns), NODES, 3)
-        ends = fly_batch(pursuer.start, steering, unknowns[:, -1], pursuer.thrust, pursuer.mass, pursuer.flow)
+        ends = fly_batch(
+            pursuer.start, steering, unknowns[:, -1], pursuer.thrust, pursuer.mass, pursuer.flow
+        )
         return np.asarray(ends[:, :3] - np.array([path.at(float(t))[:3] for t in unknowns[:, -1]]))
 
     def slopes(unknown: Floats) -> Floats:
-        moved = np.concatenate([unknown + moves * np.eye(len(unknown)), unknown - moves * np.eye(len(unknown))])
+        moved = np.concatenate(
+            [unknown + moves * np.eye(len(unknown)), unknown - moves * np.eye(len(unknown))]
+        )
         found = gaps(moved)
         return np.asarray((found[: len(unknown)] - found[len(unknown) :]).T / (2.0 * moves))
 
@@ -62,7 +76,9 @@ def test_no_steering_captures_the_fixed_path_earlier(seed: int, solved: Solution
     random = np.random.default_rng(seed)
     begin = np.concatenate(
         [
-            (np.tile([0.2, 1.0, 0.0], (NODES, 1)) + 0.1 * random.standard_normal((NODES, 3))).ravel(),
+            (
+                np.tile([0.2, 1.0, 0.0], (NODES, 1)) + 0.1 * random.standard_normal((NODES, 3))
+            ).ravel(),
             [node.duration * 1.05],
         ]
     )
@@ -79,4 +95,6 @@ def test_no_steering_captures_the_fixed_path_earlier(seed: int, solved: Solution
     assert np.abs(gaps(found.x[None])).max() * units.length_m < 1.0
     capture_s = float(found.x[-1]) * units.time_s
     assert capture_s > solved.capture.time_s - 0.01
-    assert capture_s < solved.capture.time_s + 60.0  # it is a search that gets there, not one that fails
+    assert (
+        capture_s < solved.capture.time_s + 60.0
+    )  # it is a search that gets there, not one that fails

@@ -8,7 +8,14 @@ from numpy.typing import NDArray
 
 from infoset.arrays import Floats
 from infoset.rendezvous.pursuit_evasion._coupling import across
-from infoset.rendezvous.pursuit_evasion._extremal import NO_VARIATIONS, end_of, flow_back, invert, rate, respond
+from infoset.rendezvous.pursuit_evasion._extremal import (
+    NO_VARIATIONS,
+    end_of,
+    flow_back,
+    invert,
+    rate,
+    respond,
+)
 
 PLACE = st.floats(-1.5, 1.5)
 OBLATENESS = (0.0, 5e-4)
@@ -22,7 +29,9 @@ def potential(r: NDArray[np.complex128], oblateness: float) -> complex:
 @pytest.mark.parametrize("oblateness", [0.0, 0.3])
 @given(PLACE, PLACE, PLACE)
 @settings(deadline=None, max_examples=50)
-def test_gravity_is_the_gradient_of_the_potential(oblateness: float, x: float, y: float, z: float) -> None:
+def test_gravity_is_the_gradient_of_the_potential(
+    oblateness: float, x: float, y: float, z: float
+) -> None:
     r = np.array([x, y, z + 3.0])
     step = 1e-30
     gradient = [potential(r + 1j * step * axis, oblateness).imag / step for axis in np.eye(3)]
@@ -44,15 +53,20 @@ def test_variations_are_differences(oblateness: float) -> None:
         assert flow_back(y, NO_VARIATIONS, craft, 0.0, duration, 1e-14)
         return y
 
-    shot, variations = end_of(end, nu), np.zeros((12, 9))
+    shot = end_of(end, nu)
+    variations = np.zeros((12, 9))
     variations[:6, :6] = np.eye(6)
     variations[6:9, 6:8] = plane.T
-    assert flow_back(shot, variations, np.array([1.0, oblateness, thrust, mass, flow]), 0.0, duration, 1e-13)
+    assert flow_back(
+        shot, variations, np.array([1.0, oblateness, thrust, mass, flow]), 0.0, duration, 1e-13
+    )
     step = 1e-5
     for column in range(9):
         moved = []
         for sign in (1.0, -1.0):
-            state, direction, final_mass = end.copy(), nu.copy(), mass
+            state = end.copy()
+            direction = nu.copy()
+            final_mass = mass
             if column < 6:
                 state[column] += sign * step
             elif column < 8:
@@ -61,11 +75,15 @@ def test_variations_are_differences(oblateness: float) -> None:
                 final_mass += sign * step
             moved.append(start(state, direction, final_mass))
         difference = (moved[0] - moved[1]) / (2.0 * step)
-        np.testing.assert_allclose(variations[:, column], difference, rtol=2e-5, atol=2e-5 * np.abs(difference).max())
+        np.testing.assert_allclose(
+            variations[:, column], difference, rtol=2e-5, atol=2e-5 * np.abs(difference).max()
+        )
 
 
 @pytest.mark.parametrize("oblateness", [0.0, 1e-3])
-def test_a_response_is_the_derivative_of_the_end_state_by_direction_and_duration(oblateness: float) -> None:
+def test_a_response_is_the_derivative_of_the_end_state_by_direction_and_duration(
+    oblateness: float,
+) -> None:
     nu = np.array([0.3, 0.9, -0.2])
     nu /= np.linalg.norm(nu)
     plane = across(nu)
@@ -80,16 +98,23 @@ def test_a_response_is_the_derivative_of_the_end_state_by_direction_and_duration
     start = known[:6].copy()
 
     def end(direction: Floats, lasting: float) -> Floats:
-        """Return the end state from which the start is reached: a fixed point, whatever the other derivatives."""
+        """Return the end state from which the start is reached: a fixed point, whatever the other
+        derivatives.
+        """
         state = near
         for _ in range(6):
-            state = state + respond(start, craft(lasting), state, direction, plane, lasting, 1e-14).rho
+            state = (
+                state + respond(start, craft(lasting), state, direction, plane, lasting, 1e-14).rho
+            )
         return state
 
     found = respond(start, craft(duration), near, nu, plane, duration, 1e-13)
 
     step = 1e-5
-    by_nu = [(end(nu + step * row, duration) - end(nu - step * row, duration)) / (2.0 * step) for row in plane]
+    by_nu = [
+        (end(nu + step * row, duration) - end(nu - step * row, duration)) / (2.0 * step)
+        for row in plane
+    ]
     by_time = (end(nu, duration + step) - end(nu, duration - step)) / (2.0 * step)
     assert found.regular
     # Some 50 steps with an error of 1e-13 each, which grow a little on the way back.
@@ -121,6 +146,8 @@ def test_an_inverse_and_its_determinant(count: int) -> None:
     assert determinant == pytest.approx(np.linalg.det(matrix), rel=allowed)
 
 
-@pytest.mark.parametrize("entries", [[[1.0, 2.0], [2.0, 4.0]], [[0.0, 0.0], [0.0, 1.0]], [[np.nan, 0.0], [0.0, 1.0]]])
+@pytest.mark.parametrize(
+    "entries", [[[1.0, 2.0], [2.0, 4.0]], [[0.0, 0.0], [0.0, 1.0]], [[np.nan, 0.0], [0.0, 1.0]]]
+)
 def test_a_singular_matrix_has_no_inverse(entries: list[list[float]]) -> None:
     assert invert(np.array(entries), np.empty((2, 2))) == 0.0

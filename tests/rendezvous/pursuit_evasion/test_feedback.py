@@ -24,8 +24,12 @@ PUBLISHED: list[tuple[str, Steering | None, float]] = [
 ]
 
 
-@pytest.mark.parametrize(("name", "steering", "capture_s"), PUBLISHED, ids=[each[0] for each in PUBLISHED])
-def test_receding_horizon(name: str, steering: Steering | None, capture_s: float, solved: Solution) -> None:
+@pytest.mark.parametrize(
+    ("name", "steering", "capture_s"), PUBLISHED, ids=[each[0] for each in PUBLISHED]
+)
+def test_receding_horizon(
+    name: str, steering: Steering | None, capture_s: float, solved: Solution
+) -> None:
     flight = fly(solved.game, steering, solution=solved)
     assert flight.ended is Ended.CAPTURED
     assert flight.predicted_s[-1] == pytest.approx(capture_s, abs=0.1)
@@ -36,7 +40,9 @@ def test_receding_horizon(name: str, steering: Steering | None, capture_s: float
 
 
 @pytest.mark.parametrize("policy", [Policy.NORMAL, Policy.RETROGRADE])
-def test_what_a_held_plan_loses_vanishes_with_the_time_it_is_held(policy: Policy, solved: Solution) -> None:
+def test_what_a_held_plan_loses_vanishes_with_the_time_it_is_held(
+    policy: Policy, solved: Solution
+) -> None:
     # Within a leg the pursuer does not answer: its loss is of high order in the leg.
     losses = [
         np.diff(fly(solved.game, policy.direction, solution=solved, replan_s=leg).predicted_s).max()
@@ -49,7 +55,9 @@ def test_what_a_held_plan_loses_vanishes_with_the_time_it_is_held(policy: Policy
 def test_old_and_noisy_sight_costs_time(slides: MakeGame) -> None:
     solution = solve(slides(capture_radius_m=20e3))
     assert solution.capture is not None
-    noisy = fly(solution.game, None, solution=solution, observation=Observation(300.0, 500.0, 0.05), seed=3)
+    noisy = fly(
+        solution.game, None, solution=solution, observation=Observation(300.0, 500.0, 0.05), seed=3
+    )
     assert noisy.ended is Ended.CAPTURED
     assert noisy.time_s > solution.capture.time_s
     assert noisy.time_s == pytest.approx(solution.capture.time_s, rel=1e-3)

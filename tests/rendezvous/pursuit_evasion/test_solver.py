@@ -28,7 +28,8 @@ from .linear_game import capture_s
 from .published import CASES, Case
 
 GEO_M = 42166e3
-OFFSET_M, DRIFT_M_S = np.array([100e3, 1500e3, 200e3]), np.array([10.0, -20.0, 15.0])
+OFFSET_M = np.array([100e3, 1500e3, 200e3])
+DRIFT_M_S = np.array([10.0, -20.0, 15.0])
 
 
 def captured(solution: Solution) -> Capture:
@@ -40,7 +41,8 @@ def captured(solution: Solution) -> Capture:
 @pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.thrust_n:g}N")
 def test_the_slides_cases(case: Case, slides: MakeGame) -> None:
     solution = solve(slides(case.thrust_n))
-    capture, units = captured(solution), solution.units
+    capture = captured(solution)
+    units = solution.units
     assert solution.branch_changes == 0
     assert units.length_m == pytest.approx(42166e3, rel=1e-12)
     assert capture.time_s == pytest.approx(case.capture_s, rel=1e-9)
@@ -75,7 +77,9 @@ def test_a_capture_within_seconds_is_found(slides: MakeGame) -> None:
 
 def test_a_coasting_evader_is_captured_the_first_time_it_can_be(slides: MakeGame) -> None:
     game = slides(0.0)
-    capture, units, pair = captured(solve(game)), units_of(game), scaled_game(game).pair
+    capture = captured(solve(game))
+    units = units_of(game)
+    pair = scaled_game(game).pair
     first = pair.begin(10.0, 0.0)
     assert first is not None
     # There is another extremal at 138928 s; before and after the first capture l changes its sign.
@@ -121,28 +125,43 @@ def linear_capture_s() -> float:
     return found
 
 
-# Theory, analytic checks: pursuer on a circular orbit, evader offset along the arc, masses that stay.
-@pytest.mark.parametrize(("share", "difference"), [(1.0, -4.278e-3), (0.1, -4.566e-4), (0.01, -4.595e-5)])
-def test_small_games_approach_the_linear_one(share: float, difference: float, linear_capture_s: float) -> None:
-    axis, offset, drift = GEO_M, OFFSET_M, DRIFT_M_S
+# Theory, analytic checks: pursuer on a circular orbit, evader offset along the arc, masses that
+# stay.
+@pytest.mark.parametrize(
+    ("share", "difference"), [(1.0, -4.278e-3), (0.1, -4.566e-4), (0.01, -4.595e-5)]
+)
+def test_small_games_approach_the_linear_one(
+    share: float, difference: float, linear_capture_s: float
+) -> None:
+    axis = GEO_M
+    offset = OFFSET_M
+    drift = DRIFT_M_S
     rate = math.sqrt(MU_M3_S2 / axis**3)
     (x, y, z), (vx, vy, vz) = share * offset, share * drift
-    angle, radius = y / axis, axis + x
-    outward, ahead = (
-        np.array([math.cos(angle), math.sin(angle), 0.0]),
-        np.array([-math.sin(angle), math.cos(angle), 0.0]),
-    )
+    angle = y / axis
+    radius = axis + x
+    outward = np.array([math.cos(angle), math.sin(angle), 0.0])
+    ahead = np.array([-math.sin(angle), math.cos(angle), 0.0])
     position = radius * outward + np.array([0.0, 0.0, z])
     velocity = vx * outward + radius * (rate + vy / axis) * ahead + np.array([0.0, 0.0, vz])
-    pursuer = Player((axis, 0.0, 0.0), (0.0, rate * axis, 0.0), 2000.0, 200.0, share * 20.0, math.inf)
+    pursuer = Player(
+        (axis, 0.0, 0.0), (0.0, rate * axis, 0.0), 2000.0, 200.0, share * 20.0, math.inf
+    )
     evader = Player(tuple(position), tuple(velocity), 2000.0, 200.0, share * 10.0, math.inf)
     found = captured(solve(Game(Gravity(MU_M3_S2, EARTH_M), pursuer, evader)))
-    assert found.time_s / linear_capture_s - 1.0 == pytest.approx(difference, abs=5e-4 * abs(difference))
+    assert found.time_s / linear_capture_s - 1.0 == pytest.approx(
+        difference, abs=5e-4 * abs(difference)
+    )
 
 
 def rates(t: float, y: Floats, thrust: float, mass: float, flow: float) -> Floats:
-    """The conditions as the theory writes them, for the pursuer, or the evader with its costate turned."""
-    r, v, lr, lv = y[:3], y[3:6], y[6:9], y[9:]
+    """The conditions as the theory writes them, for the pursuer, or the evader with its costate
+    turned.
+    """
+    r = y[:3]
+    v = y[3:6]
+    lr = y[6:9]
+    lv = y[9:]
     cube = float(r @ r) ** 1.5
     push = thrust / (mass - flow * t) * lv / np.linalg.norm(lv)
     turned = lv / cube - 3.0 * r * (lv @ r) / (cube * float(r @ r))
@@ -150,7 +169,9 @@ def rates(t: float, y: Floats, thrust: float, mass: float, flow: float) -> Float
 
 
 def independent_capture(game: Game, capture: Capture) -> float:
-    """Shoot forward on 13 unknowns with SciPy from a guess a little off, nondimensional; return the capture time, s."""
+    """Shoot forward on 13 unknowns with SciPy from a guess a little off, nondimensional; return the
+    capture time, s.
+    """
     units = units_of(game)
     pair = scaled_game(game, units).pair
     crafts = (pair.pursuer, pair.evader)
@@ -181,7 +202,9 @@ def independent_capture(game: Game, capture: Capture) -> float:
     return float(found[12]) * units.time_s
 
 
-@pytest.mark.parametrize(("thrust_n", "anomaly_deg", "inclination_deg"), [(10.0, 312.0, 0.3), (10.0, 325.0, 2.0)])
+@pytest.mark.parametrize(
+    ("thrust_n", "anomaly_deg", "inclination_deg"), [(10.0, 312.0, 0.3), (10.0, 325.0, 2.0)]
+)
 def test_other_geometries_agree_with_an_independent_solver(
     thrust_n: float, anomaly_deg: float, inclination_deg: float, slides: MakeGame
 ) -> None:
@@ -192,7 +215,8 @@ def test_other_geometries_agree_with_an_independent_solver(
 
 def test_where_the_branch_folds_another_one_keeps_the_evader_farther(slides: MakeGame) -> None:
     game = slides(18.0, anomaly_deg=330.0)
-    plain, changed = solve(game, change_branch=False), solve(game)
+    plain = solve(game, change_branch=False)
+    changed = solve(game)
     assert plain.verdict is Verdict.BRANCH_NOT_CERTIFIED
     assert plain.capture is None
     assert captured(changed).time_s > plain.looked_at_s
@@ -203,9 +227,12 @@ def test_where_the_branch_folds_another_one_keeps_the_evader_farther(slides: Mak
 def test_a_capture_that_misses_the_conditions_is_not_returned(
     slides: MakeGame, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    exact, game = Pair.solve, slides()
+    exact = Pair.solve
+    game = slides()
 
-    def inexact(pair: Pair, guess: Floats, duration: float, distance: float, **how: Any) -> Node | None:
+    def inexact(
+        pair: Pair, guess: Floats, duration: float, distance: float, **how: Any
+    ) -> Node | None:
         found = exact(pair, guess, duration, distance, **how)
         return None if found is None else replace(found, residual=1e-8)
 

@@ -7,18 +7,28 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from infoset.rendezvous.reachability import MotionModel, ReachabilityProblem, ThrustShape, discretised, motion_of
+from infoset.rendezvous.reachability import (
+    MotionModel,
+    ReachabilityProblem,
+    ThrustShape,
+    discretised,
+    motion_of,
+)
 from infoset.rendezvous.relative_motion import EllipticOrbit
 
 Paper = Callable[..., ReachabilityProblem]
 
 SOLVED = 1e-10
-"""The relative tolerance at which the convex programs' solver stops, whatever the order of its operations."""
+"""The relative tolerance at which the convex programs' solver stops, whatever the order of its
+operations.
+"""
 ORBIT = EllipticOrbit.of_size(1e7, 0.1, 3.986004418e14)
 
 
 def printed(number: str) -> object:
-    """A solution that was printed: it is compared within half a unit of its last digit and the solver's tolerance."""
+    """A solution that was printed: it is compared within half a unit of its last digit and the
+    solver's tolerance.
+    """
     value = float(number)
     last_digit = 10.0 ** -len(number.partition(".")[2])
     return pytest.approx(value, abs=0.5 * last_digit + SOLVED * abs(value))
@@ -31,7 +41,9 @@ def orbit() -> EllipticOrbit:
 
 @pytest.fixture(scope="session")
 def paper() -> Paper:
-    """The paper's problem, with another model, number of periods, bound on the thrust or shape of it."""
+    """The paper's problem, with another model, number of periods, bound on the thrust or shape of
+    it.
+    """
 
     def make(
         model: MotionModel = MotionModel.FROZEN,
@@ -55,7 +67,9 @@ def paper() -> Paper:
 
 @pytest.fixture(scope="session")
 def random_problem() -> Callable[[int, int], ReachabilityProblem]:
-    """A random system of a dimension: sometimes singular, sometimes with fewer controls than reach every direction."""
+    """A random system of a dimension: sometimes singular, sometimes with fewer controls than reach
+    every direction.
+    """
 
     def make(seed: int, size: int) -> ReachabilityProblem:
         generator = np.random.default_rng(seed)

@@ -1,4 +1,6 @@
-"""The minimum terminal norm in forty decimal digits, by a barrier method that shares nothing with the package."""
+"""The minimum terminal norm in forty decimal digits, by a barrier method that shares nothing with
+the package.
+"""
 
 from __future__ import annotations
 
@@ -22,46 +24,64 @@ _decimals = np.vectorize(lambda value: Decimal(float(value)), otypes=[object])
 
 
 class Dense:
-    """A problem as matrices of the controls divided by their bounds: minimise |free + response v|, rows v <= limits.
+    """A problem as matrices of the controls divided by their bounds: minimise |free + response v|,
+    rows v <= limits.
 
     Written straight from x(t + 1) = A x + B u, in whatever numbers `convert` makes.
     """
 
     def __init__(self, problem: ReachabilityProblem, convert: Any = np.asarray) -> None:
-        periods, n, m = problem.periods, problem.states, problem.controls
-        normals = [np.eye(n) / problem.state_bounds[:, None], -np.eye(n) / problem.state_bounds[:, None]]
+        periods = problem.periods
+        n = problem.states
+        m = problem.controls
+        normals = [
+            np.eye(n) / problem.state_bounds[:, None],
+            -np.eye(n) / problem.state_bounds[:, None],
+        ]
         offsets = [np.ones((periods + 1, 2 * n))]
         if problem.normals is not None and problem.offsets is not None:
             sizes = np.linalg.norm(problem.normals * problem.state_bounds, axis=1)
             normals.append(problem.normals / sizes[:, None])
             offsets.append(problem.offsets / sizes)
-        sides, ends = convert(np.vstack(normals)), np.hstack(offsets)
+        sides = convert(np.vstack(normals))
+        ends = np.hstack(offsets)
         bounds = convert(problem.control_bounds)
-        state, moved = convert(problem.initial), convert(np.zeros((n, periods * m)))
-        rows, limits = [], []
+        state = convert(problem.initial)
+        moved = convert(np.zeros((n, periods * m)))
+        rows = []
+        limits = []
         for t in range(periods):
             now = convert(np.zeros((m, periods * m)))
             now[:, t * m : (t + 1) * m] = np.diag(bounds)
             if problem.between is not None:
                 for each in problem.between[t]:
                     kept = np.isfinite(ends[t])
-                    inner, push = convert(each[:, :n]), convert(each[:, n:])
+                    inner = convert(each[:, :n])
+                    push = convert(each[:, n:])
                     rows.append(sides[kept] @ (inner @ moved + push @ now))
                     limits.append(convert(ends[t][kept]) - sides[kept] @ (inner @ state))
-            a, b = convert(problem.transition[t]), convert(problem.control[t])
-            state, moved = a @ state, a @ moved + b @ now
+            a = convert(problem.transition[t])
+            b = convert(problem.control[t])
+            state = a @ state
+            moved = a @ moved + b @ now
             kept = np.isfinite(ends[t + 1])
             rows.append(sides[kept] @ moved)
             limits.append(convert(ends[t + 1][kept]) - sides[kept] @ state)
-        self.free, self.response = state, moved
-        self.rows, self.limits = np.vstack(rows), np.concatenate(limits)
+        self.free = state
+        self.response = moved
+        self.rows = np.vstack(rows)
+        self.limits = np.concatenate(limits)
         self.group = m if problem.thrust is ThrustShape.BALL else 1
 
 
 def cone_program(given: Dense, kind: str) -> tuple[float, Floats]:
-    """Minimise the norm, or maximise a margin (deep), or minimise the bound on controls that reaches zero (bound)."""
+    """Minimise the norm, or maximise a margin (deep), or minimise the bound on controls that
+    reaches zero (bound).
+    """
     size = given.response.shape[1]
-    rows, limits, cones = [], [], []
+    rows = []
+    limits = []
+    cones = []
 
     def add(block: Floats, end: Floats, cone: Any) -> None:
         rows.append(block)
@@ -76,7 +96,8 @@ def cone_program(given: Dense, kind: str) -> tuple[float, Floats]:
     cones[-1] = clarabel.NonnegativeConeT(len(wide))
     unit = np.eye(size, size + 1)
     for first in range(0, size, given.group):
-        block, end = np.vstack([np.zeros((1, size + 1)), -unit[first : first + given.group]]), np.zeros(given.group + 1)
+        block = np.vstack([np.zeros((1, size + 1)), -unit[first : first + given.group]])
+        end = np.zeros(given.group + 1)
         end[0] = 0.0 if kind == "bound" else 1.0
         block[0, -1] = {"bound": -1.0, "deep": 1.0, "norm": 0.0}[kind]
         add(block, end, clarabel.SecondOrderConeT(given.group + 1))
@@ -103,7 +124,12 @@ def cone_program(given: Dense, kind: str) -> tuple[float, Floats]:
         for name, value in settings.items():
             setattr(chosen, name, value)
         found = clarabel.DefaultSolver(
-            csc_matrix((size + 1,) * 2), cost, csc_matrix(np.vstack(rows)), np.concatenate(limits), cones, chosen
+            csc_matrix((size + 1,) * 2),
+            cost,
+            csc_matrix(np.vstack(rows)),
+            np.concatenate(limits),
+            cones,
+            chosen,
         ).solve()
         best = float(found.x[-1]) * (scale if kind == "norm" else 1.0), np.array(found.x[:-1])
         if found.status == clarabel.SolverStatus.Solved:
@@ -112,23 +138,29 @@ def cone_program(given: Dense, kind: str) -> tuple[float, Floats]:
 
 
 def precise_min_norm(problem: ReachabilityProblem) -> tuple[float, float] | None:
-    """Return the minimum terminal norm and its rounding in doubles; None where no control is well inside.
+    """Return the minimum terminal norm and its rounding in doubles; None where no control is well
+    inside.
 
     Notes
     -----
-    A logarithmic barrier followed to a duality gap of `GAP`, in float while that does, then in Decimal.
+    A logarithmic barrier followed to a duality gap of `GAP`, in float while that does, then in
+    Decimal.
     """
     radius, start = cone_program(Dense(problem), "deep")
     if not radius > 1e-6:
         return None
     with localcontext() as context:
         context.prec = DIGITS
-        rough, exact = Dense(problem), Dense(problem, _decimals)
+        rough = Dense(problem)
+        exact = Dense(problem, _decimals)
         state = rough.free + rough.response @ start
         t = 2.0 * float(np.linalg.norm(state)) + 1e-3
-        smallest = 1e-15 * (float(np.abs(rough.free).max()) + float(np.abs(rough.response).sum(axis=1).max()))
+        smallest = 1e-15 * (
+            float(np.abs(rough.free).max()) + float(np.abs(rough.response).sum(axis=1).max())
+        )
         count = 2.0 + len(rough.limits) + 2.0 * len(start) / rough.group
-        weight, point = t, np.append(start, t)
+        weight = t
+        point = np.append(start, t)
         while weight > 1e-5 * t:
             point = _centred(rough, point, weight)
             weight *= 0.2
@@ -139,7 +171,9 @@ def precise_min_norm(problem: ReachabilityProblem) -> tuple[float, float] | None
         value = float(numbers[-1])
         state = np.array(exact.free + exact.response @ numbers[:-1], dtype=float)
         along = np.abs(state) / max(float(np.linalg.norm(state)), 1e-300)
-        rounding = float(along @ (np.abs(rough.free) + np.abs(rough.response).sum(axis=1))) * 2.0**-52
+        rounding = (
+            float(along @ (np.abs(rough.free) + np.abs(rough.response).sum(axis=1))) * 2.0**-52
+        )
         return (value if value > smallest else 0.0), rounding
 
 
@@ -162,16 +196,21 @@ def _centred(given: Dense, point: Numbers, weight: Any) -> Numbers:
 
 
 def _inside(given: Dense, point: Numbers) -> bool:
-    v, t = point[:-1], point[-1]
+    v = point[:-1]
+    t = point[-1]
     y = given.free + given.response @ v
     thrust = (v.reshape(-1, given.group) ** 2).sum(axis=1)
-    return bool(t > 0 and t * t > y @ y and (given.limits - given.rows @ v).min() > 0 and thrust.max() < 1)
+    return bool(
+        t > 0 and t * t > y @ y and (given.limits - given.rows @ v).min() > 0 and thrust.max() < 1
+    )
 
 
 def _slopes(given: Dense, point: Numbers, weight: Any) -> tuple[Numbers, Numbers]:
-    v, t = point[:-1], point[-1]
+    v = point[:-1]
+    t = point[-1]
     size = len(v)
-    gradient, hessian = point * 0, np.outer(point, point) * 0
+    gradient = point * 0
+    hessian = np.outer(point, point) * 0
     y = given.free + given.response @ v
     room = t * t - y @ y
     slope = np.append(-2 * (given.response.T @ y), 2 * t) / room
@@ -194,11 +233,14 @@ def _slopes(given: Dense, point: Numbers, weight: Any) -> tuple[Numbers, Numbers
 
 
 def _solved(matrix: Numbers, right: Numbers) -> Numbers:
-    """Solve a positive definite system by elimination, in whatever numbers it has, after a scaling of its diagonal."""
+    """Solve a positive definite system by elimination, in whatever numbers it has, after a scaling
+    of its diagonal.
+    """
     if matrix.dtype == float:
         scale = 1.0 / np.sqrt(np.diag(matrix))
         return np.asarray(scale * np.linalg.solve(matrix * np.outer(scale, scale), scale * right))
-    matrix, right = matrix.copy(), right.copy()
+    matrix = matrix.copy()
+    right = right.copy()
     count = len(right)
     for k in range(count):
         factors = matrix[k + 1 :, k] / matrix[k, k]

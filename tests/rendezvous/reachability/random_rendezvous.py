@@ -25,7 +25,9 @@ GAPS = (0.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, -1e-9)
 
 
 def random_rendezvous(seed: int) -> ReachabilityProblem:
-    """A problem that may or may not reach zero, or have controls that keep its constraints at all."""
+    """A problem that may or may not reach zero, or have controls that keep its constraints at
+    all.
+    """
     generator = np.random.default_rng([2021, seed])
     while True:
         problem = _drawn(generator)
@@ -37,10 +39,15 @@ def _drawn(generator: np.random.Generator) -> ReachabilityProblem | None:
     eccentricity = float(generator.choice([0.0, 0.1, generator.uniform(0.0, 0.9)]))
     perigee_m = float(generator.choice([6.8e6, 7.6e6, 9e6, 2e7, 4.2164e7]))
     orbit = EllipticOrbit.of_size(
-        perigee_m / (1.0 - eccentricity), eccentricity, MU_M3_S2, float(generator.uniform(-np.pi, np.pi))
+        perigee_m / (1.0 - eccentricity),
+        eccentricity,
+        MU_M3_S2,
+        float(generator.uniform(-np.pi, np.pi)),
     )
     periods = int(generator.choice([2, 3, 4, 4, 5, 6, 8, 12, 16]))
-    period_s = float(generator.choice([60.0, 180.0, np.exp(generator.uniform(np.log(30.0), np.log(600.0)))]))
+    period_s = float(
+        generator.choice([60.0, 180.0, np.exp(generator.uniform(np.log(30.0), np.log(600.0)))])
+    )
     push = float(generator.choice([0.15, 1.0, 0.01]))
     motion = motion_of(orbit, MotionModel(generator.choice(["frozen", "time-varying"])))
     transition, control = discretised(motion, periods, period_s, push)

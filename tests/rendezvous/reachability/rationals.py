@@ -41,7 +41,9 @@ class RationalSet:
 
 
 def rational_hull(points: Floats) -> RationalSet:
-    """Return the exact convex hull of points, shape (k, n), by the double description of the library PPL."""
+    """Return the exact convex hull of points, shape (k, n), by the double description of the
+    library PPL.
+    """
     return rounded(polyhedron_of([[Fraction(float(value)) for value in point] for point in points]))
 
 
@@ -86,14 +88,17 @@ def rational_intersection(normals: Floats, offsets: Floats) -> RationalSet:
 def rational_sets(block: Block) -> tuple[list[RationalSet], list[RationalSet]]:
     """Return the exact forward sets of a block and its exact tube to zero, at t = 0..T.
 
-    Thrust is in a box and constraints hold at whole periods; floats are taken as the rationals they are.
+    Thrust is in a box and constraints hold at whole periods; floats are taken as the rationals they
+    are.
 
     Notes
     -----
-    Forward: states, controls and next states as one polyhedron, projected on the last. Backward: projected on the
-    first. No inverse of A, no rounding; numbers grow by some 50 binary digits a period.
+    Forward: states, controls and next states as one polyhedron, projected on the last. Backward:
+    projected on the first. No inverse of A, no rounding; numbers grow by some 50 binary digits a
+    period.
     """
-    size, group = block.size, len(block.controls)
+    size = block.size
+    group = len(block.controls)
     current = ppl.C_Polyhedron(size, "universe")
     _fix(current, block.initial, range(size))
     forward = [current]
@@ -115,12 +120,17 @@ def rational_sets(block: Block) -> tuple[list[RationalSet], list[RationalSet]]:
         both = ppl.C_Polyhedron(step)
         both.intersection_assign(forward[t])
         tube.append(both)
-    return [rounded(polyhedron) for polyhedron in forward], [rounded(polyhedron) for polyhedron in reversed(tube)]
+    return [rounded(polyhedron) for polyhedron in forward], [
+        rounded(polyhedron) for polyhedron in reversed(tube)
+    ]
 
 
 def _step(block: Block, period: int, before: int, after: int) -> ppl.C_Polyhedron:
-    """States (first index: before), controls and next states (after) of a period, states unconstrained."""
-    size, group = block.size, len(block.controls)
+    """States (first index: before), controls and next states (after) of a period, states
+    unconstrained.
+    """
+    size = block.size
+    group = len(block.controls)
     polyhedron = ppl.C_Polyhedron(2 * size + group, "universe")
     for j in range(group):
         polyhedron.add_constraint(ppl.Variable(before + size + j) <= 1)
@@ -128,7 +138,9 @@ def _step(block: Block, period: int, before: int, after: int) -> ppl.C_Polyhedro
     for i in range(size):
         row = np.concatenate([block.transition[period, i], block.control[period, i]])
         numerators, divisor = _whole([Fraction(float(value)) for value in row])
-        polyhedron.add_constraint(divisor * ppl.Variable(after + i) == _expression(numerators, before))
+        polyhedron.add_constraint(
+            divisor * ppl.Variable(after + i) == _expression(numerators, before)
+        )
     return polyhedron
 
 
@@ -144,7 +156,9 @@ def _cut(polyhedron: ppl.C_Polyhedron, normals: Floats, offsets: Floats, axes: r
     for normal, offset in zip(normals, offsets, strict=True):
         if np.isfinite(offset):
             numerators, _ = _whole([Fraction(float(value)) for value in (*normal, offset)])
-            total = sum((n * ppl.Variable(axis) for n, axis in zip(numerators, axes, strict=False)), start=0)
+            total = sum(
+                (n * ppl.Variable(axis) for n, axis in zip(numerators, axes, strict=False)), start=0
+            )
             polyhedron.add_constraint(total <= numerators[-1])
 
 

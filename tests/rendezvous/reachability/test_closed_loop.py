@@ -16,16 +16,23 @@ def truth(orbit: EllipticOrbit) -> Callable[[int, Floats, Floats], Floats]:
     motion = NonlinearMotion(orbit, 1e7)
 
     def fly(period: int, state: Floats, control: Floats) -> Floats:
-        return np.asarray(motion.paths(180.0 * period, state, 0.15 * control, [180.0 * (period + 1)])[0, 0])
+        return np.asarray(
+            motion.paths(180.0 * period, state, 0.15 * control, [180.0 * (period + 1)])[0, 0]
+        )
 
     return fly
 
 
 @pytest.mark.parametrize(
-    ("model", "relative", "plain"), [(MotionModel.TIME_VARYING, 0.00577, 0.000185), (MotionModel.FROZEN, 2.825, 1.266)]
+    ("model", "relative", "plain"),
+    [(MotionModel.TIME_VARYING, 0.00577, 0.000185), (MotionModel.FROZEN, 2.825, 1.266)],
 )
 def test_replanning_on_the_nonlinear_truth(
-    paper: Paper, truth: Callable[[int, Floats, Floats], Floats], model: MotionModel, relative: float, plain: float
+    paper: Paper,
+    truth: Callable[[int, Floats, Floats], Floats],
+    model: MotionModel,
+    relative: float,
+    plain: float,
 ) -> None:
     problem = paper(model)
     # The published figures are of plans whose last period minimises states divided by their bounds.
@@ -41,7 +48,10 @@ def test_replanning_on_the_nonlinear_truth(
 
 def test_on_its_own_model_replanning_keeps_the_first_plan(paper: Paper) -> None:
     problem = paper()
-    own = replan(problem, lambda t, state, control: problem.transition[t] @ state + problem.control[t] @ control)
+    own = replan(
+        problem,
+        lambda t, state, control: problem.transition[t] @ state + problem.control[t] @ control,
+    )
     assert own.miss < 1e-9
     assert (own.controls**2).sum() == pytest.approx(0.14323052820, abs=1e-9)
 
@@ -52,7 +62,9 @@ def test_noise_is_flown_through_with_bounds_relaxed_where_they_must_be(
     generator = np.random.default_rng(3)
     noise = np.array([1.0] * 3 + [0.01] * 3)
     flight = replan(
-        paper(MotionModel.TIME_VARYING), truth, lambda _, state: state + noise * generator.standard_normal(6)
+        paper(MotionModel.TIME_VARYING),
+        truth,
+        lambda _, state: state + noise * generator.standard_normal(6),
     )
     assert 0.01 < flight.miss < 50.0
     assert (flight.relaxations >= 0.0).all()

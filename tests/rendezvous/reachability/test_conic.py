@@ -9,7 +9,9 @@ from infoset.rendezvous.reachability.conic import ConeProgram, NoSolutionError
 
 
 def program_with_solution() -> tuple[ConeProgram, np.ndarray, np.ndarray]:
-    """Minimise the first of 40 states that are linear in a control u with |u| <= 1, with its exact solution."""
+    """Minimise the first of 40 states that are linear in a control u with |u| <= 1, with its exact
+    solution.
+    """
     generator = np.random.default_rng(5)
     response = 100.0 * generator.standard_normal((40, 3))
     cost = np.zeros(43)
@@ -25,7 +27,8 @@ def program_with_solution() -> tuple[ConeProgram, np.ndarray, np.ndarray]:
 def test_multipliers_with_a_small_residual_prove_a_solution() -> None:
     program, point, exact = program_with_solution()
     assert program.violation_and_gap(point, exact)[1] < 1e-13
-    # Errors of a solver's tolerance, times 43 variables of sizes up to some hundred, are a large gap.
+    # Errors of a solver's tolerance, times 43 variables of sizes up to some hundred, are a large
+    # gap.
     noisy = exact + 1e-9 * np.random.default_rng(6).standard_normal(len(exact))
     assert program.violation_and_gap(point, noisy)[1] > 1e-7
     program.checked(point, noisy)

@@ -1,4 +1,6 @@
-"""The minimum terminal norm against programs of its own kind and forty digits, from well inside to the edges."""
+"""The minimum terminal norm against programs of its own kind and forty digits, from well inside to
+the edges.
+"""
 
 from __future__ import annotations
 
@@ -33,14 +35,25 @@ from .high_precision import Dense, cone_program, precise_min_norm
 from .random_rendezvous import random_rendezvous
 
 CASES = Path(__file__).parent / "cases"
-SELECTIONS = (minimum_energy, minimum_l1, minimum_norms, minimum_peak, chebyshev_centre, analytic_centre)
+SELECTIONS = (
+    minimum_energy,
+    minimum_l1,
+    minimum_norms,
+    minimum_peak,
+    chebyshev_centre,
+    analytic_centre,
+)
 RELATIVE = 1e-6
 ZERO, ABSOLUTE = 1e-11, 1e-12
-"""Of what controls can do: misses below the first are zero, and the second is the error of small ones."""
+"""Of what controls can do: misses below the first are zero, and the second is the error of small
+ones.
+"""
 
 
 def size_of(problem: ReachabilityProblem) -> float:
-    """How far controls and free motion may bring a terminal state: doubles know it to so many parts in 1e16."""
+    """How far controls and free motion may bring a terminal state: doubles know it to so many parts
+    in 1e16.
+    """
     given = Dense(problem)
     return float(np.abs(given.free).max() + np.abs(given.response).sum(axis=1).max())
 
@@ -58,7 +71,9 @@ def assert_precise(problem: ReachabilityProblem, miss: float) -> bool:
     return True
 
 
-@pytest.mark.parametrize("name", ["near_0.172", "near_0.1726", "s2_1_193", "s2_2_133", "s2_2_26", "s2_2_68"])
+@pytest.mark.parametrize(
+    "name", ["near_0.172", "near_0.1726", "s2_1_193", "s2_2_133", "s2_2_26", "s2_2_68"]
+)
 def test_misses_that_were_wrong_or_refused(name: str) -> None:
     problem = load_problem(CASES / f"{name}.toml").problem
     miss = solve(problem).optimal.miss
@@ -76,7 +91,9 @@ def test_misses_with_thrust_in_a_ball_to_forty_digits(name: str) -> None:
 
 @pytest.mark.parametrize("thrust", list(ThrustShape))
 @pytest.mark.parametrize("gap", [1e-1, 1e-5, 1e-9])
-def test_just_under_the_min_bound_that_reaches_zero(paper: Paper, thrust: ThrustShape, gap: float) -> None:
+def test_just_under_the_min_bound_that_reaches_zero(
+    paper: Paper, thrust: ThrustShape, gap: float
+) -> None:
     problem = paper(periods=3, thrust=thrust)
     minimum = cone_program(Dense(problem), "bound")[0]
     below = replace(problem, control_bounds=np.full(3, minimum * (1.0 - gap)))
@@ -95,12 +112,17 @@ def test_flat_sets_of_optimal_controls(paper: Paper, bound: float) -> None:
     for select in SELECTIONS:
         control = select(optimal)
         assert float(optimal.excess(control)) < 1e-9
-        assert float(np.linalg.norm(problem.run(control)[-1])) == pytest.approx(optimal.miss, rel=1e-9)
+        assert float(np.linalg.norm(problem.run(control)[-1])) == pytest.approx(
+            optimal.miss, rel=1e-9
+        )
 
 
 def test_every_dimension_down_to_a_point(paper: Paper) -> None:
-    """At the minimum bound that reaches zero the set loses dimensions; with fewer periods it is a point."""
-    problem, dimensions = paper(), []
+    """At the minimum bound that reaches zero the set loses dimensions; with fewer periods it is a
+    point.
+    """
+    problem = paper()
+    dimensions = []
     for shape in ThrustShape:
         given = replace(problem, thrust=shape)
         for factor in (1.0, cone_program(Dense(given), "bound")[0]):
@@ -127,7 +149,9 @@ def test_axes_without_thrust(paper: Paper, axes: tuple[int, ...], thrust: Thrust
     assert optimal.miss == pytest.approx(cone_program(Dense(still), "norm")[0], rel=RELATIVE)
     for select in SELECTIONS:
         controls = select(optimal)
-        assert float(optimal.excess(controls)) < (1e-9 if thrust is ThrustShape.BOX else CONE_TOLERANCE)
+        assert float(optimal.excess(controls)) < (
+            1e-9 if thrust is ThrustShape.BOX else CONE_TOLERANCE
+        )
     if thrust is ThrustShape.BOX:
         assert solve(still).route is Route.EXACT  # its bounds agree with those of programs
 

@@ -1,4 +1,5 @@
-"""The numbers of the paper and of its parameters as identified: acceptance/reachability.json, copied.
+"""The numbers of the paper and of its parameters as identified: acceptance/reachability.json,
+copied.
 
 The numbers are in the paper's axes, problems and solutions in Hill's.
 """
@@ -59,13 +60,24 @@ def exact(paper: Paper) -> Solution:
 def test_matrices(paper: Paper) -> None:
     problem = paper()
     # Rows and columns in the paper's axes.
-    a, b = (to_paper(to_paper(matrix).T).T for matrix in (problem.transition[0], problem.control[0]))
-    expected = [1.0008801595082484, 0.002552748205224468, 0, 177.71697310723644, 25.082847920872695, 0]
+    a, b = (
+        to_paper(to_paper(matrix).T).T for matrix in (problem.transition[0], problem.control[0])
+    )
+    expected = [
+        1.0008801595082484,
+        0.002552748205224468,
+        0,
+        177.71697310723644,
+        25.082847920872695,
+        0,
+    ]
     np.testing.assert_allclose(a[0], expected, rtol=1e-11, atol=1e-13)
     assert a[2, 2] == pytest.approx(0.9911552814183396, rel=1e-12)
     assert a[2, 5] == pytest.approx(179.46900330815475, rel=1e-12)
     found = [b[0, 0], b[0, 1], b[5, 2]]
-    np.testing.assert_allclose(found, [2414.5844342853457, 225.9057563126505, 26.920350496223215], rtol=1e-11)
+    np.testing.assert_allclose(
+        found, [2414.5844342853457, 225.9057563126505, 26.920350496223215], rtol=1e-11
+    )
 
 
 def ends_in_paper(bounds: Floats) -> Floats:
@@ -75,7 +87,8 @@ def ends_in_paper(bounds: Floats) -> Floats:
 
 def test_bounds_of_forward_sets_and_tube(exact: Solution) -> None:
     scale = exact.problem.state_bounds[:, None]
-    forward, tube = exact.sets.bounds(SetKind.FORWARD), exact.sets.bounds(SetKind.TUBE)
+    forward = exact.sets.bounds(SetKind.FORWARD)
+    tube = exact.sets.bounds(SetKind.TUBE)
     for t, expected in FORWARD.items():
         assert np.abs((ends_in_paper(forward[t]) - expected) / scale).max() < 1e-9
     for t, expected in TUBE.items():
@@ -85,7 +98,12 @@ def test_bounds_of_forward_sets_and_tube(exact: Solution) -> None:
 
 def test_counts(exact: Solution, paper: Paper) -> None:
     found = [exact.sets.counts(SetKind.FORWARD, t) for t in range(1, 5)]
-    assert found == [SetCounts(10, 7, 3), SetCounts(130, 15, 6), SetCounts(100, 15, 6), SetCounts(96, 15, 6)]
+    assert found == [
+        SetCounts(10, 7, 3),
+        SetCounts(130, 15, 6),
+        SetCounts(100, 15, 6),
+        SetCounts(96, 15, 6),
+    ]
     assert exact.sets.counts(SetKind.TUBE, 2) == SetCounts(27, 9, 6)
     dimensions = [exact.sets.counts(SetKind.TUBE, t) for t in (1, 3)]
     assert [each.dimension for each in dimensions if each is not None] == [3, 3]
@@ -106,9 +124,13 @@ def test_min_energy_l1_and_peak(exact: Solution) -> None:
     assert effort(minimum_energy(exact.optimal)).energy == printed("0.14323052820")
     sparse = minimum_l1(exact.optimal)
     assert effort(sparse).l1 == printed("0.88770050948")
-    np.testing.assert_allclose(to_paper(sparse[0]), [-0.1255926124, 0.0371598443, -0.2619971202], atol=1e-10)
+    np.testing.assert_allclose(
+        to_paper(sparse[0]), [-0.1255926124, 0.0371598443, -0.2619971202], atol=1e-10
+    )
     np.testing.assert_allclose(sparse[1:3], 0.0, atol=1e-10)
-    np.testing.assert_allclose(to_paper(sparse[3]), [0.0891976706, -0.2056122151, 0.1681410469], atol=1e-10)
+    np.testing.assert_allclose(
+        to_paper(sparse[3]), [0.0891976706, -0.2056122151, 0.1681410469], atol=1e-10
+    )
     assert effort(minimum_peak(exact.optimal)).peak == printed("0.17263864653")
     # With both ends only, the sum of norms has the same minimiser.
     np.testing.assert_allclose(minimum_norms(exact.optimal), sparse, atol=1e-6)
@@ -116,9 +138,14 @@ def test_min_energy_l1_and_peak(exact: Solution) -> None:
 
 @pytest.mark.parametrize(
     ("model", "energy", "miss"),
-    [(MotionModel.FROZEN, 0.14323052820, 1.668028), (MotionModel.TIME_VARYING, 0.143250218, 0.212159)],
+    [
+        (MotionModel.FROZEN, 0.14323052820, 1.668028),
+        (MotionModel.TIME_VARYING, 0.143250218, 0.212159),
+    ],
 )
-def test_nonlinear_misses(paper: Paper, orbit: EllipticOrbit, model: MotionModel, energy: float, miss: float) -> None:
+def test_nonlinear_misses(
+    paper: Paper, orbit: EllipticOrbit, model: MotionModel, energy: float, miss: float
+) -> None:
     problem = paper(model)
     control = minimum_energy(solve(problem).optimal)
     assert effort(control).energy == pytest.approx(energy, abs=1e-9)

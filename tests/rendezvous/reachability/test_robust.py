@@ -25,10 +25,16 @@ def pushes(problem: ReachabilityProblem, acceleration_m_s2: float) -> Floats:
     return np.asarray(problem.control * (acceleration_m_s2 / 0.15))
 
 
-def flown(problem: ReachabilityProblem, disturbance: Floats, controls: Floats, moves: Floats) -> Floats:
+def flown(
+    problem: ReachabilityProblem, disturbance: Floats, controls: Floats, moves: Floats
+) -> Floats:
     states = [problem.initial]
     for t in range(problem.periods):
-        states.append(problem.transition[t] @ states[-1] + problem.control[t] @ controls[t] + disturbance[t] @ moves[t])
+        states.append(
+            problem.transition[t] @ states[-1]
+            + problem.control[t] @ controls[t]
+            + disturbance[t] @ moves[t]
+        )
     return np.array(states)
 
 
@@ -87,7 +93,9 @@ def test_the_terminal_spread_is_what_the_last_disturbance_does(paper: Paper) -> 
     assert (spread / problem.state_bounds).sum() < 0.6 * (fixed / problem.state_bounds).sum()
 
 
-def test_a_plan_that_is_not_optimal_is_refused(paper: Paper, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_plan_that_is_not_optimal_is_refused(
+    paper: Paper, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def shifted(*arguments: Any, **options: Any) -> Any:
         result = linprog(*arguments, **options)
         result.x = result.x + 1e-6

@@ -1,4 +1,6 @@
-"""Both routes, and exact rationals, on random systems; the set of optimal controls and its members."""
+"""Both routes, and exact rationals, on random systems; the set of optimal controls and its
+members.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +43,9 @@ from .rationals import rational_sets
 
 Random = Callable[[int, int], ReachabilityProblem]
 SHARED = [HealthCheck.function_scoped_fixture]
-needs_ppl = pytest.mark.skipif(find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'")
+needs_ppl = pytest.mark.skipif(
+    find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'"
+)
 
 
 def blocks_of(problem: ReachabilityProblem) -> tuple[BlockOptimum, ...]:
@@ -56,7 +60,8 @@ def blocks_of(problem: ReachabilityProblem) -> tuple[BlockOptimum, ...]:
 def test_routes_agree_with_each_other(random_problem: Random, seed: int, size: int) -> None:
     for optimum in blocks_of(random_problem(seed, size)):
         try:
-            exact, lifted = exact_sets(optimum), LiftedSets(optimum)
+            exact = exact_sets(optimum)
+            lifted = LiftedSets(optimum)
         except (TooManyVerticesError, ThinSetError):
             reject()
         for kind in SetKind:
@@ -66,7 +71,9 @@ def test_routes_agree_with_each_other(random_problem: Random, seed: int, size: i
 @needs_ppl
 @settings(max_examples=25, deadline=None, suppress_health_check=SHARED)
 @given(seed=st.integers(0, 10**6), size=st.integers(2, 5))
-def test_exact_route_has_the_vertices_of_exact_rationals(random_problem: Random, seed: int, size: int) -> None:
+def test_exact_route_has_the_vertices_of_exact_rationals(
+    random_problem: Random, seed: int, size: int
+) -> None:
     for optimum in blocks_of(random_problem(seed, size)):
         try:
             exact = exact_sets(optimum)
@@ -94,7 +101,8 @@ def test_a_thousand_members_are_optimal_and_a_thousand_others_are_not(
     assert np.abs(norms - optimal.miss).max() < 1e-7
     assert float(problem.excess(members).max()) < 1e-9
     assert float(optimal.excess(members).max()) < 1e-9
-    # Controls outside: members moved across the set's own affine hull, and members pushed out of it.
+    # Controls outside: members moved across the set's own affine hull, and members pushed out of
+    # it.
     moved = members + 1e-3 * generator.standard_normal(members.shape)
     centre = chebyshev_centre(optimal)
     pushed = centre + 40.0 * (members - centre)
@@ -107,7 +115,8 @@ def test_a_thousand_members_are_optimal_and_a_thousand_others_are_not(
 
 def test_samples_spread_over_the_set(paper: Paper) -> None:
     optimal = solve(paper()).optimal
-    corners, drawn = vertices(optimal), samples(optimal, 1500, np.random.default_rng(0))
+    corners = vertices(optimal)
+    drawn = samples(optimal, 1500, np.random.default_rng(0))
     assert len(corners) == 27
     assert float(optimal.excess(corners).max()) < 1e-9
     ranges = optimal.ranges()
@@ -139,21 +148,30 @@ def test_each_choice_is_best_of_a_thousand(paper: Paper, thrust: ThrustShape) ->
             others = samples(optimal, 1000, np.random.default_rng(2))
             assert own <= float(np.linalg.norm(others, axis=2).max(axis=1).min())
         else:
-            assert getattr(effort(control), name) <= min(getattr(each, name) for each in drawn) + 1e-9
+            assert (
+                getattr(effort(control), name) <= min(getattr(each, name) for each in drawn) + 1e-9
+            )
     for centre in (chebyshev_centre(optimal), analytic_centre(optimal)):
-        assert float(optimal.excess(centre)) < (1e-12 if thrust is ThrustShape.BOX else CONE_TOLERANCE)
+        assert float(optimal.excess(centre)) < (
+            1e-12 if thrust is ThrustShape.BOX else CONE_TOLERANCE
+        )
 
 
 def test_analytic_centre_has_the_max_product_of_slacks(paper: Paper) -> None:
     optimal = solve(paper()).optimal
-    space, centre = optimal.space, analytic_centre(optimal).ravel()
+    space = optimal.space
+    centre = analytic_centre(optimal).ravel()
 
     def product(control: Floats) -> float:
-        point = np.linalg.lstsq(space.control_response, control / optimal.scale - space.control_free, rcond=None)[0]
+        point = np.linalg.lstsq(
+            space.control_response, control / optimal.scale - space.control_free, rcond=None
+        )[0]
         return float(np.log(space.limits - space.rows @ point).sum())
 
     best = product(centre)
-    assert all(product(each.ravel()) < best for each in samples(optimal, 200, np.random.default_rng(0)))
+    assert all(
+        product(each.ravel()) < best for each in samples(optimal, 200, np.random.default_rng(0))
+    )
 
 
 def test_reasons_for_the_lifted_route(paper: Paper, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -172,7 +190,11 @@ def test_reasons_for_the_lifted_route(paper: Paper, monkeypatch: pytest.MonkeyPa
 def test_projections_of_both_routes(paper: Paper) -> None:
     exact = solve(paper())
     both = [exact.sets, ReachableSets(exact.problem, tuple(map(LiftedSets, exact.optimal.blocks)))]
-    for kind, t, axes in ((SetKind.TUBE, 2, (0, 1)), (SetKind.FORWARD, 3, (0, 1, 2)), (SetKind.TUBE, 1, (3, 4, 5))):
+    for kind, t, axes in (
+        (SetKind.TUBE, 2, (0, 1)),
+        (SetKind.FORWARD, 3, (0, 1, 2)),
+        (SetKind.TUBE, 1, (3, 4, 5)),
+    ):
         one, other = (sets.projection(kind, t, axes) for sets in both)
         seen = np.random.default_rng(0).standard_normal((40, len(axes)))
         gap = np.abs((seen @ one.T).max(axis=1) - (seen @ other.T).max(axis=1))

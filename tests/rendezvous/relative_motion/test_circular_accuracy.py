@@ -16,7 +16,15 @@ ANGLES = (1e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.1, 0.5, 0.999, 1.0, 1.7, 1.999999, 2.0
 def exact(theta: float) -> tuple[mp.matrix, mp.matrix]:
     """Transition and Gramian for unit rate, by Van Loan's block exponential in 50 digits."""
     matrix = mp.zeros(6)
-    for row, column, value in ((0, 3, 1), (1, 4, 1), (2, 5, 1), (3, 0, 3), (3, 4, 2), (4, 3, -2), (5, 2, -1)):
+    for row, column, value in (
+        (0, 3, 1),
+        (1, 4, 1),
+        (2, 5, 1),
+        (3, 0, 3),
+        (3, 4, 2),
+        (4, 3, -2),
+        (5, 2, -1),
+    ):
         matrix[row, column] = value
     block = mp.zeros(12)
     for row in range(6):
@@ -47,4 +55,7 @@ def test_gramian_and_transition_keep_thirteen_digits(theta: float) -> None:
         for row in range(6):
             for column in range(6):
                 size = max(abs(transition[row, column]), mp.mpf("1e-3") * min(1, theta**3))
-                assert abs(mp.mpf(float(reached[row, column])) - transition[row, column]) < 1e-12 * size
+                assert (
+                    abs(mp.mpf(float(reached[row, column])) - transition[row, column])
+                    < 1e-12 * size
+                )

@@ -1,4 +1,6 @@
-"""Motion about an elliptic orbit against differences of Kepler's motion in 50 digits, up to e = 0.9999."""
+"""Motion about an elliptic orbit against differences of Kepler's motion in 50 digits, up to e =
+0.9999.
+"""
 
 from __future__ import annotations
 
@@ -32,16 +34,22 @@ def plus(a: Vector, b: Vector, factor: int = 1) -> Vector:
 
 def coasted(r: Vector, v: Vector, time: mp.mpf) -> tuple[Vector, Vector]:
     """Kepler's motion along an ellipse with mu = 1."""
-    radius, along = norm(r), mp.fdot(r, v)
+    radius = norm(r)
+    along = mp.fdot(r, v)
     axis = 1 / (2 / radius - mp.fdot(v, v))
-    cosine, sine = 1 - radius / axis, along / mp.sqrt(axis)
-    e, first = mp.sqrt(cosine**2 + sine**2), mp.atan2(sine, cosine)
+    cosine = 1 - radius / axis
+    sine = along / mp.sqrt(axis)
+    e = mp.sqrt(cosine**2 + sine**2)
+    first = mp.atan2(sine, cosine)
     mean = first - sine + time / axis**1.5
-    low, high = mean - 1, mean + 1
+    low = mean - 1
+    high = mean + 1
     for _ in range(12):
         middle = (low + high) / 2
         low, high = (middle, high) if middle - e * mp.sin(middle) < mean else (low, middle)
-    last = mp.findroot(lambda x: x - e * mp.sin(x) - mean, (low, high), solver="anderson", tol=mp.mpf(10) ** -90)
+    last = mp.findroot(
+        lambda x: x - e * mp.sin(x) - mean, (low, high), solver="anderson", tol=mp.mpf(10) ** -90
+    )
     passed = last - first
     later = axis * (1 - cosine * mp.cos(passed) + sine * mp.sin(passed))
     f = 1 - axis / radius * (1 - mp.cos(passed))
@@ -62,15 +70,25 @@ def hill_axes(r: Vector, v: Vector) -> tuple[list[Vector], Vector]:
 
 def at_anomaly(eccentricity: float, anomaly: float) -> tuple[Vector, Vector]:
     """A state on an ellipse of semi-major axis 1, mu = 1."""
-    e, nu = mp.mpf(eccentricity), mp.mpf(anomaly)
+    e = mp.mpf(eccentricity)
+    nu = mp.mpf(anomaly)
     latus_rectum = 1 - e * e
-    radius, speed = latus_rectum / (1 + e * mp.cos(nu)), 1 / mp.sqrt(latus_rectum)
+    radius = latus_rectum / (1 + e * mp.cos(nu))
+    speed = 1 / mp.sqrt(latus_rectum)
     zero = mp.mpf(0)
-    return [radius * mp.cos(nu), radius * mp.sin(nu), zero], [-speed * mp.sin(nu), speed * (e + mp.cos(nu)), zero]
+    return [radius * mp.cos(nu), radius * mp.sin(nu), zero], [
+        -speed * mp.sin(nu),
+        speed * (e + mp.cos(nu)),
+        zero,
+    ]
 
 
-def exact_transition(eccentricity: float, anomaly: float, start: float, end: float, columns_from: int = 0) -> Floats:
-    """Last columns of the transition between two times after the anomaly, by central differences of Kepler's motion."""
+def exact_transition(
+    eccentricity: float, anomaly: float, start: float, end: float, columns_from: int = 0
+) -> Floats:
+    """Last columns of the transition between two times after the anomaly, by central differences of
+    Kepler's motion.
+    """
     r, v = coasted(*at_anomaly(eccentricity, anomaly), mp.mpf(start))
     axes, turning = hill_axes(r, v)
     r_end, v_end = coasted(r, v, mp.mpf(end) - mp.mpf(start))
@@ -81,10 +99,14 @@ def exact_transition(eccentricity: float, anomaly: float, start: float, end: flo
         shift = [STEP * each for each in axis]
         zero = [mp.mpf(0)] * 3
         dr, dv = (shift, cross(turning, shift)) if component < 3 else (zero, shift)
-        ahead, behind = (coasted(plus(r, dr, s), plus(v, dv, s), mp.mpf(end) - mp.mpf(start)) for s in (1, -1))
+        ahead, behind = (
+            coasted(plus(r, dr, s), plus(v, dv, s), mp.mpf(end) - mp.mpf(start)) for s in (1, -1)
+        )
         apart = plus(ahead[0], behind[0], -1)
         speed = plus(plus(ahead[1], behind[1], -1), cross(turning_end, apart), -1)
-        columns.append([mp.fdot(each, part) / (2 * STEP) for part in (apart, speed) for each in axes_end])
+        columns.append(
+            [mp.fdot(each, part) / (2 * STEP) for part in (apart, speed) for each in axes_end]
+        )
     return np.array(columns, dtype=float).T
 
 
@@ -95,8 +117,9 @@ def radius_at(eccentricity: float, anomaly: float, time: float) -> float:
 def tolerance(eccentricity: float, anomaly: float, duration: float) -> float:
     """Relative error of a transition that rounding explains, for any order of operations.
 
-    The constants of the motion have the factor 1 / (1 - e^2), and 100 roundings of them are allowed. An end of the
-    interval is shifted by the rounding of the time, which is multiplied by the rate of the motion there, r^(-3/2).
+    The constants of the motion have the factor 1 / (1 - e^2), and 100 roundings of them are
+    allowed. An end of the interval is shifted by the rounding of the time, which is multiplied by
+    the rate of the motion there, r^(-3/2).
     """
     radius = min(radius_at(eccentricity, anomaly, time) for time in (0.0, duration))
     return float(EPSILON * (100.0 / (1.0 - eccentricity**2) + 8.0 * (1.0 + duration) / radius**1.5))
@@ -109,7 +132,8 @@ def far_apart(found: Floats, exact: Floats, weight: Floats) -> float:
 @pytest.mark.parametrize(
     "spans",
     [
-        # A difference of large terms, and the rounding of the two anomalies, left 7 digits of these.
+        # A difference of large terms, and the rounding of the two anomalies, left 7 digits of
+        # these.
         (1e-7, 1e-5),
         (1e-4, 1e-2),
         (0.01, 1.0),
@@ -118,7 +142,9 @@ def far_apart(found: Floats, exact: Floats, weight: Floats) -> float:
     ],
 )
 @pytest.mark.parametrize("eccentricity", [0.0, 0.1, 0.5, 0.9, 0.95, 0.99, 0.999, 0.9999])
-def test_transitions_are_exact_but_for_rounding(eccentricity: float, spans: tuple[float, float]) -> None:
+def test_transitions_are_exact_but_for_rounding(
+    eccentricity: float, spans: tuple[float, float]
+) -> None:
     # Products of panels in the same variables are wrong by 2e-11 at 0.95 and 3e-9 at 0.99.
     random = np.random.default_rng([int(1e4 * eccentricity), int(1e7 * spans[0])])
     anomaly = float(random.uniform(-3.1, 3.1))
@@ -135,12 +161,15 @@ def test_transitions_are_exact_but_for_rounding(eccentricity: float, spans: tupl
 
 @pytest.mark.parametrize("duration", [1e-6, 0.3, 5.0, 40.0])
 @pytest.mark.parametrize("eccentricity", [0.0, 0.6, 0.99])
-def test_a_transition_back_is_the_inverse_of_the_one_forward(eccentricity: float, duration: float) -> None:
+def test_a_transition_back_is_the_inverse_of_the_one_forward(
+    eccentricity: float, duration: float
+) -> None:
     with mp.workdps(50):
         of_each = tolerance(eccentricity, 0.4, duration)
     motion = TschaunerHempel(EllipticOrbit(1.0, eccentricity, 0.4))
 
-    forward, back = motion.transition(0.0, duration), motion.transition(duration, 0.0)
+    forward = motion.transition(0.0, duration)
+    back = motion.transition(duration, 0.0)
 
     # Each of the two has the error of a transition, which the other one multiplies.
     size = float(np.linalg.norm(forward) * np.linalg.norm(back))
@@ -162,11 +191,15 @@ def test_gramians_and_held_controls_are_integrals_of_exact_transitions(
     eccentricity: float, anomaly: float, duration: float
 ) -> None:
     motion = TschaunerHempel(EllipticOrbit(1.0, eccentricity, anomaly))
-    begin_rad, end_rad = (float(each) for each in motion.orbit.eccentric_anomaly(np.array([0.0, duration])))
+    begin_rad, end_rad = (
+        float(each) for each in motion.orbit.eccentric_anomaly(np.array([0.0, duration]))
+    )
     times = motion.orbit.time_of_eccentric(np.linspace(begin_rad, end_rad, 9))
-    times[0], times[-1] = 0.0, duration
+    times[0] = 0.0
+    times[-1] = duration
     nodes, weights = np.polynomial.legendre.leggauss(10)
-    gramian, held = np.zeros((6, 6)), np.zeros((6, 3))
+    gramian = np.zeros((6, 6))
+    held = np.zeros((6, 3))
     with mp.workdps(50):
         for begin, end in itertools.pairwise(times):
             # Gauss points of the eccentric anomaly, in which the integrand has distant poles.
@@ -175,7 +208,9 @@ def test_gramians_and_held_controls_are_integrals_of_exact_transitions(
             rates = 1.0 - eccentricity * np.cos(anomalies)
             places = motion.orbit.time_of_eccentric(anomalies)
             for place, weight in zip(places, 0.5 * (last - first) * weights * rates, strict=True):
-                effect = exact_transition(eccentricity, anomaly, float(place), duration, columns_from=3)
+                effect = exact_transition(
+                    eccentricity, anomaly, float(place), duration, columns_from=3
+                )
                 gramian += weight * effect @ effect.T
                 held += weight * effect
 
@@ -192,8 +227,12 @@ def test_gramians_and_held_controls_are_integrals_of_exact_transitions(
 
 def random_interval(seed: int) -> tuple[TschaunerHempel, float]:
     random = np.random.default_rng(seed)
-    orbit = EllipticOrbit(1e-3, 1.0 - 10.0 ** random.uniform(-4.0, -2.0), random.uniform(-np.pi, np.pi))
-    return TschaunerHempel(orbit), float(random.uniform(0.05, 2.5) * 2.0 * np.pi / orbit.mean_motion_rad_s)
+    orbit = EllipticOrbit(
+        1e-3, 1.0 - 10.0 ** random.uniform(-4.0, -2.0), random.uniform(-np.pi, np.pi)
+    )
+    return TschaunerHempel(orbit), float(
+        random.uniform(0.05, 2.5) * 2.0 * np.pi / orbit.mean_motion_rad_s
+    )
 
 
 def test_no_orbit_of_a_large_eccentricity_is_refused() -> None:
@@ -210,16 +249,23 @@ def test_a_gramian_is_that_of_two_parts(seed: int) -> None:
     whole = motion.gramian(0.0, duration_s)
     latter = motion.segment(middle_s, duration_s)
 
-    joined = latter.transition @ motion.gramian(0.0, middle_s) @ latter.transition.T + latter.gramian
+    joined = (
+        latter.transition @ motion.gramian(0.0, middle_s) @ latter.transition.T + latter.gramian
+    )
 
-    # The rounding of the middle time, 4e-15 rad, is multiplied by (1 - e)^(-3/2), at most 1e6, at perigee.
+    # The rounding of the middle time, 4e-15 rad, is multiplied by (1 - e)^(-3/2), at most 1e6, at
+    # perigee.
     spread = np.sqrt(np.diag(whole))
-    np.testing.assert_allclose(joined / np.outer(spread, spread), whole / np.outer(spread, spread), atol=1e-8)
+    np.testing.assert_allclose(
+        joined / np.outer(spread, spread), whole / np.outer(spread, spread), atol=1e-8
+    )
 
 
 def test_an_interval_of_too_many_panels_is_refused() -> None:
     motion = TschaunerHempel(EllipticOrbit(1.0, 0.5))
-    with pytest.raises(ValueError, match=r"turns by 5e\+05 rad from 2 s to 500000 s; at most 200000 rad"):
+    with pytest.raises(
+        ValueError, match=r"turns by 5e\+05 rad from 2 s to 500000 s; at most 200000 rad"
+    ):
         motion.segment([0.0, 2.0], [1.0, 5e5])
 
 
@@ -235,5 +281,7 @@ def test_many_revolutions_are_not_refused() -> None:
 
 
 def test_eccentricities_beyond_the_digits_of_a_time_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"the eccentricity must be at most 0\.999999, found 0\.9999999"):
+    with pytest.raises(
+        ValueError, match=r"the eccentricity must be at most 0\.999999, found 0\.9999999"
+    ):
         TschaunerHempel(EllipticOrbit(1.0, 0.9999999))

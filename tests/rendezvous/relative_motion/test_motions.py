@@ -32,9 +32,23 @@ MOTIONS: dict[str, Callable[[], LinearMotion]] = {
 PUBLISHED_GRAMIAN = np.array(
     [
         [8997.761636941204, 449.8135383406748, 0.09879027439642714, -10.575438652455434, 0.0, 0.0],
-        [449.8135383406748, 30.000027881906004, 10.595195887584822, 0.0009878207706748873, 0.0, 0.0],
+        [
+            449.8135383406748,
+            30.000027881906004,
+            10.595195887584822,
+            0.0009878207706748873,
+            0.0,
+            0.0,
+        ],
         [0.09879027439642714, 10.595195887584822, 9004.480111945337, 450.37331832075387, 0.0, 0.0],
-        [-10.575438652455434, 0.0009878207706748873, 450.37331832075387, 30.03733105775588, 0.0, 0.0],
+        [
+            -10.575438652455434,
+            0.0009878207706748873,
+            450.37331832075387,
+            30.03733105775588,
+            0.0,
+            0.0,
+        ],
         [0.0, 0.0, 0.0, 0.0, 8997.759844442951, 449.8133292217318],
         [0.0, 0.0, 0.0, 0.0, 449.8133292217318, 29.987556314081377],
     ]
@@ -54,8 +68,11 @@ def integrated(motion: LinearMotion, start: float, end: float) -> tuple[Floats, 
     """Transition, Gramian and effect of a held control by DOP853."""
 
     def rates(time: float, values: Floats) -> Floats:
-        matrix, inputs = motion.dynamics(time), np.eye(6)[:, 3:]
-        transition, gramian, held = values[:36].reshape(6, 6), values[36:72].reshape(6, 6), values[72:].reshape(6, 3)
+        matrix = motion.dynamics(time)
+        inputs = np.eye(6)[:, 3:]
+        transition = values[:36].reshape(6, 6)
+        gramian = values[36:72].reshape(6, 6)
+        held = values[72:].reshape(6, 3)
         spread = matrix @ gramian
         parts = (matrix @ transition, spread + spread.T + inputs @ inputs.T, matrix @ held + inputs)
         return np.concatenate([part.ravel() for part in parts])
@@ -68,37 +85,55 @@ def integrated(motion: LinearMotion, start: float, end: float) -> tuple[Floats, 
 @pytest.mark.parametrize("name", MOTIONS)
 @pytest.mark.parametrize("duration", [20.0, 900.0, 7000.0])
 def test_matrices_satisfy_their_differential_equations(name: str, duration: float) -> None:
-    motion, start = MOTIONS[name](), 130.0
+    motion = MOTIONS[name]()
+    start = 130.0
     transition, gramian, held = integrated(motion, start, start + duration)
     scale = np.array([duration] * 3 + [1.0] * 3)
     weight = scale[None, :] / scale[:, None]
-    found, breaks = motion.segment(start, start + duration), motion.breaks(start, start + duration)
+    found = motion.segment(start, start + duration)
+    breaks = motion.breaks(start, start + duration)
     assert (breaks[0], breaks[-1]) == (start, start + duration)
     assert (np.diff(breaks) > 0.0).all()
     size = np.abs(transition * weight).max()
-    np.testing.assert_allclose(found.transition * weight, transition * weight, rtol=0.0, atol=2e-10 * size)
+    np.testing.assert_allclose(
+        found.transition * weight, transition * weight, rtol=0.0, atol=2e-10 * size
+    )
     spread = np.sqrt(np.outer(np.diag(gramian), np.diag(gramian)))
     np.testing.assert_allclose(found.gramian / spread, gramian / spread, rtol=0.0, atol=2e-10)
     if isinstance(motion, HeldMotion):
-        effect, wanted = motion.segment(start, start + duration).held / scale[:, None], held / scale[:, None]
-        np.testing.assert_allclose(effect, wanted, rtol=0.0, atol=2e-10 * float(np.abs(wanted).max()))
+        effect = motion.segment(start, start + duration).held / scale[:, None]
+        wanted = held / scale[:, None]
+        np.testing.assert_allclose(
+            effect, wanted, rtol=0.0, atol=2e-10 * float(np.abs(wanted).max())
+        )
 
 
 def test_the_published_gramian() -> None:
-    found = in_paper_axes(ClohessyWiltshire(0.001176).gramian(0.0, 30.0))[:, INTERLEAVED][INTERLEAVED]
+    found = in_paper_axes(ClohessyWiltshire(0.001176).gramian(0.0, 30.0))[:, INTERLEAVED][
+        INTERLEAVED
+    ]
     np.testing.assert_allclose(found, PUBLISHED_GRAMIAN, rtol=2e-12, atol=1e-18)
 
 
 def test_the_equations_of_two_papers_in_their_axes() -> None:
     # x'' = 2 w y', y'' = 3 w^2 y - 2 w x', z'' = -w^2 z: (1.8) of Barseghyan and Stepanyan.
-    found = in_paper_axes(ClohessyWiltshire(RATE).dynamics(0.0)) @ np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
+    found = in_paper_axes(ClohessyWiltshire(RATE).dynamics(0.0)) @ np.array(
+        [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+    )
     expected = [4.0, 5.0, 6.0, 2 * RATE * 5, 3 * RATE**2 * 2 - 2 * RATE * 4, -(RATE**2) * 3]
     np.testing.assert_allclose(found, expected, rtol=1e-15)
-    # (2) of Shorikov and Goranov, at perigee, where w' = 0: x'' = 2 w y' - w^2 (r/p - 1) x, and so on.
-    orbit, e = EllipticOrbit(RATE, 0.1), 0.1
-    w, r_by_p = orbit.semi_latus_rate_rad_s * (1.0 + e) ** 2, 1.0 / (1.0 + e)
+    # (2) of Shorikov and Goranov, at perigee, where w' = 0: x'' = 2 w y' - w^2 (r/p - 1) x, and so
+    # on.
+    orbit = EllipticOrbit(RATE, 0.1)
+    e = 0.1
+    w = orbit.semi_latus_rate_rad_s * (1.0 + e) ** 2
+    r_by_p = 1.0 / (1.0 + e)
     found = in_paper_axes(orbit.dynamics(0.0)) @ np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
-    pulls = [2 * w * 5 - w**2 * (r_by_p - 1), -2 * w * 4 + w**2 * (2 * r_by_p + 1) * 2, -(w**2) * r_by_p * 3]
+    pulls = [
+        2 * w * 5 - w**2 * (r_by_p - 1),
+        -2 * w * 4 + w**2 * (2 * r_by_p + 1) * 2,
+        -(w**2) * r_by_p * 3,
+    ]
     np.testing.assert_allclose(found, [4.0, 5.0, 6.0, *pulls], rtol=1e-13)
 
 
@@ -110,7 +145,8 @@ def test_keplers_equation(eccentricity: float, mean: float) -> None:
 
 def test_an_orbit_of_a_size() -> None:
     orbit = EllipticOrbit.of_size(1e7, 0.1, 3.986004418e14)
-    # Shorikov and Goranov (2021), identified from their tables: frozen at perigee, a period of 180 s, 0.15 m/s^2.
+    # Shorikov and Goranov (2021), identified from their tables: frozen at perigee, a period of 180
+    # s, 0.15 m/s^2.
     frozen = motion_of(orbit, MotionModel.FROZEN).segment(0.0, 180.0)
     matrix, effect = (in_paper_axes(each) for each in (frozen.transition, 0.15 * frozen.held))
     row = [1.000880159508, 2.552748205224e-3, 0.0, 177.7169731072, 25.08284792087, 0.0]
@@ -121,4 +157,6 @@ def test_an_orbit_of_a_size() -> None:
     assert effect[5, 2] == pytest.approx(26.92035049622, rel=1e-12)
     turn = 2.0 * np.pi / orbit.mean_motion_rad_s
     assert float(orbit.true_anomaly(3.0 * turn)) == pytest.approx(6.0 * np.pi, rel=1e-14)
-    assert float(orbit.time_of_eccentric(orbit.eccentric_anomaly(777.0))) == pytest.approx(777.0, rel=1e-13)
+    assert float(orbit.time_of_eccentric(orbit.eccentric_anomaly(777.0))) == pytest.approx(
+        777.0, rel=1e-13
+    )

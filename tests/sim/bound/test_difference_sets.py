@@ -14,7 +14,9 @@ Floats = NDArray[np.float64]
 Point = tuple[Fraction, Fraction]
 
 ROUNDING = 1e-12
-"""A height is a sum of at most 30 products, one for each segment: below 30 ulp. At most 20 cuts pass it on."""
+"""A height is a sum of at most 30 products, one for each segment: below 30 ulp. At most 20 cuts
+pass it on.
+"""
 
 
 def exact(values: Floats) -> Point:
@@ -48,22 +50,31 @@ def hull(points: list[Point]) -> list[Point]:
 
 
 def add(polygon: list[Point], segment: Point) -> list[Point]:
-    return hull([(x + sign * segment[0], y + sign * segment[1]) for x, y in polygon for sign in (1, -1)])
+    return hull(
+        [(x + sign * segment[0], y + sign * segment[1]) for x, y in polygon for sign in (1, -1)]
+    )
 
 
 def clip(polygon: list[Point], normal: Point, limit: Fraction) -> list[Point]:
-    """Return the vertices with dot(normal, point) <= limit, and the points where edges cross the border."""
+    """Return the vertices with dot(normal, point) <= limit, and the points where edges cross the
+    border.
+    """
     kept = [point for point in polygon if dot(normal, point) <= limit]
     for one, other in zip(polygon, polygon[1:] + polygon[:1], strict=True):
-        inside, outside = dot(normal, one) - limit, dot(normal, other) - limit
+        inside = dot(normal, one) - limit
+        outside = dot(normal, other) - limit
         if inside * outside < 0:
             share = inside / (inside - outside)
-            kept.append((one[0] + share * (other[0] - one[0]), one[1] + share * (other[1] - one[1])))
+            kept.append(
+                (one[0] + share * (other[0] - one[0]), one[1] + share * (other[1] - one[1]))
+            )
     return hull(kept)
 
 
 class Case:
-    """Random widths, accelerations and strips of the kind of a flight, and others that are hard for rounding."""
+    """Random widths, accelerations and strips of the kind of a flight, and others that are hard for
+    rounding.
+    """
 
     def __init__(self, kind: str, number: int) -> None:
         random = np.random.default_rng([number, len(kind)])
@@ -80,12 +91,16 @@ class Case:
         self.limits = 10.0 ** random.uniform(-1.0, 3.0, (steps, 2))
         self.limits[random.random((steps, 2)) < 0.3] = np.inf
         if kind == "any directions":
-            self.pushes = random.normal(size=(steps, 2)) * 10.0 ** random.uniform(-3.0, 3.0, (steps, 1))
+            self.pushes = random.normal(size=(steps, 2)) * 10.0 ** random.uniform(
+                -3.0, 3.0, (steps, 1)
+            )
             self.normals = random.normal(size=(steps, 2, 2))
             self.towards = random.normal(size=2)
         if kind in ("parallel", "nearly parallel"):
             # Accelerations along borders, in both orientations, and strips with the same normal.
-            borders = self.normals[random.integers(steps, size=steps), random.integers(2, size=steps)]
+            borders = self.normals[
+                random.integers(steps, size=steps), random.integers(2, size=steps)
+            ]
             sizes = random.choice([-1.0, 1.0], steps) * 10.0 ** random.uniform(-2.0, 2.0, steps)
             self.pushes = sizes[:, None] * np.column_stack([-borders[:, 1], borders[:, 0]])
         if kind == "nearly parallel":
@@ -107,9 +122,12 @@ class Case:
         return float(along + np.abs(self.pushes @ self.towards).sum())
 
     def farthest(self) -> list[Fraction]:
-        """Return the maximum differences with equal measurements in the first 0, 1, ..., steps, by clipping."""
+        """Return the maximum differences with equal measurements in the first 0, 1, ..., steps, by
+        clipping.
+        """
         widths = [Fraction(float(width)) for width in self.widths]
-        towards, steps = exact(self.towards), len(self.pushes)
+        towards = exact(self.towards)
+        steps = len(self.pushes)
         later = [abs(dot(towards, exact(push))) for push in self.pushes]
         polygon = hull([(x * widths[0], y * widths[1]) for x in (-1, 1) for y in (-1, 1)])
         found = [max(dot(towards, point) for point in polygon) + sum(later)]
@@ -124,7 +142,14 @@ class Case:
         return found
 
 
-KINDS = ["flight", "any directions", "parallel", "nearly parallel", "extreme limits", "nothing moves"]
+KINDS = [
+    "flight",
+    "any directions",
+    "parallel",
+    "nearly parallel",
+    "extreme limits",
+    "nothing moves",
+]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -133,7 +158,9 @@ def test_farthest_differences_are_those_of_rational_polygons(kind: str, number: 
     case = Case(kind, number)
     steps = len(case.pushes)
 
-    found = farthest_difference(case.widths, case.pushes, case.normals, case.limits, case.towards, steps)
+    found = farthest_difference(
+        case.widths, case.pushes, case.normals, case.limits, case.towards, steps
+    )
 
     expected = [float(value) for value in case.farthest()]
     assert found.farthest == pytest.approx(expected, abs=ROUNDING * case.size)
@@ -144,7 +171,9 @@ def test_farthest_differences_are_those_of_rational_polygons(kind: str, number: 
 def test_farthest_member_is_in_all_strips_and_reaches_the_maximum(kind: str, number: int) -> None:
     case = Case(kind, number)
     for common in range(len(case.pushes) + 1):
-        found = farthest_difference(case.widths, case.pushes, case.normals, case.limits, case.towards, common)
+        found = farthest_difference(
+            case.widths, case.pushes, case.normals, case.limits, case.towards, common
+        )
 
         assert len(found.farthest) == common + 1
         assert np.abs(found.start).max() <= 1.0
@@ -154,9 +183,9 @@ def test_farthest_member_is_in_all_strips_and_reaches_the_maximum(kind: str, num
             if k < common:
                 heights = np.abs(case.normals[k] @ member)
                 # The height of a member is a sum of the heights of all segments, which cancel.
-                largest = np.abs(case.normals[k] @ np.column_stack([np.diag(case.widths), case.pushes[:k].T])).sum(
-                    axis=1
-                )
+                largest = np.abs(
+                    case.normals[k] @ np.column_stack([np.diag(case.widths), case.pushes[:k].T])
+                ).sum(axis=1)
                 assert (heights <= case.limits[k] + ROUNDING * largest).all()
             member = member + found.pushes[k] * push
         assert case.towards @ member == pytest.approx(found.farthest[-1], abs=ROUNDING * case.size)
@@ -167,7 +196,11 @@ def test_strip_that_is_left_out_does_not_cut() -> None:
     limits = case.limits.copy()
     limits[1:] = np.inf
 
-    left_out = farthest_difference(case.widths, case.pushes, case.normals, limits, case.towards, len(case.pushes))
-    first = farthest_difference(case.widths, case.pushes, case.normals, case.limits, case.towards, 1)
+    left_out = farthest_difference(
+        case.widths, case.pushes, case.normals, limits, case.towards, len(case.pushes)
+    )
+    first = farthest_difference(
+        case.widths, case.pushes, case.normals, case.limits, case.towards, 1
+    )
 
     assert left_out.farthest[-1] == pytest.approx(first.farthest[-1], rel=ROUNDING)

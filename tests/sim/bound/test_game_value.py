@@ -21,14 +21,24 @@ from tests.space import in_space
 RANGE_M, SPEED_M_S = 1745e3, 58e3
 
 
-def known(*, z_m: tuple[float, float] = (-1e3, 1e3), vz_m_s: float = 100.0, range_m: float = RANGE_M) -> Scenario:
-    """Return half a minute of the published approach in free space, with known range and closing speed."""
+def known(
+    *, z_m: tuple[float, float] = (-1e3, 1e3), vz_m_s: float = 100.0, range_m: float = RANGE_M
+) -> Scenario:
+    """Return half a minute of the published approach in free space, with known range and closing
+    speed.
+    """
     scenario = with_model(load_scenario("asteroid-1997"), Model.GUARANTEED)
     box = StateBox(z_m, (range_m, range_m), (-vz_m_s, vz_m_s), (-SPEED_M_S, -SPEED_M_S))
     sensor = replace(linear(scenario.angle_sensor), nominal_range_m=range_m)
     model = replace(scenario.set_model, bounds=box, angle_sensor=sensor, disturbance_m_s2=0.0)
     return replace(
-        scenario, sun=None, range_sensor=None, nominal_range_m=range_m, dispersion=box, **of_model(model), name="known"
+        scenario,
+        sun=None,
+        range_sensor=None,
+        nominal_range_m=range_m,
+        dispersion=box,
+        **of_model(model),
+        name="known",
     )
 
 
@@ -50,7 +60,9 @@ def reserve_of(scenario: Scenario) -> tuple[float, ValueReserve]:
 
 def wider(axis: str) -> Callable[[Scenario], Scenario]:
     interval = {"x_m": (1740e3, 1745e3), "vx_m_s": (-58.1e3, -58e3)}[axis]
-    return lambda scenario: with_box(scenario, replace(scenario.set_model.bounds, **{axis: interval}))
+    return lambda scenario: with_box(
+        scenario, replace(scenario.set_model.bounds, **{axis: interval})
+    )
 
 
 def other_speed(scenario: Scenario) -> Scenario:
@@ -66,13 +78,21 @@ def other_speed(scenario: Scenario) -> Scenario:
         (wider("vx_m_s"), "closing speed not exactly known"),
         (other_speed, "closing speed not the nominal one"),
         (
-            lambda scenario: with_thruster(scenario, replace(scenario.thruster, execution_error_relative=0.01)),
+            lambda scenario: with_thruster(
+                scenario, replace(scenario.thruster, execution_error_relative=0.01)
+            ),
             "impulses with errors",
         ),
-        (lambda scenario: with_thruster(scenario, replace(scenario.thruster, delay_steps=1)), "impulses with a delay"),
+        (
+            lambda scenario: with_thruster(scenario, replace(scenario.thruster, delay_steps=1)),
+            "impulses with a delay",
+        ),
         (
             lambda scenario: replace(
-                scenario, **of_model(replace(scenario.set_model, model=Model.PAPER, initial_set=InitialSet.BOX))
+                scenario,
+                **of_model(
+                    replace(scenario.set_model, model=Model.PAPER, initial_set=InitialSet.BOX)
+                ),
             ),
             "model paper",
         ),
@@ -81,7 +101,8 @@ def other_speed(scenario: Scenario) -> Scenario:
                 scenario,
                 **of_model(
                     replace(
-                        scenario.set_model, angle_sensor=replace(scenario.set_model.angle_sensor, miss_probability=0.1)
+                        scenario.set_model,
+                        angle_sensor=replace(scenario.set_model.angle_sensor, miss_probability=0.1),
                     )
                 ),
             ),
@@ -90,7 +111,9 @@ def other_speed(scenario: Scenario) -> Scenario:
         (lambda scenario: replace(scenario, rate_sensor=RateSensor(0.5, 1e-6)), "rate sensor"),
     ],
 )
-def test_each_assumption_has_its_reason(change: Callable[[Scenario], Scenario], reason: str) -> None:
+def test_each_assumption_has_its_reason(
+    change: Callable[[Scenario], Scenario], reason: str
+) -> None:
     assert why_no_value(known()) == ()
     assert why_no_value(change(known())) == (reason,)
 
@@ -105,7 +128,9 @@ def test_reserve_of_a_weak_engine_by_hand() -> None:
     """All 61 impulses of 0.5 m/s correct 460 of 1100 m; the one at 5 km is below the threshold."""
     scenario = known(z_m=(900.0, 1100.0), vz_m_s=0.0)
     engine = replace(scenario.thruster, max_impulse_m_s=0.5, min_impulse_m_s=0.0)
-    weak = replace(scenario, thruster=engine, **of_model(replace(scenario.set_model, range_threshold_m=6e3)))
+    weak = replace(
+        scenario, thruster=engine, **of_model(replace(scenario.set_model, range_threshold_m=6e3))
+    )
     bound_m, reserve = reserve_of(weak)
     to_go_s = RANGE_M / SPEED_M_S - 0.5 * np.arange(61)
     left_m = 1100.0 - 0.5 * to_go_s.sum()
@@ -119,11 +144,15 @@ def test_reserve_of_a_weak_engine_by_hand() -> None:
 
 
 def test_reserve_of_one_impulse_by_hand() -> None:
-    """One impulse 10 s before the arrival: the first and the 41st image leave 174 m, which the dead zone increases."""
+    """One impulse 10 s before the arrival: the first and the 41st image leave 174 m, which the dead
+    zone increases.
+    """
     scenario = known(range_m=1740e3)
     sensor = AngleSensor(0.5, 1e-4, 1e-4, 1740e3)
     engine = Thruster(1e3, 2.0, 1e3, impulses_s=(10.0,))
-    one = replace(scenario, thruster=engine, **of_model(replace(scenario.set_model, angle_sensor=sensor)))
+    one = replace(
+        scenario, thruster=engine, **of_model(replace(scenario.set_model, angle_sensor=sensor))
+    )
     bound_m, reserve = reserve_of(one)
     exact_m = 1e-4 * (580e3 + (580e3 + 1740e3) * 10.0 / 20.0)
     # The tangent of the error itself makes the set wider by 1e-8 / 3.
@@ -133,7 +162,9 @@ def test_reserve_of_one_impulse_by_hand() -> None:
     assert reserve.range_threshold_m == 0.0
     # Before the impulse: at most 4000 m without it, 58 km/s to go and a lateral speed of 100 m/s.
     slope = (4000.0 / 10.0 + 100.0) / SPEED_M_S
-    assert reserve.tangent_m == pytest.approx(exact_m * (np.cos(np.arctan(slope) + 2e-4) ** -2 - 1.0), rel=1e-3)
+    assert reserve.tangent_m == pytest.approx(
+        exact_m * (np.cos(np.arctan(slope) + 2e-4) ** -2 - 1.0), rel=1e-3
+    )
 
 
 CAMERA = Camera(0.5, 5e-5, 20.0, first_image_s=20.0, last_image_s=1.0)
@@ -145,9 +176,15 @@ CAMERA = Camera(0.5, 5e-5, 20.0, first_image_s=20.0, last_image_s=1.0)
     [
         lambda scenario: scenario,
         lambda scenario: with_thruster(scenario, replace(scenario.thruster, min_impulse_m_s=3.0)),
-        lambda scenario: with_thruster(scenario, Thruster(500.0, 0.0, 200.0, impulses_s=(22.0, 9.0, 3.0))),
-        lambda scenario: replace(scenario, **of_model(replace(scenario.set_model, disturbance_m_s2=0.5))),
-        lambda scenario: replace(scenario, **of_model(replace(scenario.set_model, angle_sensor=CAMERA))),
+        lambda scenario: with_thruster(
+            scenario, Thruster(500.0, 0.0, 200.0, impulses_s=(22.0, 9.0, 3.0))
+        ),
+        lambda scenario: replace(
+            scenario, **of_model(replace(scenario.set_model, disturbance_m_s2=0.5))
+        ),
+        lambda scenario: replace(
+            scenario, **of_model(replace(scenario.set_model, angle_sensor=CAMERA))
+        ),
     ],
     ids=["published", "dead zone", "schedule", "disturbance", "camera"],
 )

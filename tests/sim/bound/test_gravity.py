@@ -1,8 +1,10 @@
-"""The lower bound under gravity, against an integration of both motions of a pair in heliocentric two-body gravity.
+"""The lower bound under gravity, against an integration of both motions of a pair in heliocentric
+two-body gravity.
 
-The integration is that of SciPy and uses nothing of the bound: neither transition matrices nor reserves. A strategy
-gives the same impulses to both motions up to the last common step. After it each motion gets the impulses that bring
-it nearest to the target, as if the strategy knew the truth, so no strategy does better.
+The integration is that of SciPy and uses nothing of the bound: neither transition matrices nor
+reserves. A strategy gives the same impulses to both motions up to the last common step. After it
+each motion gets the impulses that bring it nearest to the target, as if the strategy knew the
+truth, so no strategy does better.
 """
 
 from __future__ import annotations
@@ -28,10 +30,14 @@ Floats = NDArray[np.float64]
 SUN = 1.324948e20
 
 
-def slow_flight(range_km: float, *, cut_off_s: float | None = 2000.0, strength: float = 1.0) -> Scenario:
+def slow_flight(
+    range_km: float, *, cut_off_s: float | None = 2000.0, strength: float = 1.0
+) -> Scenario:
     """2 km/s with the Sun at 60 million km across the approach; range and speed are known."""
     range_m = 1e3 * range_km
-    box = StateBox((-1e4, 1e4), (range_m - 500.0, range_m + 500.0), (-0.1, 0.1), (-2000.01, -1999.99))
+    box = StateBox(
+        (-1e4, 1e4), (range_m - 500.0, range_m + 500.0), (-0.1, 0.1), (-2000.01, -1999.99)
+    )
     sensor = Camera(200.0, 5e-6, 5.0)
     model = SetModel(
         closing_speed_m_s=2000.0,
@@ -58,11 +64,17 @@ class TrueFlight:
     def __init__(self, scenario: Scenario, pair: TruthPair, which: int) -> None:
         assert scenario.sun is not None
         axes = scenario.set_model.axes
-        sun, self.lateral = scenario.sun, [("y", "z").index(name) for name in axes]
-        self.parameter, self.step_s = sun.gravitational_parameter_m3_s2, scenario.set_model.step_s
+        sun = scenario.sun
+        self.lateral = [("y", "z").index(name) for name in axes]
+        self.parameter = sun.gravitational_parameter_m3_s2
+        self.step_s = scenario.set_model.step_s
         level = np.cos(sun.elevation_rad)
         toward = np.array(
-            [np.sin(sun.elevation_rad), level * np.sin(sun.direction_rad), level * np.cos(sun.direction_rad)]
+            [
+                np.sin(sun.elevation_rad),
+                level * np.sin(sun.direction_rad),
+                level * np.cos(sun.direction_rad),
+            ]
         )
         along = np.array([0.0, 0.0, 1.0]) - toward[2] * toward
         along /= np.linalg.norm(along)
@@ -71,25 +83,33 @@ class TrueFlight:
         relative[:, [*self.lateral, 2]] = pair.position_m[which], pair.velocity_m_s[which]
         self.state = np.concatenate([-sun.distance_m * toward, speed * along, *relative])
         pushes = pair.acceleration_m_s2[:, which]
-        self.pushes, self.time_s = pushes, 0.0
+        self.pushes = pushes
+        self.time_s = 0.0
 
     def rates(self, _time: float, state: Floats, push: Floats) -> Floats:
         """Velocities and accelerations of the spacecraft, and of the object relative to it."""
         own, own_speed, apart, speed = state.reshape(4, 3)
         attraction = [-self.parameter * at / np.linalg.norm(at) ** 3 for at in (own, own + apart)]
-        return np.concatenate([own_speed, attraction[0], speed, attraction[1] - attraction[0] + push])
+        return np.concatenate(
+            [own_speed, attraction[0], speed, attraction[1] - attraction[0] + push]
+        )
 
     def fly(self, until_s: float, event: Callable[..., float] | None = None) -> Floats:
-        """Integrate until a time and return the relative states at the steps on the way, shape (n, 6)."""
+        """Integrate until a time and return the relative states at the steps on the way, shape (n,
+        6).
+        """
         if until_s <= self.time_s:
             return np.empty((0, 6))
-        seen, breaks = [], self.step_s * (1 + np.flatnonzero(np.diff(self.pushes, axis=1).any(axis=0)))
+        seen = []
+        breaks = self.step_s * (1 + np.flatnonzero(np.diff(self.pushes, axis=1).any(axis=0)))
         for end_s in [*breaks[(breaks > self.time_s) & (breaks < until_s)], until_s]:
             step = int(np.floor(self.time_s / self.step_s + 1e-9))
             push = np.zeros(3)
             push[self.lateral] = self.pushes[:, step] if step < self.pushes.shape[1] else 0.0
             first = int(np.ceil(self.time_s / self.step_s - 1e-9))
-            at_s = np.append(self.step_s * np.arange(first, int(np.ceil(end_s / self.step_s - 1e-9))), end_s)
+            at_s = np.append(
+                self.step_s * np.arange(first, int(np.ceil(end_s / self.step_s - 1e-9))), end_s
+            )
             at_s[0] = max(at_s[0], self.time_s)
             found = solve_ivp(
                 *(self.rates, (self.time_s, end_s), self.state),
@@ -101,10 +121,12 @@ class TrueFlight:
                 atol=1e-9,
             )
             if event is not None and len(found.t_events[0]):
-                self.state, self.event_s = found.y_events[0][0], float(found.t_events[0][0])
+                self.state = found.y_events[0][0]
+                self.event_s = float(found.t_events[0][0])
                 break
             seen.append(found.y[6:, :-1].T)
-            self.time_s, self.state = float(end_s), found.y[:, -1]
+            self.time_s = float(end_s)
+            self.state = found.y[:, -1]
         return np.concatenate([np.empty((0, 6)), *seen])
 
     def fire(self, impulse_m_s: Floats) -> None:
@@ -113,7 +135,9 @@ class TrueFlight:
         self.state[9:12][self.lateral] -= impulse_m_s
 
     def until(self, event: Callable[..., float]) -> tuple[float, Floats]:
-        """Return the time from now to an event without impulses, and the relative state then; stay here."""
+        """Return the time from now to an event without impulses, and the relative state then; stay
+        here.
+        """
         start = self.time_s, self.state
         event.terminal = True  # type: ignore[attr-defined]
         self.fly(self.time_s + 1.5 * self.state[8] / -self.state[11] + 10.0 * self.step_s, event)
@@ -122,33 +146,48 @@ class TrueFlight:
         return found
 
     def correct(self, max_m_s: float) -> Floats:
-        """Give the impulse that brings the motion nearest to the target without later ones, and return it."""
+        """Give the impulse that brings the motion nearest to the target without later ones, and
+        return it.
+        """
         to_go, state = self.until(lambda _time, state, _push: state[8])
         miss = state[self.lateral]
-        impulse = miss * min(max_m_s, float(np.linalg.norm(miss)) / to_go) / max(float(np.linalg.norm(miss)), 1e-9)
+        impulse = (
+            miss
+            * min(max_m_s, float(np.linalg.norm(miss)) / to_go)
+            / max(float(np.linalg.norm(miss)), 1e-9)
+        )
         self.fire(impulse)
         return np.asarray(impulse)
 
     def miss_m(self) -> float:
         """Return the minimum distance from now on."""
-        return float(np.linalg.norm(self.until(lambda _time, state, _push: state[6:9] @ state[9:12])[1][:3]))
+        return float(
+            np.linalg.norm(self.until(lambda _time, state, _push: state[6:9] @ state[9:12])[1][:3])
+        )
 
 
 def measured(scenario: Scenario, states: Floats) -> dict[str, Floats]:
     """Return true angles, rates and distances of relative states (n, 6)."""
-    x, distance = states[:, 2], np.linalg.norm(states[:, :3], axis=1)
+    x = states[:, 2]
+    distance = np.linalg.norm(states[:, :3], axis=1)
     angles = np.arctan2(states[:, :2], x[:, None])
-    rates = (states[:, 3:5] * x[:, None] - states[:, 5:] * states[:, :2]) / (states[:, :2] ** 2 + x[:, None] ** 2)
+    rates = (states[:, 3:5] * x[:, None] - states[:, 5:] * states[:, :2]) / (
+        states[:, :2] ** 2 + x[:, None] ** 2
+    )
     chosen = [("y", "z").index(name) for name in scenario.set_model.axes]
     return {"angle": angles[:, chosen], "rate": rates[:, chosen], "range": distance[:, None]}
 
 
 def max_share(scenario: Scenario, both: list[Floats], last_common_step: int) -> float:
-    """Return the maximum error of the mean of the two measured values, in units of the lesser bound."""
+    """Return the maximum error of the mean of the two measured values, in units of the lesser
+    bound.
+    """
     values = [measured(scenario, states) for states in both]
     shares = [0.0]
     for name, sensor in scenario.sensors.items():
-        steps = np.arange(0, last_common_step + 1, round(sensor.period_s / scenario.set_model.step_s))
+        steps = np.arange(
+            0, last_common_step + 1, round(sensor.period_s / scenario.set_model.step_s)
+        )
         half = 0.5 * np.abs(values[0][name] - values[1][name])[steps]
         ranges = np.minimum(*(each["range"][steps] for each in values))
         if isinstance(sensor, AngleSensor | Camera):
@@ -163,19 +202,26 @@ def max_share(scenario: Scenario, both: list[Floats], last_common_step: int) -> 
     return max(shares)
 
 
-def misses(scenario: Scenario, pair: TruthPair, common: dict[int, Floats]) -> tuple[float, list[float]]:
+def misses(
+    scenario: Scenario, pair: TruthPair, common: dict[int, Floats]
+) -> tuple[float, list[float]]:
     """Return the maximum share of an error bound and both misses.
 
-    `common` are impulses by step until the last common one. All later impulses are the maximum that the budget allows,
-    toward the target.
+    `common` are impulses by step until the last common one. All later impulses are the maximum that
+    the budget allows, toward the target.
     """
-    thruster, step_s = scenario.thruster, scenario.set_model.step_s
+    thruster = scenario.thruster
+    step_s = scenario.set_model.step_s
     spent = sum(float(np.linalg.norm(impulse)) for impulse in common.values())
-    rest = replace(scenario, thruster=replace(thruster, budget_m_s=max(0.0, thruster.budget_m_s - spent)))
+    rest = replace(
+        scenario, thruster=replace(thruster, budget_m_s=max(0.0, thruster.budget_m_s - spent))
+    )
     times_s, sizes = later_impulses(rest, pair.last_common_step, 1.2 * pair.arrival_s)
-    seen, found = [], []
+    seen = []
+    found = []
     for which in range(2):
-        flight, states = TrueFlight(scenario, pair, which), []
+        flight = TrueFlight(scenario, pair, which)
+        states = []
         for step, impulse in common.items():
             states.append(flight.fly(step * step_s))
             flight.fire(impulse)
@@ -191,12 +237,17 @@ def misses(scenario: Scenario, pair: TruthPair, common: dict[int, Floats]) -> tu
 
 
 def commands(scenario: Scenario, pair: TruthPair) -> list[dict[int, Floats]]:
-    """Return impulses up to the last common step: none, random ones, and those that bring the middle to the target."""
-    thruster, last, step_s = scenario.thruster, pair.last_common_step, scenario.set_model.step_s
+    """Return impulses up to the last common step: none, random ones, and those that bring the
+    middle to the target.
+    """
+    thruster = scenario.thruster
+    last = pair.last_common_step
+    step_s = scenario.set_model.step_s
     allowed = [step for step in (scenario.impulse_steps or range(last + 1)) if step <= last]
     random = np.random.default_rng(1)
     drawn = {
-        int(step): random.uniform(-0.3, 0.3, len(scenario.set_model.axes)) * thruster.max_impulse_m_s
+        int(step): random.uniform(-0.3, 0.3, len(scenario.set_model.axes))
+        * thruster.max_impulse_m_s
         for step in np.sort(random.choice(allowed, 6, replace=False))
     }
     same = np.ones((2, 1))
@@ -206,7 +257,9 @@ def commands(scenario: Scenario, pair: TruthPair) -> list[dict[int, Floats]]:
         velocity_m_s=same * pair.velocity_m_s.mean(axis=0),
         acceleration_m_s2=np.zeros_like(pair.acceleration_m_s2),
     )
-    flight, steered, left = TrueFlight(scenario, middle, 0), {}, thruster.budget_m_s
+    flight = TrueFlight(scenario, middle, 0)
+    steered = {}
+    left = thruster.budget_m_s
     for step in (*allowed[:40], *allowed[-3:]):
         flight.fly(step * step_s)
         steered[step] = flight.correct(min(left, thruster.max_impulse_m_s))
@@ -217,14 +270,18 @@ def commands(scenario: Scenario, pair: TruthPair) -> list[dict[int, Floats]]:
 
 
 def aimed(scenario: Scenario) -> Scenario:
-    """Return the scenario with starts around one that gravity brings to the target without impulses."""
+    """Return the scenario with starts around one that gravity brings to the target without
+    impulses.
+    """
     box = scenario.set_model.bounds
     for _ in range(3):
         start = [np.array([np.mean(interval) for interval in part]) for part in _intervals(box)]
         motion = coasting(start[0], start[1], scenario.sun, scenario.set_model.step_s)
         moved = [
             (float(low - miss / motion.arrival_s), float(high - miss / motion.arrival_s))
-            for (low, high), miss in zip(_intervals(box)[1][:-1], motion.states[:-1, -1], strict=False)
+            for (low, high), miss in zip(
+                _intervals(box)[1][:-1], motion.states[:-1, -1], strict=False
+            )
         ]
         box = replace(box, vz_m_s=moved[-1], vy_m_s=moved[0] if len(moved) > 1 else None)
     return replace(scenario, **of_model(replace(scenario.set_model, bounds=box)), dispersion=box)
@@ -233,17 +290,24 @@ def aimed(scenario: Scenario) -> Scenario:
 def _intervals(box: StateBox) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
     """Intervals of the position and of the velocity along the lateral axes and x."""
     lateral = [box.axis(name) for name in box.axes]
-    return [*(each.z_m for each in lateral), box.x_m], [*(each.vz_m_s for each in lateral), box.vx_m_s]
+    return [*(each.z_m for each in lateral), box.x_m], [
+        *(each.vz_m_s for each in lateral),
+        box.vx_m_s,
+    ]
 
 
 def strong(strength: float) -> Scenario:
-    """A slow flight without a cut-off and with small impulses, in gravity that is `strength` times the Sun's."""
+    """A slow flight without a cut-off and with small impulses, in gravity that is `strength` times
+    the Sun's.
+    """
     scenario = slow_flight(140000.0, cut_off_s=None, strength=strength)
     return replace(scenario, thruster=Thruster(3.0, 0.0, 0.02))
 
 
 def skew() -> Scenario:
-    """In space, with the Sun in no plane of the axes, manoeuvres, rates and ranges; 2 G T^2 = 4 %."""
+    """In space, with the Sun in no plane of the axes, manoeuvres, rates and ranges; 2 G T^2 = 4
+    %.
+    """
     scenario = in_space(strong(6.0))
     model = replace(scenario.set_model, disturbance_m_s2=1e-8)
     return replace(
@@ -258,7 +322,14 @@ def skew() -> Scenario:
 def near_a_planet() -> Scenario:
     """An approach at 12 km/s from 20 000 km, 60 000 km from the Earth."""
     box = StateBox((-2e4, 1e4), (2e7, 2e7), (-5.0, 5.0), (-12e3, -12e3))
-    model = SetModel(12e3, 10.0, box, AngleSensor(10.0, 1e-4, 1e-4, 2e7), disturbance_m_s2=1e-5, model=Model.PAPER)
+    model = SetModel(
+        12e3,
+        10.0,
+        box,
+        AngleSensor(10.0, 1e-4, 1e-4, 2e7),
+        disturbance_m_s2=1e-5,
+        model=Model.PAPER,
+    )
     return Scenario(
         name="planet",
         sun=Sun(3.986e14, 6e7, 2.5),
@@ -280,11 +351,13 @@ def near_a_planet() -> Scenario:
 def test_one_of_two_motions_misses_by_the_bound_in_two_body_gravity(scenario: Scenario) -> None:
     box = scenario.set_model.bounds
     approach = Approach(scenario, box.x_m[1], box.vx_m_s[1])
-    pair, single = approach.best_pair(), approach.single()
+    pair = approach.best_pair()
+    single = approach.single()
     assert pair.bound_m > 0.0
     for common in commands(scenario, pair):
         share, found = misses(scenario, pair, common)
-        # Far from an interception the slopes exceed those of Lemma 20; the miss is then far greater.
+        # Far from an interception the slopes exceed those of Lemma 20; the miss is then far
+        # greater.
         assert share <= 1.0 or max(found) > 2.0 * pair.bound_m
         assert max(found) >= pair.bound_m
     if single.bound_m > 0.0:
@@ -294,17 +367,30 @@ def test_one_of_two_motions_misses_by_the_bound_in_two_body_gravity(scenario: Sc
 
 @pytest.mark.parametrize(
     ("range_km", "min_m", "program_m"),
-    [(60000.0, 47.5, 48.45), (140000.0, 43.5, 45.0), (190000.0, 40.5, 42.5), (200000.0, 39.5, 41.8)],
+    [
+        (60000.0, 47.5, 48.45),
+        (140000.0, 43.5, 45.0),
+        (190000.0, 40.5, 42.5),
+        (200000.0, 39.5, 41.8),
+    ],
 )
 def test_bound_is_near_the_linear_program_with_the_gravity_gradient(
     range_km: float, min_m: float, program_m: float
 ) -> None:
-    """The values of an independent program without any reserve; without the gradient 47.3, 32.3, 13.7 and 9.1 m."""
-    assert min_m <= pair_at(slow_flight(range_km), 1e3 * range_km + 500.0, -1999.99).bound_m <= program_m + 0.05
+    """The values of an independent program without any reserve; without the gradient 47.3, 32.3,
+    13.7 and 9.1 m.
+    """
+    assert (
+        min_m
+        <= pair_at(slow_flight(range_km), 1e3 * range_km + 500.0, -1999.99).bound_m
+        <= program_m + 0.05
+    )
 
 
 def test_the_bound_of_pairs_changes_gradually_with_gravity() -> None:
-    """2 G T^2 from 0.006 % to 49 %. Gravity also changes the arrival, and so the range at the last common step."""
+    """2 G T^2 from 0.006 % to 49 %. Gravity also changes the arrival, and so the range at the last
+    common step.
+    """
     bounds = [
         Approach(scenario, 140000.5e3, -1999.99).best_pair().bound_m
         for scenario in (
@@ -324,14 +410,21 @@ def test_transition_matrices_are_those_of_two_body_gravity() -> None:
     both = [TrueFlight(scenario, pair, which) for which in range(2)]
     states = [each.fly(float(pair.times_s[-2])) for each in both]
     motion = coasting(
-        pair.position_m.mean(axis=0), pair.velocity_m_s.mean(axis=0), scenario.sun, scenario.set_model.step_s
+        pair.position_m.mean(axis=0),
+        pair.velocity_m_s.mean(axis=0),
+        scenario.sun,
+        scenario.set_model.step_s,
     )
-    offset, velocity = (-np.diff(each, axis=0)[0, :-1] for each in (pair.position_m, pair.velocity_m_s))
+    offset, velocity = (
+        -np.diff(each, axis=0)[0, :-1] for each in (pair.position_m, pair.velocity_m_s)
+    )
     acceleration = -np.diff(pair.acceleration_m_s2, axis=1)[:, 0]
     difference = motion.difference(offset, velocity, acceleration)[:, : len(states[0])]
     found = (states[0] - states[1]).T
     assert difference[:3] == pytest.approx(found[:3], abs=1e-5 * np.abs(found[:3]).max())
     assert difference[3:] == pytest.approx(found[3:], abs=1e-5 * np.abs(found[3:]).max())
-    assert pair.track_m[:, : len(states[0])] == pytest.approx(0.5 * found[:2], abs=1e-5 * np.abs(found[:3]).max())
+    assert pair.track_m[:, : len(states[0])] == pytest.approx(
+        0.5 * found[:2], abs=1e-5 * np.abs(found[:3]).max()
+    )
     middle = 0.5 * (states[0] + states[1])[:, 2]
     assert motion.range_m[: len(middle)] == pytest.approx(middle, abs=1.0)

@@ -31,7 +31,9 @@ NOMINAL_LABEL_M = 5801.3e3
 
 
 def toy(vz_m_s: float = 1e3, max_impulse_m_s: float = 0.5, z_m: float = 1e5) -> Scenario:
-    """Two measurements, at 2000 m and at 1000 m, of an object that comes at 1000 m/s; errors of 1 mrad."""
+    """Two measurements, at 2000 m and at 1000 m, of an object that comes at 1000 m/s; errors of 1
+    mrad.
+    """
     model = SetModel(
         closing_speed_m_s=1000.0,
         step_s=1.0,
@@ -49,41 +51,54 @@ def toy(vz_m_s: float = 1e3, max_impulse_m_s: float = 0.5, z_m: float = 1e5) -> 
 
 
 def cosine(across_m_s: float) -> float:
-    """Cosine of the angle between the relative velocity and the x axis, at a closing speed of 1000 m/s."""
+    """Cosine of the angle between the relative velocity and the x axis, at a closing speed of 1000
+    m/s.
+    """
     return 1.0 / float(np.sqrt(1.0 + (across_m_s / 1000.0) ** 2))
 
 
 def with_disturbance(scenario: Scenario, disturbance_m_s2: float) -> Scenario:
-    return replace(scenario, **of_model(replace(scenario.set_model, disturbance_m_s2=disturbance_m_s2)))
+    return replace(
+        scenario, **of_model(replace(scenario.set_model, disturbance_m_s2=disturbance_m_s2))
+    )
 
 
-def positions(pair: TruthPair, scenario: Scenario) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def positions(
+    pair: TruthPair, scenario: Scenario
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Times of all steps and of the arrival, and the lateral positions then, by plain stepping.
 
     The positions have the shape (C, 2, steps + 1).
     """
     steps = pair.acceleration_m_s2.shape[-1]
     times = np.append(np.arange(steps) * scenario.set_model.step_s, pair.arrival_s)
-    z, v = pair.position_m[:, :-1].T, pair.velocity_m_s[:, :-1].T
+    z = pair.position_m[:, :-1].T
+    v = pair.velocity_m_s[:, :-1].T
     track = [z]
     for i in range(steps):
-        duration, push = times[i + 1] - times[i], pair.acceleration_m_s2[..., i]
-        z, v = z + v * duration + 0.5 * push * duration**2, v + push * duration
+        duration = times[i + 1] - times[i]
+        push = pair.acceleration_m_s2[..., i]
+        z = z + v * duration + 0.5 * push * duration**2
+        v = v + push * duration
         track.append(z)
     return times, np.stack(track, axis=-1)
 
 
 def shares(pair: TruthPair, scenario: Scenario, axis: str) -> NDArray[np.float64]:
-    """Bounds of an angle of both at the steps until the last common one, as shares of the bound on the x axis.
+    """Bounds of an angle of both at the steps until the last common one, as shares of the bound on
+    the x axis.
 
-    If both come nearer than the bound, their slope is at most q = W/|V_x| + L/x, and their distance x sqrt(1 + q^2).
-    The velocity across x is at most W: that at the start, by accelerations, and the whole budget of 1000 m/s.
+    If both come nearer than the bound, their slope is at most q = W/|V_x| + L/x, and their distance
+    x sqrt(1 + q^2). The velocity across x is at most W: that at the start, by accelerations, and
+    the whole budget of 1000 m/s.
     """
     assert scenario.thruster.budget_m_s == 1000.0
     pushes = np.abs(pair.acceleration_m_s2).sum(axis=-1)
     speeds = np.abs(pair.velocity_m_s[:, :-1].T) + pushes * scenario.set_model.step_s
     maximum = float(np.hypot.reduce(speeds).max()) + 1000.0
-    ranges = pair.label_m + pair.vx_m_s * scenario.set_model.step_s * np.arange(pair.last_common_step + 1)
+    ranges = pair.label_m + pair.vx_m_s * scenario.set_model.step_s * np.arange(
+        pair.last_common_step + 1
+    )
     slopes = maximum / -pair.vx_m_s + max(0.0, 0.5 * pair.apart_m - pair.correction_m) / ranges
     farthest = np.asarray(ranges * np.hypot(1.0, slopes), dtype=np.float64)
     bound = scenario.set_model.axis(axis).angle_sensor.error_bound
@@ -98,7 +113,10 @@ def max_half_distance_m(scenario: Scenario, label_m: float, last_common_step: in
     since = np.maximum(times[:, None] - times[None, :-1], 0.0)
     until = np.maximum(times[:, None] - times[None, 1:], 0.0)
     # Columns: offset and velocity at t = 0, accelerations; each in units of its maximum difference.
-    widths = [model.bounds.z_m[1] - model.bounds.z_m[0], model.bounds.vz_m_s[1] - model.bounds.vz_m_s[0]]
+    widths = [
+        model.bounds.z_m[1] - model.bounds.z_m[0],
+        model.bounds.vz_m_s[1] - model.bounds.vz_m_s[0],
+    ]
     motion = np.column_stack(
         [
             np.full(len(times), widths[0]),
@@ -109,13 +127,22 @@ def max_half_distance_m(scenario: Scenario, label_m: float, last_common_step: in
     ranges = label_m - 58e3 * times[: last_common_step + 1]
     limits = 2.0 * ranges * model.angle_sensor.error_bound(ranges)
     common = motion[: last_common_step + 1] / limits[:, None]
-    solved = linprog(-motion[-1], A_ub=np.vstack([common, -common]), b_ub=np.ones(2 * len(limits)), bounds=(-1.0, 1.0))
+    solved = linprog(
+        -motion[-1],
+        A_ub=np.vstack([common, -common]),
+        b_ub=np.ones(2 * len(limits)),
+        bounds=(-1.0, 1.0),
+    )
     assert solved.status == 0
     return float(-0.5 * solved.fun)
 
 
-@pytest.mark.parametrize(("last_common_step", "bound_m"), [(199, 11.5), (198, 18.9), (197, 22.6), (196, 22.6)])
-def test_bound_of_the_nominal_approach(last_common_step: int, bound_m: float, asteroid: Scenario) -> None:
+@pytest.mark.parametrize(
+    ("last_common_step", "bound_m"), [(199, 11.5), (198, 18.9), (197, 22.6), (196, 22.6)]
+)
+def test_bound_of_the_nominal_approach(
+    last_common_step: int, bound_m: float, asteroid: Scenario
+) -> None:
     pair = pair_at(asteroid, NOMINAL_LABEL_M, -58e3, last_common_step=last_common_step)
     assert pair.bound_m == pytest.approx(bound_m, abs=0.05)
 
@@ -124,16 +151,20 @@ def test_bound_of_the_nominal_approach(last_common_step: int, bound_m: float, as
 def test_two_measurements_by_hand(last_common_step: int, bound_m: float) -> None:
     """Without disturbance the two truths differ by dz(t) = dz(0) + t dv, and T = 2 s.
 
-    Measurements at t = 0 (x = 2000 m) and t = 1 s (x = 1000 m) that can be the same mean |dz(0)| <= 2 * 0.001 * 2000
+    Measurements at t = 0 (x = 2000 m) and t = 1 s (x = 1000 m) that can be the same mean |dz(0)| <=
+    2 * 0.001 * 2000
     = 4 m and |dz(1)| <= 2 * 0.001 * 1000 = 2 m.
 
-    Only the first can be the same (s = 0), and V_z is within 50 m/s, so |dv| <= 100 m/s: dz(2) = dz(0) + 2 dv is at
-    most 204 m. The impulse at t = 1 s may differ and corrects 0.5 m/s * 1 s of either: 102 - 0.5 = 101.5 m.
+    Only the first can be the same (s = 0), and V_z is within 50 m/s, so |dv| <= 100 m/s: dz(2) =
+    dz(0) + 2 dv is at most 204 m. The impulse at t = 1 s may differ and corrects 0.5 m/s * 1 s of
+    either: 102 - 0.5 = 101.5 m.
 
-    Both can be the same (s = 1), and V_z is within 2 m/s, so |dv| <= 4 m/s: dz(2) = dz(1) + dv is at most 2 + 4 = 6 m,
-    reached from dz(0) = -2 m. No impulse is left, for x = 0 at step 2: 6 / 2 = 3 m.
+    Both can be the same (s = 1), and V_z is within 2 m/s, so |dv| <= 4 m/s: dz(2) = dz(1) + dv is
+    at most 2 + 4 = 6 m, reached from dz(0) = -2 m. No impulse is left, for x = 0 at step 2: 6 / 2 =
+    3 m.
 
-    These are distances at x = 0. Impulses at t = 0, 1 and 2 s change V_z, which is at most the half-width, by 1.5 m/s.
+    These are distances at x = 0. Impulses at t = 0, 1 and 2 s change V_z, which is at most the
+    half-width, by 1.5 m/s.
     """
     half_width = 50.0 if last_common_step == 0 else 2.0
     pair = pair_at(toy(vz_m_s=half_width), 2000.0, -1000.0, last_common_step=last_common_step)
@@ -141,16 +172,17 @@ def test_two_measurements_by_hand(last_common_step: int, bound_m: float) -> None
 
 
 def test_two_measurements_by_hand_without_a_binding_box() -> None:
-    """As above, V_z within 5 m/s: dz(2) = 2 dz(1) - dz(0) is at most 2 * 2 + 4 = 8 m, so 4 m with both the same.
+    """As above, V_z within 5 m/s: dz(2) = 2 dz(1) - dz(0) is at most 2 * 2 + 4 = 8 m, so 4 m with
+    both the same.
 
-    The start is within 2 m of the x axis, and impulses at t = 0 and 1 s correct 60 m: a single motion proves nothing.
-    dv = dz(1) - dz(0) is then 6 m/s, V_z is 3 m/s, and three impulses of 20 m/s make it 63 m/s. With one measurement
-    only, dz(2) is at most 4 + 2 * 10 = 24 m, and an impulse of 20 m/s at t = 1 s leaves nothing of 12 m: both the same
-    is the best choice.
+    The start is within 2 m of the x axis, and impulses at t = 0 and 1 s correct 60 m: a single
+    motion proves nothing. dv = dz(1) - dz(0) is then 6 m/s, V_z is 3 m/s, and three impulses of 20
+    m/s make it 63 m/s. With one measurement only, dz(2) is at most 4 + 2 * 10 = 24 m, and an
+    impulse of 20 m/s at t = 1 s leaves nothing of 12 m: both the same is the best choice.
 
-    If either truth may accelerate by 0.25 m/s^2, the difference by 0.5 m/s^2 over each second: dz(1) = dz(0) + v + a/2
-    and dz(2) = dz(1) + v + a + b/2 = 2 dz(1) - dz(0) + (a + b)/2 is at most 8.5 m: 4.25 m. v is 6 - 0.25 = 5.75 m/s,
-    and V_z at most 2.875 + 2 * 0.25 + 60 m/s.
+    If either truth may accelerate by 0.25 m/s^2, the difference by 0.5 m/s^2 over each second:
+    dz(1) = dz(0) + v + a/2 and dz(2) = dz(1) + v + a + b/2 = 2 dz(1) - dz(0) + (a + b)/2 is at most
+    8.5 m: 4.25 m. v is 6 - 0.25 = 5.75 m/s, and V_z at most 2.875 + 2 * 0.25 + 60 m/s.
     """
     strong = toy(vz_m_s=5.0, max_impulse_m_s=20.0, z_m=2.0)
     found = pair_at(strong, 2000.0, -1000.0)
@@ -160,21 +192,31 @@ def test_two_measurements_by_hand_without_a_binding_box() -> None:
     pushed = pair_at(with_disturbance(strong, 0.25), 2000.0, -1000.0)
     assert pushed.bound_m == pytest.approx(4.25 * cosine(63.375), rel=3e-6)
     poor = replace(strong, thruster=replace(strong.thruster, budget_m_s=10.0))
-    assert pair_at(poor, 2000.0, -1000.0, last_common_step=1).bound_m == pytest.approx(4.0 * cosine(13.0), rel=3e-6)
+    assert pair_at(poor, 2000.0, -1000.0, last_common_step=1).bound_m == pytest.approx(
+        4.0 * cosine(13.0), rel=3e-6
+    )
 
 
 @pytest.mark.parametrize("slope", [0.01, 0.3])
 def test_the_bound_is_of_the_min_distance_of_an_oblique_flight(slope: float) -> None:
-    """As above with both measurements the same, no budget, and V_z within 2 m/s of `slope` times the closing speed.
+    """As above with both measurements the same, no budget, and V_z within 2 m/s of `slope` times
+    the closing speed.
 
-    The two are at z = 3 m and z = -3 m when x = 0, on straight lines: their minimum distances from the target are 3 m
-    times 1/sqrt(1 + (V_z/V_x)^2), which is less than 3 m. The bound takes the greater velocity for both.
+    The two are at z = 3 m and z = -3 m when x = 0, on straight lines: their minimum distances from
+    the target are 3 m times 1/sqrt(1 + (V_z/V_x)^2), which is less than 3 m. The bound takes the
+    greater velocity for both.
     """
-    scenario, speed = toy(), 1000.0 * slope
+    scenario = toy()
+    speed = 1000.0 * slope
     z_m = (-2.0 * speed - 100.0, -2.0 * speed + 100.0)
     box = StateBox(z_m, (2000.0, 2000.0), (speed - 2.0, speed + 2.0), (-1000.0, -1000.0))
     engine = replace(scenario.thruster, budget_m_s=0.0)
-    scenario = replace(scenario, dispersion=box, **of_model(replace(scenario.set_model, bounds=box)), thruster=engine)
+    scenario = replace(
+        scenario,
+        dispersion=box,
+        **of_model(replace(scenario.set_model, bounds=box)),
+        thruster=engine,
+    )
     pair = pair_at(scenario, 2000.0, -1000.0, last_common_step=1)
     miss_m = sorted(fly_pair(scenario, pair).results.miss_m)
     assert miss_m == pytest.approx([3.0 * cosine(speed + 2.0), 3.0 * cosine(speed - 2.0)], rel=3e-6)
@@ -193,7 +235,11 @@ def oblique(z_m: float, vz_m_s: float, half_width_m_s: float = 5.0, **sensor: An
     return replace(scenario, dispersion=box, **of_model(model), thruster=engine)
 
 
-FALLING = {"error_at_nominal_range_rad": 1e-4, "error_at_zero_range_rad": 1e-2, "nominal_range_m": 2100.0}
+FALLING = {
+    "error_at_nominal_range_rad": 1e-4,
+    "error_at_zero_range_rad": 1e-2,
+    "nominal_range_m": 2100.0,
+}
 
 
 @pytest.mark.parametrize(
@@ -214,24 +260,29 @@ def test_far_from_the_axis_measurements_can_be_the_same(scenario: Scenario) -> N
 
 
 def test_a_precise_range_sensor_limits_the_pair() -> None:
-    """At the slope q, the distances of the two differ by at most q |dz|: not more than 2e-5 of the range.
+    """At the slope q, the distances of the two differ by at most q |dz|: not more than 2e-5 of the
+    range.
 
-    Without the meter dz is -4, 2 and 8 m at x = 2000, 1000 and 0 m, and V_z is at most 103 m/s. The maximum slope q,
-    if the miss is below 4 m, is 0.103 + 4/2000 and 0.103 + 4/1000. The second is the stricter one: 0.107 * 2/1000 is
-    10.7 times 2e-5, so the difference and the bound are divided by 10.7.
+    Without the meter dz is -4, 2 and 8 m at x = 2000, 1000 and 0 m, and V_z is at most 103 m/s. The
+    maximum slope q, if the miss is below 4 m, is 0.103 + 4/2000 and 0.103 + 4/1000. The second is
+    the stricter one: 0.107 * 2/1000 is 10.7 times 2e-5, so the difference and the bound are divided
+    by 10.7.
     """
     scenario = replace(oblique(-200.0, 100.0), range_sensor=RangeSensor(1.0, 1e-5))
     pair = pair_at(scenario, 2000.0, -1000.0, last_common_step=1)
     assert pair.apart_m == pytest.approx(8.0 / 10.7, rel=3e-6)
     assert pair.bound_m == pytest.approx(4.0 / 10.7 * cosine(103.0), rel=3e-6)
     blunt = replace(scenario, range_sensor=RangeSensor(1.0, 1.1e-4))
-    assert pair_at(blunt, 2000.0, -1000.0, last_common_step=1).apart_m == pytest.approx(8.0, rel=3e-6)
+    assert pair_at(blunt, 2000.0, -1000.0, last_common_step=1).apart_m == pytest.approx(
+        8.0, rel=3e-6
+    )
 
 
 def test_budget_limits_what_can_be_corrected() -> None:
     """From 10 km at 1 km/s, impulses from step 5 on: arms 5, 4, 3, 2 and 1 s, 2 m/s each.
 
-    The budget of 5 m/s is best spent as 2, 2 and 1 m/s at the first three: 10 + 8 + 3 = 21 m, not 30 m.
+    The budget of 5 m/s is best spent as 2, 2 and 1 m/s at the first three: 10 + 8 + 3 = 21 m, not
+    30 m.
     """
     scenario = toy(max_impulse_m_s=2.0)
     rich = pair_at(scenario, 10e3, -1000.0, last_common_step=4)
@@ -241,7 +292,9 @@ def test_budget_limits_what_can_be_corrected() -> None:
 
 
 def test_gravity_on_both_motions_is_allowed_for() -> None:
-    """A flight of 4 h at 0.3 au, with the Sun across the approach: the arrival is later, and images are nearer."""
+    """A flight of 4 h at 0.3 au, with the Sun across the approach: the arrival is later, and images
+    are nearer.
+    """
     scenario = replace(load_scenario("dart-2022"), sun=Sun(1.327e20, 45e9, 0.5 * np.pi))
     box = scenario.set_model.bounds
     pair = pair_at(scenario, sum(box.x_m) / 2.0, sum(box.vx_m_s) / 2.0)
@@ -282,20 +335,32 @@ def test_lower_bound_of_the_published_scenario(asteroid: Scenario) -> None:
     ],
 )
 def test_bounds_in_space_by_the_last_common_step(
-    last_common_step: int, half_m: float, correction_m: float, planar_m: float, box_m: float, asteroid: Scenario
+    last_common_step: int,
+    half_m: float,
+    correction_m: float,
+    planar_m: float,
+    box_m: float,
+    asteroid: Scenario,
 ) -> None:
-    """A_s and M_s by an independent linear program, and the bounds in a plane and in space; no gravity."""
+    """A_s and M_s by an independent linear program, and the bounds in a plane and in space; no
+    gravity.
+    """
     asteroid = replace(asteroid, sun=None)
     box = in_space(asteroid)
     planar, joint = (
-        pair_at(scenario, NOMINAL_LABEL_M, -58e3, last_common_step=last_common_step) for scenario in (asteroid, box)
+        pair_at(scenario, NOMINAL_LABEL_M, -58e3, last_common_step=last_common_step)
+        for scenario in (asteroid, box)
     )
     independent_m = max_half_distance_m(asteroid, NOMINAL_LABEL_M, last_common_step)
     assert independent_m == pytest.approx(half_m, abs=0.006)
     assert planar.correction_m == joint.correction_m == pytest.approx(correction_m, abs=0.005)
     assert planar.bound_m == pytest.approx(planar_m, abs=0.06)
-    for pair, scenario, farthest_m in ((planar, asteroid, independent_m), (joint, box, np.sqrt(2.0) * independent_m)):
-        # A reserve of 1e-6 of the limits, and at worst all differences reduced to the limits at the true distance.
+    for pair, scenario, farthest_m in (
+        (planar, asteroid, independent_m),
+        (joint, box, np.sqrt(2.0) * independent_m),
+    ):
+        # A reserve of 1e-6 of the limits, and at worst all differences reduced to the limits at the
+        # true distance.
         least_m = shares(pair, scenario, "z").min() * farthest_m
         assert least_m * (1.0 - 2e-6) <= 0.5 * pair.apart_m <= farthest_m * (1.0 + 1e-7)
     assert joint.bound_m == pytest.approx(box_m, abs=0.05)
@@ -315,7 +380,10 @@ def test_the_pair_in_space_is_admissible(asteroid: Scenario) -> None:
     common = slice(0, pair.last_common_step + 1)
     for i, name in enumerate(model.axes):
         planar = model.axis(name)
-        for values, limits in ((pair.position_m, planar.bounds.z_m), (pair.velocity_m_s, planar.bounds.vz_m_s)):
+        for values, limits in (
+            (pair.position_m, planar.bounds.z_m),
+            (pair.velocity_m_s, planar.bounds.vz_m_s),
+        ):
             assert ((limits[0] <= values[:, i]) & (values[:, i] <= limits[1])).all()
         assert (np.abs(pair.acceleration_m_s2[i]) <= planar.disturbance_m_s2 * (1.0 + 1e-12)).all()
         apart = np.abs(positions_m[i, 0] - positions_m[i, 1])[common]
@@ -335,12 +403,16 @@ def test_the_pair_in_space_is_admissible(asteroid: Scenario) -> None:
     [{"impulses_s": (80.0, 45.0, 5.0)}, {"last_impulse_s": 8.0, "delay_steps": 3}],
     ids=["times", "cut-off"],
 )
-def test_with_a_schedule_the_best_last_common_step_is_found(asteroid: Scenario, fields: dict[str, Any]) -> None:
+def test_with_a_schedule_the_best_last_common_step_is_found(
+    asteroid: Scenario, fields: dict[str, Any]
+) -> None:
     """The best of all steps, most of which are no candidates."""
     scenario = replace(asteroid, thruster=replace(asteroid.thruster, **fields))
     found = pair_at(scenario, NOMINAL_LABEL_M, -58e3)
     steps = range(60, 200, 3) if "last_impulse_s" in fields else range(0, 200, 5)
-    every = [pair_at(scenario, NOMINAL_LABEL_M, -58e3, last_common_step=step).bound_m for step in steps]
+    every = [
+        pair_at(scenario, NOMINAL_LABEL_M, -58e3, last_common_step=step).bound_m for step in steps
+    ]
     assert found.bound_m >= max(every) * (1.0 - 1e-6)
     assert found.bound_m > pair_at(asteroid, NOMINAL_LABEL_M, -58e3).bound_m
     assert found.last_common_step <= 190
@@ -348,7 +420,9 @@ def test_with_a_schedule_the_best_last_common_step_is_found(asteroid: Scenario, 
 
 @pytest.mark.parametrize("case", ["narrow-labels", "rate-free-space", "late-cut-off"])
 def test_best_pair_is_the_best_of_all_last_common_steps(case: str) -> None:
-    """The bound has several maxima over the last common step, with the one motion of `narrow-labels` far from best."""
+    """The bound has several maxima over the last common step, with the one motion of
+    `narrow-labels` far from best.
+    """
     scenario = load_scenario(CASES / f"{case}.toml")
     box = scenario.set_model.bounds
     approach = Approach(scenario, box.x_m[1], box.vx_m_s[0])
@@ -360,15 +434,18 @@ def test_best_pair_is_the_best_of_all_last_common_steps(case: str) -> None:
 
 
 def test_two_measurements_in_space_by_hand() -> None:
-    """As in the plane, with V_z within 2 m/s and V_y within 1 m/s, both measurements the same and no impulse left.
+    """As in the plane, with V_z within 2 m/s and V_y within 1 m/s, both measurements the same and
+    no impulse left.
 
     |dv_y| <= 2 m/s: dy(2) = dy(1) + dv_y is at most 2 + 2 = 4 m, with dy(0) = 0; dz(2) is at most 6 m. One of the two
-    is half of |(4, 6)| m from the target at x = 0. The velocity across x is at most |(1, 2)| m/s, and 1.5 m/s by
-    impulses.
+    is half of |(4, 6)| m from the target at x = 0. The velocity across x is at most |(1, 2)| m/s,
+    and 1.5 m/s by impulses.
     """
     scenario = in_space(toy(vz_m_s=2.0))
     bounds = replace(scenario.set_model.bounds, vy_m_s=(-1.0, 1.0))
-    scenario = replace(scenario, **of_model(replace(scenario.set_model, bounds=bounds)), dispersion=bounds)
+    scenario = replace(
+        scenario, **of_model(replace(scenario.set_model, bounds=bounds)), dispersion=bounds
+    )
     pair = pair_at(scenario, 2000.0, -1000.0, last_common_step=1)
     bound_m = 0.5 * np.hypot(4.0, 6.0) * cosine(1.5 + np.hypot(1.0, 2.0))
     assert pair.bound_m == pytest.approx(bound_m, rel=3e-6)

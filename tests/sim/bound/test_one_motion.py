@@ -20,18 +20,28 @@ from tests.space import in_space
 
 
 def cosine(across_m_s: float) -> float:
-    """Cosine of the angle between the relative velocity and the x axis, at a closing speed of 58 km/s."""
+    """Cosine of the angle between the relative velocity and the x axis, at a closing speed of 58
+    km/s.
+    """
     return 1.0 / float(np.hypot(1.0, across_m_s / 58e3))
 
 
 def offset(z_m: tuple[float, float], **engine: Any) -> Scenario:
-    """The 1997 sensor without gravity: known range and speed, a start far from the x axis and a weak engine."""
+    """The 1997 sensor without gravity: known range and speed, a start far from the x axis and a
+    weak engine.
+    """
     published = load_scenario("asteroid-1997")
     box = StateBox(z_m, (5801.3e3, 5801.3e3), (0.0, 0.0), (-58e3, -58e3))
     model = replace(published.set_model, bounds=box, disturbance_m_s2=0.005, model=Model.GUARANTEED)
-    model = replace(model, initial_set=InitialSet.BOX, angle_sensor=replace(model.angle_sensor, period_s=0.5))
-    thruster = Thruster(**{"budget_m_s": 1000.0, "min_impulse_m_s": 1e-4, "max_impulse_m_s": 0.5} | engine)
-    return replace(published, sun=None, **of_model(model), dispersion=box, range_sensor=None, thruster=thruster)
+    model = replace(
+        model, initial_set=InitialSet.BOX, angle_sensor=replace(model.angle_sensor, period_s=0.5)
+    )
+    thruster = Thruster(
+        **{"budget_m_s": 1000.0, "min_impulse_m_s": 1e-4, "max_impulse_m_s": 0.5} | engine
+    )
+    return replace(
+        published, sun=None, **of_model(model), dispersion=box, range_sensor=None, thruster=thruster
+    )
 
 
 @pytest.mark.parametrize(
@@ -45,11 +55,14 @@ def offset(z_m: tuple[float, float], **engine: Any) -> Scenario:
     ],
     ids=["all", "budget", "delay", "cut-off", "schedule"],
 )
-def test_a_far_start_misses_by_what_all_impulses_leave(engine: dict[str, Any], given: list[float]) -> None:
-    """From z = 10 km the target ends at 10 km + nu T^2/2, and an impulse at 0.5 k s moves that by T - 0.5 k times it.
+def test_a_far_start_misses_by_what_all_impulses_leave(
+    engine: dict[str, Any], given: list[float]
+) -> None:
+    """From z = 10 km the target ends at 10 km + nu T^2/2, and an impulse at 0.5 k s moves that by T
+    - 0.5 k times it.
 
-    The cosine is that of the velocity nu T and all impulses. Every strategy misses by that; two motions with the same
-    measurements prove 90 m.
+    The cosine is that of the velocity nu T and all impulses. Every strategy misses by that; two
+    motions with the same measurements prove 90 m.
     """
     scenario = offset((8e3, 10e3), **engine)
     arrival_s = 5801.3 / 58.0
@@ -81,11 +94,14 @@ def test_in_space_a_far_start_is_a_corner_of_the_box() -> None:
 
 
 def test_the_middle_of_a_pair_adds_nothing_to_pair_and_single_motion() -> None:
-    """max(0, |c0| - C_s) + W_s - A_s of a pair around c0 is one of the other two bounds, as C_s = A_-1 - A_s."""
+    """max(0, |c0| - C_s) + W_s - A_s of a pair around c0 is one of the other two bounds, as C_s =
+    A_-1 - A_s.
+    """
     for low_m in (0.0, 4e3, 4.9e3, 6e3):
         scenario = offset((low_m, low_m + 200.0))
         approach = Approach(scenario, 5801.3e3, -58e3)
-        single, pair = approach.single(), approach.best_pair()
+        single = approach.single()
+        pair = approach.best_pair()
         spent = single.correction_m - pair.correction_m
         middle = max(0.0, low_m + 100.0 - spent) + 0.5 * pair.apart_m - pair.correction_m
         assert middle * pair.cosine <= max(single.unlimited_bound_m, pair.unlimited_bound_m) + 1e-2

@@ -34,7 +34,8 @@ QUICK = 4
 SENSOR = AngleSensor(1.0, 0.001, 0.002, 1000.0)
 
 
-METER, RATE = RangeSensor(1.0, 0.1), RateSensor(1.0, 4.0)
+METER = RangeSensor(1.0, 0.1)
+RATE = RateSensor(1.0, 4.0)
 
 
 def sight(step: int, *sensors: Sensor) -> LineOfSight:
@@ -58,7 +59,9 @@ def nothing_known() -> InformationSetView:
     return InformationSet(SetModel(100.0, 1.0, box, SENSOR, model=Model.PAPER), 4).view()
 
 
-def test_pairs_are_measured_in_the_middle_until_it_is_late(nothing_known: InformationSetView) -> None:
+def test_pairs_are_measured_in_the_middle_until_it_is_late(
+    nothing_known: InformationSetView,
+) -> None:
     noise = PairNoise(3)
     common = noise.measure(sight(3, SENSOR, METER, RATE), nothing_known)
     assert common["angle"][0] == pytest.approx([0.011, 0.011, -0.5005, -0.5005])
@@ -72,9 +75,17 @@ def test_pairs_are_measured_in_the_middle_until_it_is_late(nothing_known: Inform
     assert np.array_equal(honest["rate"], sight(4).omega_rad_s)
 
 
-def test_pairs_in_space_have_one_measurement_with_equal_errors(nothing_known: InformationSetView) -> None:
+def test_pairs_in_space_have_one_measurement_with_equal_errors(
+    nothing_known: InformationSetView,
+) -> None:
     alpha = np.array([[0.3, 0.3012, -0.1, -0.1], [0.2, 0.1991, 0.4, 0.4016]])
-    true = LineOfSight(3, alpha, 10.0 * alpha, np.full(4, 1000.0), {each.name: each for each in (SENSOR, METER, RATE)})
+    true = LineOfSight(
+        3,
+        alpha,
+        10.0 * alpha,
+        np.full(4, 1000.0),
+        {each.name: each for each in (SENSOR, METER, RATE)},
+    )
     noise = PairNoise(3)
     measured = noise.measure(true, nothing_known)
     assert all((values[..., 0::2] == values[..., 1::2]).all() for values in measured.values())
@@ -87,7 +98,9 @@ def test_pairs_in_space_have_one_measurement_with_equal_errors(nothing_known: In
 
 
 def random_scenario(number: int) -> Scenario:
-    """An engagement of its own: ranges, speeds, bounds, steps, sensors and engines drawn at random."""
+    """An engagement of its own: ranges, speeds, bounds, steps, sensors and engines drawn at
+    random.
+    """
     draws = np.random.default_rng([1997, number])
     speed = draws.uniform(5e3, 60e3)
     step_s = float(draws.choice([0.2, 0.5, 1.0]))
@@ -96,17 +109,22 @@ def random_scenario(number: int) -> Scenario:
     spread = draws.uniform(0.0, 0.5) * speed * step_s if number >= QUICK else 0.0
     errors = draws.uniform(5e-5, 3e-4, 2)
     hidden_m_s = errors.max() * speed  # what the measurements of a second leave open
-    z, vz = draws.uniform(1e-3, 3e-3) * nominal, draws.uniform(0.5, 5.0) * hidden_m_s
+    z = draws.uniform(1e-3, 3e-3) * nominal
+    vz = draws.uniform(0.5, 5.0) * hidden_m_s
     eta = draws.uniform(0.0, 0.02)
     closing = (-speed * (1.0 + eta), -speed * (1.0 - eta))
-    box = StateBox((-z, draws.uniform(0.5, 1.5) * z), (nominal - spread, nominal + spread), (-vz, vz), closing)
+    box = StateBox(
+        (-z, draws.uniform(0.5, 1.5) * z), (nominal - spread, nominal + spread), (-vz, vz), closing
+    )
     guaranteed = bool(draws.integers(2))
     engine = hidden_m_s * draws.uniform(0.2, 1.0)
     model = SetModel(
         closing_speed_m_s=speed,
         step_s=step_s,
         bounds=box,
-        angle_sensor=AngleSensor(step_s * float(draws.integers(1, 3)), float(errors[0]), float(errors[1]), nominal),
+        angle_sensor=AngleSensor(
+            step_s * float(draws.integers(1, 3)), float(errors[0]), float(errors[1]), nominal
+        ),
         disturbance_m_s2=draws.uniform(0.0, 0.02),
         range_threshold_m=draws.uniform(0.1, 0.3) * speed * step_s,
         sections=15,
@@ -115,27 +133,39 @@ def random_scenario(number: int) -> Scenario:
     )
     return Scenario(
         name=f"random {number}",
-        sun=Sun(1.3e20, draws.uniform(50e9, 200e9), draws.uniform(-np.pi, np.pi)) if draws.integers(2) else None,
+        sun=Sun(1.3e20, draws.uniform(50e9, 200e9), draws.uniform(-np.pi, np.pi))
+        if draws.integers(2)
+        else None,
         nominal_range_m=nominal,
         dispersion=box,
         **of_model(model),
         range_sensor=RangeSensor(2.0 * step_s, 0.05) if draws.integers(2) else None,
         thruster=Thruster(engine * draws.uniform(0.4, 1.5) * steps, 0.05 * engine, engine),
-        rate_sensor=RateSensor(step_s, draws.uniform(1.0, 10.0) * hidden_m_s / nominal) if number % 4 == 3 else None,
+        rate_sensor=RateSensor(step_s, draws.uniform(1.0, 10.0) * hidden_m_s / nominal)
+        if number % 4 == 3
+        else None,
     )
 
 
 def random_in_space(number: int) -> Scenario:
     """A random scenario with a second lateral axis: other bounds, any Sun."""
-    scenario, draws = random_scenario(number), np.random.default_rng([2001, number])
-    model, share = scenario.set_model, draws.uniform(0.3, 1.0, 4)
+    scenario = random_scenario(number)
+    draws = np.random.default_rng([2001, number])
+    model = scenario.set_model
+    share = draws.uniform(0.3, 1.0, 4)
     sensor = linear(model.angle_sensor)
-    sensor = replace(sensor, error_at_nominal_range_y_rad=share[0] * sensor.error_at_nominal_range_rad)
+    sensor = replace(
+        sensor, error_at_nominal_range_y_rad=share[0] * sensor.error_at_nominal_range_rad
+    )
     (minimum, maximum), speed = model.bounds.z_m, share[2] * model.bounds.vz_m_s[1]
     box = replace(model.bounds, y_m=(minimum, share[1] * maximum), vy_m_s=(-speed, speed))
     disturbance = share[3] * model.disturbance_m_s2
     model = replace(model, bounds=box, angle_sensor=sensor, disturbance_y_m_s2=disturbance)
-    sun = None if scenario.sun is None else replace(scenario.sun, elevation_rad=draws.uniform(-0.5, 0.5) * np.pi)
+    sun = (
+        None
+        if scenario.sun is None
+        else replace(scenario.sun, elevation_rad=draws.uniform(-0.5, 0.5) * np.pi)
+    )
     return replace(scenario, **of_model(model), dispersion=box, sun=sun)
 
 
@@ -155,7 +185,8 @@ def check(scenario: Scenario, strategy: Strategy) -> None:
     assert found.bound_m > 0.0
     for pair in found.pairs:
         flight = fly_pair(scenario, pair, strategy)
-        # Far from an interception angles are no longer small, and rates no longer linear; the miss is then far greater.
+        # Far from an interception angles are no longer small, and rates no longer linear; the miss
+        # is then far greater.
         assert flight.max_error_share <= 1.0 or flight.results.miss_m.max() > 2.0 * pair.bound_m
         common = flight.impulse_m_s[: pair.last_common_step + 1]
         assert (common[..., 0] == common[..., 1]).all()
@@ -169,19 +200,23 @@ def test_one_of_the_pair_misses_by_the_bound(number: int, make: Callable[[int], 
 
 
 @pytest.mark.parametrize("case", ["narrow-labels", "rate-free-space"])
-def test_one_of_the_pair_misses_by_the_bound_with_a_rate_sensor_and_narrow_labels(case: str) -> None:
+def test_one_of_the_pair_misses_by_the_bound_with_a_rate_sensor_and_narrow_labels(
+    case: str,
+) -> None:
     scenario = load_scenario(Path(__file__).parent.parent / "cases" / f"{case}.toml")
     check(scenario, make_strategy("symmetric-miss"))
     check(scenario, make_strategy("least-effort"))
 
 
 @pytest.mark.parametrize("kind", Model)
-def test_one_of_the_pair_misses_by_the_bound_in_the_scenario_of_1997(kind: Model, published_in_space: Scenario) -> None:
+def test_one_of_the_pair_misses_by_the_bound_in_the_scenario_of_1997(
+    kind: Model, published_in_space: Scenario
+) -> None:
     """42.8 m, with reserves for slopes of 1/58: the budget by the closing speed.
 
-    The bound is the cosine times the difference of A, from an independent linear program, and M of impulses. The error
-    bound of an angle falls by 0.08/0.15 of its value from x = 0 to the start, so it is less at the true distance, by
-    that share of half the slope squared.
+    The bound is the cosine times the difference of A, from an independent linear program, and M of
+    impulses. The error bound of an angle falls by 0.08/0.15 of its value from x = 0 to the start,
+    so it is less at the true distance, by that share of half the slope squared.
     """
     model = replace(published_in_space.set_model, model=kind)
     if kind is Model.GUARANTEED:
@@ -197,13 +232,16 @@ def test_one_of_the_pair_misses_by_the_bound_in_the_scenario_of_1997(kind: Model
     assert flight.results.miss_m.max() >= pair.bound_m
     assert flight.results.truth_kept.all()
     assert (
-        flight.impulse_m_s[: pair.last_common_step + 1, :, 0] == flight.impulse_m_s[: pair.last_common_step + 1, :, 1]
+        flight.impulse_m_s[: pair.last_common_step + 1, :, 0]
+        == flight.impulse_m_s[: pair.last_common_step + 1, :, 1]
     ).all()
 
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("make", [random_scenario, random_in_space])
 @pytest.mark.parametrize("number", range(QUICK, QUICK + 20))
-def test_one_of_the_pair_misses_by_the_bound_in_more_scenarios(number: int, make: Callable[[int], Scenario]) -> None:
+def test_one_of_the_pair_misses_by_the_bound_in_more_scenarios(
+    number: int, make: Callable[[int], Scenario]
+) -> None:
     for strategy in (make_strategy("symmetric-miss"), make_strategy("patient"), Still()):
         check(make(number), strategy)

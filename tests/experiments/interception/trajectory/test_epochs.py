@@ -49,7 +49,9 @@ DELTET/DELTA_AT = ( 10, @1972-JAN-1, 11, @1972-JUL-1, 12, @1973-JAN-1, 13, @1974
         ("2029-03-01T00:00:00.1234567890123", date(2029, 3, 1), Fraction("0.1234567890123"), None),
     ],
 )
-def test_epoch_is_read_with_all_its_digits(text: str, day: date, second: Fraction, scale: str | None) -> None:
+def test_epoch_is_read_with_all_its_digits(
+    text: str, day: date, second: Fraction, scale: str | None
+) -> None:
     assert parse_epoch(text) == (day, second, scale)
 
 
@@ -101,7 +103,8 @@ def test_utc_before_leap_seconds_is_refused() -> None:
 @pytest.mark.parametrize(
     ("scale", "wanted", "difference"),
     [
-        # At 2029: TAI - UTC = 37 s, TT - TAI = 32.184 s, TAI - GPS = 19 s. The seconds of UTC count as TAI.
+        # At 2029: TAI - UTC = 37 s, TT - TAI = 32.184 s, TAI - GPS = 19 s. The seconds of UTC count
+        # as TAI.
         ("UTC", "TAI", Fraction(37)),
         ("UTC", "TT", Fraction("69.184")),
         ("GPS", "TAI", Fraction(19)),
@@ -109,7 +112,9 @@ def test_utc_before_leap_seconds_is_refused() -> None:
         ("TAI", "TT", Fraction("32.184")),
     ],
 )
-def test_scales_with_constant_differences_are_converted_exactly(scale: str, wanted: str, difference: Fraction) -> None:
+def test_scales_with_constant_differences_are_converted_exactly(
+    scale: str, wanted: str, difference: Fraction
+) -> None:
     epoch = parse_epoch("2029-03-01T00:00:00.123456789")
 
     assert converted(epoch, scale, wanted) - seconds_in(epoch, "TT") == difference
@@ -117,7 +122,9 @@ def test_scales_with_constant_differences_are_converted_exactly(scale: str, want
 
 @pytest.mark.parametrize("year", range(1973, 2050, 3))
 def test_tdb_from_utc_is_that_of_spice(year: int, tmp_path: Path) -> None:
-    spice: Any = pytest.importorskip("spiceypy", reason="needs the extra trajectory: pip install '.[trajectory]'")
+    spice: Any = pytest.importorskip(
+        "spiceypy", reason="needs the extra trajectory: pip install '.[trajectory]'"
+    )
     (tmp_path / "leap.tls").write_text(LEAP_KERNEL)
     text = f"{year}-{1 + year % 12:02}-{1 + year % 28:02}T{year % 24:02}:34:56"
 
@@ -125,25 +132,35 @@ def test_tdb_from_utc_is_that_of_spice(year: int, tmp_path: Path) -> None:
         wanted = spice.str2et(text)
 
     # SPICE has seconds from J2000 in double precision: 1.2e-7 s at 1e9 s.
-    assert float(converted(parse_epoch(text), "UTC", "TDB")) == pytest.approx(wanted, rel=0.0, abs=5e-7)
+    assert float(converted(parse_epoch(text), "UTC", "TDB")) == pytest.approx(
+        wanted, rel=0.0, abs=5e-7
+    )
 
 
 def test_tdb_and_back_is_the_same_time() -> None:
     epoch = parse_epoch("2029-03-01T00:00:00")
     there = converted(epoch, "TT", "TDB")
 
-    back = converted(epoch._replace(second=epoch.second + there - seconds_in(epoch, "TT")), "TDB", "TT")
+    back = converted(
+        epoch._replace(second=epoch.second + there - seconds_in(epoch, "TT")), "TDB", "TT"
+    )
 
-    assert abs(float(back - seconds_in(epoch, "TT"))) < 1e-12  # the argument differs by 2 ms, the rate is 3.3e-10
+    assert (
+        abs(float(back - seconds_in(epoch, "TT"))) < 1e-12
+    )  # the argument differs by 2 ms, the rate is 3.3e-10
 
 
 def test_drift_is_the_variable_part_of_tdb() -> None:
-    """TDB - TT is 1.657 ms sin(M + e sin M), M the mean anomaly of the Earth (NAIF, Time Required Reading)."""
+    """TDB - TT is 1.657 ms sin(M + e sin M), M the mean anomaly of the Earth (NAIF, Time Required
+    Reading).
+    """
     seconds = seconds_in(parse_epoch("2029-03-01T00:00:00"), "TT")
     anomaly = 6.239996 + 1.99096871e-7 * float(seconds)
 
     assert tdb_drift_s(seconds, "TDB") == 0.0
-    assert tdb_drift_s(seconds, "TT") == pytest.approx(1.657e-3 * math.sin(anomaly + 1.671e-2 * math.sin(anomaly)))
+    assert tdb_drift_s(seconds, "TT") == pytest.approx(
+        1.657e-3 * math.sin(anomaly + 1.671e-2 * math.sin(anomaly))
+    )
     assert tdb_drift_s(seconds - Fraction("32.184"), "UTC") == tdb_drift_s(seconds, "TT")
 
 
@@ -157,5 +174,7 @@ def test_drift_is_the_variable_part_of_tdb() -> None:
         ("2027-06-28", "UTC", "TDB", False),
     ],
 )
-def test_conversion_with_future_leap_seconds_is_a_guess(day: str, scale: str, wanted: str, guess: bool) -> None:
+def test_conversion_with_future_leap_seconds_is_a_guess(
+    day: str, scale: str, wanted: str, guess: bool
+) -> None:
     assert is_guess(parse_epoch(day), scale, wanted) is guess

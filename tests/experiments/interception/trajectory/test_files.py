@@ -37,7 +37,9 @@ def test_file_elsewhere_is_refused(name: str, folder: Path) -> None:
     (folder / "link.oem").symlink_to(folder.parent / "beside.oem")
     (folder / "away").symlink_to("/etc")
 
-    with pytest.raises(InputError, match=r"is not below the folder of the trajectory file; copy it there, or allow"):
+    with pytest.raises(
+        InputError, match=r"is not below the folder of the trajectory file; copy it there, or allow"
+    ):
         named_file(name, folder, ())
 
 
@@ -86,7 +88,9 @@ def test_endless_device_is_refused_even_if_its_folder_is_allowed(folder: Path) -
 def test_meta_kernel_is_refused(text: str, folder: Path) -> None:
     (folder / "meta.tm").write_text(text)
 
-    with pytest.raises(InputError, match=r"meta.tm: is a meta-kernel, which loads further files; name the kernels"):
+    with pytest.raises(
+        InputError, match=r"meta.tm: is a meta-kernel, which loads further files; name the kernels"
+    ):
         kernel_files(["meta.tm"], folder, ())
 
 
@@ -94,7 +98,10 @@ def test_kernels_of_text_and_of_numbers_are_opened(folder: Path) -> None:
     (folder / "leap.tls").write_text("KPL/LSK\n\\begindata\nDELTET/K = 1.657D-3\n")
     (folder / "both.bsp").write_bytes(b"DAF/SPK KERNELS_TO_LOAD in its comments")
 
-    assert kernel_files(["leap.tls", "both.bsp"], folder, ()) == [folder / "leap.tls", folder / "both.bsp"]
+    assert kernel_files(["leap.tls", "both.bsp"], folder, ()) == [
+        folder / "leap.tls",
+        folder / "both.bsp",
+    ]
 
 
 def test_text_kernel_has_a_maximum_size(folder: Path) -> None:

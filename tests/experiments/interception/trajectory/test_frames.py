@@ -32,7 +32,13 @@ def test_names_of_one_frame_are_the_same(one: str, other: str) -> None:
 
 @pytest.mark.parametrize(
     ("one", "other"),
-    [("EME2000", "ICRF"), ("EME2000", "ECLIPJ2000"), ("TOD_EARTH", "TOD_MOON"), ("MOD", "TOD"), ("B1950", "J2000")],
+    [
+        ("EME2000", "ICRF"),
+        ("EME2000", "ECLIPJ2000"),
+        ("TOD_EARTH", "TOD_MOON"),
+        ("MOD", "TOD"),
+        ("B1950", "J2000"),
+    ],
 )
 def test_different_frames_are_not_the_same(one: str, other: str) -> None:
     assert not is_same_frame(inertial_frame(one), inertial_frame(other))
@@ -96,7 +102,13 @@ def test_j2000_of_spice_is_both_eme2000_and_icrf(name: str) -> None:
 
 @pytest.mark.parametrize(
     ("one", "other"),
-    [("Sun", "SUN"), ("10", "SUN"), ("SSB", "Solar_System_Barycenter"), ("399", "earth"), ("EMB", "Earth Barycenter")],
+    [
+        ("Sun", "SUN"),
+        ("10", "SUN"),
+        ("SSB", "Solar_System_Barycenter"),
+        ("399", "earth"),
+        ("EMB", "Earth Barycenter"),
+    ],
 )
 def test_names_of_one_centre_are_the_same(one: str, other: str) -> None:
     assert centre_name(one) == centre_name(other)

@@ -11,7 +11,12 @@ import pytest
 
 from infoset.arrays import Floats
 from infoset.experiments.interception.trajectory import interpolation
-from infoset.experiments.interception.trajectory.interpolation import Interpolated, hermite, interpolate, lagrange
+from infoset.experiments.interception.trajectory.interpolation import (
+    Interpolated,
+    hermite,
+    interpolate,
+    lagrange,
+)
 
 Polynomial = list[Fraction]
 """Coefficients, the constant first."""
@@ -30,27 +35,39 @@ def derivative(polynomial: Polynomial) -> Polynomial:
 
 
 def random_polynomial(generator: np.random.Generator, degree: int, time_unit: int) -> Polynomial:
-    """A polynomial with whole coefficients in units of a time, of the size of an orbit around the Sun."""
+    """A polynomial with whole coefficients in units of a time, of the size of an orbit around the
+    Sun.
+    """
     coefficients = generator.integers(-(10**9), 10**9, size=degree + 1).tolist()
     return [Fraction(each, time_unit**power) for power, each in enumerate(coefficients)]
 
 
 def table_of(polynomials: list[Polynomial], times: list[Fraction]) -> Floats:
     rates = [derivative(each) for each in polynomials]
-    return np.array([[[float(value(each, time)) for each in kind] for kind in (polynomials, rates)] for time in times])
+    return np.array(
+        [
+            [[float(value(each, time)) for each in kind] for kind in (polynomials, rates)]
+            for time in times
+        ]
+    )
 
 
 def at_zero(newton: list[Fraction], nodes: list[Fraction]) -> tuple[float, float]:
     """Value and derivative at zero of a polynomial in Newton's form."""
-    position, velocity = newton[-1], Fraction(0)
-    for coefficient, node in zip(reversed(newton[:-1]), reversed(nodes[: len(newton) - 1]), strict=True):
+    position = newton[-1]
+    velocity = Fraction(0)
+    for coefficient, node in zip(
+        reversed(newton[:-1]), reversed(nodes[: len(newton) - 1]), strict=True
+    ):
         velocity = position - node * velocity
         position = coefficient - node * position
     return float(position), float(velocity)
 
 
 def exact_hermite(times: list[Fraction], states: Floats) -> Floats:
-    """Position and velocity at time zero of the polynomial by divided differences with repeated nodes."""
+    """Position and velocity at time zero of the polynomial by divided differences with repeated
+    nodes.
+    """
     nodes = [time for time in times for _ in range(2)]
     result = np.empty((2, 3))
     for axis in range(3):
@@ -85,10 +102,14 @@ def summed(lengths: Sequence[int], begin: Fraction) -> list[Fraction]:
     return list(accumulate(map(Fraction, lengths), initial=begin))
 
 
-def random_times(generator: np.random.Generator, count: int, first: int, second: int) -> list[Fraction]:
+def random_times(
+    generator: np.random.Generator, count: int, first: int, second: int
+) -> list[Fraction]:
     """Times with a change of the step in the middle; zero is not one of them."""
     lengths = [first] * (count // 2) + [second] * (count - count // 2)
-    begin = Fraction(-sum(lengths[: count // 2])) + Fraction(int(generator.integers(1, 99)), 100) * min(first, second)
+    begin = Fraction(-sum(lengths[: count // 2])) + Fraction(
+        int(generator.integers(1, 99)), 100
+    ) * min(first, second)
     return summed(lengths, begin)
 
 
@@ -104,19 +125,26 @@ def test_polynomial_is_that_of_exact_rationals(method: str, seed: int) -> None:
     states[:, 0] = 1e11 + np.cumsum(states[:, 1] * step, axis=0)
     relative = np.array([float(time) for time in times])
 
-    polynomial, exact = (hermite, exact_hermite) if method == "HERMITE" else (lagrange, exact_lagrange)
+    polynomial, exact = (
+        (hermite, exact_hermite) if method == "HERMITE" else (lagrange, exact_lagrange)
+    )
     found = polynomial(relative, states)
 
-    # In the middle of nine equal steps the weights have a sum below 100, and each product has a rounding error.
+    # In the middle of nine equal steps the weights have a sum below 100, and each product has a
+    # rounding error.
     spread = np.ptp(states[:, 0], axis=0).max() + step * np.abs(states[:, 1]).max()
     scale = np.array([1e11 + spread, spread / step])[:, None]
-    np.testing.assert_allclose(found / scale, exact(times, states) / scale, rtol=0.0, atol=100.0 * 2.0**-52)
+    np.testing.assert_allclose(
+        found / scale, exact(times, states) / scale, rtol=0.0, atol=100.0 * 2.0**-52
+    )
 
 
 @pytest.mark.parametrize("seed", range(10))
 @pytest.mark.parametrize(("method", "degree"), [("HERMITE", 15), ("LAGRANGE", 6)])
 def test_table_of_a_polynomial_gives_this_polynomial(method: str, degree: int, seed: int) -> None:
-    """Eight states determine a polynomial of degree 15 by Hermite's method, and of degree 7 by Lagrange's."""
+    """Eight states determine a polynomial of degree 15 by Hermite's method, and of degree 7 by
+    Lagrange's.
+    """
     generator = np.random.default_rng(seed)
     step = 600
     polynomials = [random_polynomial(generator, degree, step * 8) for _ in range(3)]
@@ -128,8 +156,9 @@ def test_table_of_a_polynomial_gives_this_polynomial(method: str, degree: int, s
     assert found.degree == 7
     position = [float(value(each, epoch)) for each in polynomials]
     velocity = [float(value(derivative(each), epoch)) for each in polynomials]
-    # Coefficients are below 1e9 within 20 / 24 of the unit of time: values below 1e10 have roundings of 1e-6, which
-    # the weights of Hermite's method, below 10 in the middle of a table, add up.
+    # Coefficients are below 1e9 within 20 / 24 of the unit of time: values below 1e10 have
+    # roundings of 1e-6, which the weights of Hermite's method, below 10 in the middle of a table,
+    # add up.
     np.testing.assert_allclose(found.state[0], position, rtol=0.0, atol=1e-3)
     np.testing.assert_allclose(found.state[1], velocity, rtol=0.0, atol=1e-5)
 
@@ -144,7 +173,9 @@ def orbit(times: list[Fraction]) -> Floats:
     return np.stack([positions, velocities], axis=1)
 
 
-@pytest.mark.parametrize(("first", "second"), [(86400, 60), (86400, 600), (3600, 60), (600, 86400), (60, 3600)])
+@pytest.mark.parametrize(
+    ("first", "second"), [(86400, 60), (86400, 600), (3600, 60), (600, 86400), (60, 3600)]
+)
 @pytest.mark.parametrize("interval", range(-4, 4))
 @pytest.mark.parametrize("method", ["HERMITE", "LAGRANGE"])
 def test_state_beside_a_change_of_the_step_is_that_of_the_orbit(
@@ -158,8 +189,9 @@ def test_state_beside_a_change_of_the_step_is_that_of_the_orbit(
     found = interpolate(epoch, times, orbit(times), method, 7, without_drift)
 
     error_m, error_m_s = np.linalg.norm(found.state - orbit([epoch])[0], axis=1)
-    # Positions have roundings of 3e-5 m. The error of degree 7 with steps of a day is below
-    # (2e-7 86400)^8 1.5e11 m 273 / 10^5 = 3 mm; the velocity by Hermite has the roundings per step of 60 s.
+    # Positions have roundings of 3e-5 m. The error of degree 7 with steps of a day is below (2e-7
+    # 86400)^8 1.5e11 m 273 / 10^5 = 3 mm; the velocity by Hermite has the roundings per step of 60
+    # s.
     assert error_m < 1e-2
     assert error_m_s < 1e-5
     assert max(found.error[0], 1e-4) * 10.0 > error_m
@@ -189,7 +221,10 @@ def test_tabulated_epoch_is_the_tabulated_state(method: str, row: int) -> None:
 def test_single_state_is_enough_for_its_own_epoch() -> None:
     times = [Fraction(60)]
 
-    assert interpolate(Fraction(60), times, orbit(times), "HERMITE", 7, without_drift).method == "TABULATED"
+    assert (
+        interpolate(Fraction(60), times, orbit(times), "HERMITE", 7, without_drift).method
+        == "TABULATED"
+    )
     with pytest.raises(ValueError, match="outside the table"):
         interpolate(Fraction(61), times, orbit(times), "HERMITE", 7, without_drift)
 
@@ -213,7 +248,9 @@ def gap_after(step: int, gap: int) -> tuple[list[Fraction], Fraction]:
 def test_epoch_in_a_gap_is_refused() -> None:
     times, epoch = gap_after(60, 60 * 21)
 
-    with pytest.raises(ValueError, match=r"in a gap of 1260 s, 21 times the steps beside it \(at most 20\)"):
+    with pytest.raises(
+        ValueError, match=r"in a gap of 1260 s, 21 times the steps beside it \(at most 20\)"
+    ):
         interpolate(epoch, times, orbit(times), "HERMITE", 7, without_drift)
 
 
@@ -234,7 +271,9 @@ def test_epoch_beside_a_gap_is_not_in_it() -> None:
 
 
 def test_drift_of_the_clock_stretches_the_derivatives() -> None:
-    """A clock that is fast by 1e-6: positions are those of its table, velocities are per second of the other clock."""
+    """A clock that is fast by 1e-6: positions are those of its table, velocities are per second of
+    the other clock.
+    """
     slow = [Fraction(60 * row) for row in range(10)]
     fast = [time * Fraction(1_000_000, 1_000_001) for time in slow]
     epoch = Fraction(301)

@@ -74,7 +74,8 @@ def test_accelerations_are_read_over() -> None:
     [
         b"\xef\xbb\xbf" + SIMPLE.encode(),
         SIMPLE.replace("TEST", "TEST\nCOMMENT Universit\u00e4t").encode("latin-1"),
-        b"\xef\xbb\xbf" + SIMPLE.replace("TEST", "TEST\nCOMMENT Universit\u00e4t").encode("latin-1"),
+        b"\xef\xbb\xbf"
+        + SIMPLE.replace("TEST", "TEST\nCOMMENT Universit\u00e4t").encode("latin-1"),
         SIMPLE.replace("TEST", "TEST\nCOMMENT Universit\u00e4t").encode("utf-8"),
         SIMPLE.replace("TEST", "TEST\nCOMMENT and so on\u2026 for ever").encode("cp1252"),
     ],
@@ -87,10 +88,17 @@ def test_encodings_of_other_programs_are_read(content: bytes) -> None:
 def test_each_segment_has_its_own_metadata() -> None:
     later = ("2029-03-02T00:00:00", "2029-03-02T00:01:00", "2029-03-02T00:02:00")
 
-    one, other = read(SIMPLE + segment(later, STATES, CENTER_NAME="EARTH", REF_FRAME="ITRF2000", TIME_SYSTEM="UTC"))
+    one, other = read(
+        SIMPLE
+        + segment(later, STATES, CENTER_NAME="EARTH", REF_FRAME="ITRF2000", TIME_SYSTEM="UTC")
+    )
 
     assert (one.metadata["CENTER_NAME"], one.scale) == ("SUN", "TDB")
-    assert (other.metadata["CENTER_NAME"], other.metadata["REF_FRAME"], other.scale) == ("EARTH", "ITRF2000", "UTC")
+    assert (other.metadata["CENTER_NAME"], other.metadata["REF_FRAME"], other.scale) == (
+        "EARTH",
+        "ITRF2000",
+        "UTC",
+    )
     assert other.number == 2
 
 
@@ -101,15 +109,21 @@ def test_metadata_without_interpolation_have_hermite_of_degree_seven() -> None:
 
 
 def test_linear_interpolation_has_degree_one_whatever_the_file_says() -> None:
-    (found,) = read(HEADER + segment(EPOCHS, STATES, INTERPOLATION="LINEAR", INTERPOLATION_DEGREE="7"))
+    (found,) = read(
+        HEADER + segment(EPOCHS, STATES, INTERPOLATION="LINEAR", INTERPOLATION_DEGREE="7")
+    )
 
     assert (found.method, found.degree) == ("LINEAR", 1)
 
 
 def test_usable_span_is_within_the_span_and_the_states() -> None:
-    text = SIMPLE.replace("INTERPOLATION =", "USEABLE_START_TIME = 2029-03-01T00:00:30\nINTERPOLATION =")
+    text = SIMPLE.replace(
+        "INTERPOLATION =", "USEABLE_START_TIME = 2029-03-01T00:00:30\nINTERPOLATION ="
+    )
 
-    (found,) = read(text.replace("STOP_TIME = 2029-03-01T00:02:30.5", "STOP_TIME = 2029-03-05T00:00:00"))
+    (found,) = read(
+        text.replace("STOP_TIME = 2029-03-01T00:02:30.5", "STOP_TIME = 2029-03-05T00:00:00")
+    )
 
     assert found.start - found.seconds[0] == 30
     assert found.stop == found.seconds[-1]
@@ -144,41 +158,80 @@ COVARIANCE = covariance_block(EPOCHS[0], np.eye(6))
         (SIMPLE.replace("2.0", "4.0", 1), 'CCSDS_OEM_VERS "4.0" is not one of 1.0, 2.0, 3.0'),
         ('<?xml version="1.0"?><oem/>', "is XML"),
         (b"\xff\xfeC\0C\0S\0D\0S\0", "is not text"),
-        (SIMPLE.replace("ORIGINATOR = TEST", "ORIGINATOR TEST"), "line 3: must be KEYWORD = VALUE in the header"),
-        (SIMPLE.replace("ORIGINATOR", "CREATION_DATE"), "CREATION_DATE is written again in the header"),
-        (SIMPLE.replace("OBJECT_ID", "OBJECT_NAME"), "OBJECT_NAME is written again in the metadata"),
-        (SIMPLE.replace("CENTER_NAME = SUN\n", ""), "CENTER_NAME is missing in the metadata of segment 1"),
+        (
+            SIMPLE.replace("ORIGINATOR = TEST", "ORIGINATOR TEST"),
+            "line 3: must be KEYWORD = VALUE in the header",
+        ),
+        (
+            SIMPLE.replace("ORIGINATOR", "CREATION_DATE"),
+            "CREATION_DATE is written again in the header",
+        ),
+        (
+            SIMPLE.replace("OBJECT_ID", "OBJECT_NAME"),
+            "OBJECT_NAME is written again in the metadata",
+        ),
+        (
+            SIMPLE.replace("CENTER_NAME = SUN\n", ""),
+            "CENTER_NAME is missing in the metadata of segment 1",
+        ),
         (SIMPLE.replace("REF_FRAME = EME2000\n", ""), "REF_FRAME is missing"),
         (SIMPLE.replace("TIME_SYSTEM = TDB", "TIME_SYSTEM = "), "TIME_SYSTEM is missing"),
-        (SIMPLE.replace("= SUN", "= S\x1b[31mUN"), "CENTER_NAME has control characters in the metadata"),
+        (
+            SIMPLE.replace("= SUN", "= S\x1b[31mUN"),
+            "CENTER_NAME has control characters in the metadata",
+        ),
         (b"\xef\xbb\xbf<oem/>", "is XML"),
         (SIMPLE.replace("TDB", "UT1"), "TIME_SYSTEM: time scale UT1 is not one of"),
-        (SIMPLE.replace("HERMITE", "CHEBYSHEV"), 'INTERPOLATION "CHEBYSHEV" is not one of HERMITE, LAGRANGE, LINEAR'),
-        (SIMPLE.replace("DEGREE = 7", "DEGREE = 7.1"), "INTERPOLATION_DEGREE must be a whole number from 1 to 20"),
+        (
+            SIMPLE.replace("HERMITE", "CHEBYSHEV"),
+            'INTERPOLATION "CHEBYSHEV" is not one of HERMITE, LAGRANGE, LINEAR',
+        ),
+        (
+            SIMPLE.replace("DEGREE = 7", "DEGREE = 7.1"),
+            "INTERPOLATION_DEGREE must be a whole number from 1 to 20",
+        ),
         (SIMPLE.replace("DEGREE = 7", "DEGREE = 0"), "INTERPOLATION_DEGREE must be"),
         (SIMPLE.replace("DEGREE = 7", "DEGREE = 999999999"), "INTERPOLATION_DEGREE must be"),
         (SIMPLE.replace("META_STOP", ""), "must be KEYWORD = VALUE in the metadata"),
         (SIMPLE[: SIMPLE.index("META_STOP")], "META_STOP is missing at the end of the file"),
         (HEADER + segment(EPOCHS[:1], STATES[:1]).splitlines()[0], "META_STOP is missing"),
         (SIMPLE[: SIMPLE.index("META_STOP")] + "META_STOP\n", "segment 1 has no states"),
-        (SIMPLE[: SIMPLE.index("META_STOP")] + "META_STOP\n" + COVARIANCE, "segment 1 has no states"),
+        (
+            SIMPLE[: SIMPLE.index("META_STOP")] + "META_STOP\n" + COVARIANCE,
+            "segment 1 has no states",
+        ),
         (SIMPLE.rstrip() + " 1.0\n", "must be an epoch and 6 numbers, or 9"),
         (SIMPLE + "2029-03-01T00:03:00 1 2 3 4 5 six\n", "must be numbers, found"),
         (SIMPLE + "2029-03-01T00:03:00 1 2 3 4 5 nan\n", "must be numbers, found"),
         (SIMPLE + "2029-03-01T00:03:00 1 2 3 4 5 1e300\n", "must be numbers, found"),
-        (SIMPLE + "2029-03-01T00:02:30.5 1 2 3 4 5 6\n", "is not later than the one before; sort the states"),
+        (
+            SIMPLE + "2029-03-01T00:02:30.5 1 2 3 4 5 6\n",
+            "is not later than the one before; sort the states",
+        ),
         (SIMPLE + "2029-02-01T00:02:30 1 2 3 4 5 6\n", "is not later than the one before"),
         (SIMPLE + "yesterday 1 2 3 4 5 6\n", '"yesterday" is not an epoch such as'),
         (SIMPLE.replace("START_TIME = 2029", "START_TIME = 20x9"), "START_TIME of segment 1: "),
-        (SIMPLE + COVARIANCE.replace("EPOCH = 2029-03-01T00:00:00\n", ""), "EPOCH of the covariance is missing"),
+        (
+            SIMPLE + COVARIANCE.replace("EPOCH = 2029-03-01T00:00:00\n", ""),
+            "EPOCH of the covariance is missing",
+        ),
         (SIMPLE + COVARIANCE.replace("EPOCH", "TIME"), "must be KEYWORD = VALUE in the covariance"),
-        (SIMPLE + "COVARIANCE_START\nEPOCH = 2029-03-01\n1\n1 2 3\n", "row 2 of the covariance must have 2 numbers"),
+        (
+            SIMPLE + "COVARIANCE_START\nEPOCH = 2029-03-01\n1\n1 2 3\n",
+            "row 2 of the covariance must have 2 numbers",
+        ),
         (
             SIMPLE + "COVARIANCE_START\nEPOCH = 2029-03-01\n1\nCOVARIANCE_STOP\n",
             "the covariance ends after 1 of 6 rows",
         ),
-        (SIMPLE + "COVARIANCE_START\nEPOCH = 2029-03-01\n1\nEPOCH = 2\n", "the covariance has 1 rows, it must have 6"),
-        (SIMPLE + "COVARIANCE_START\nEPOCH = 2029-03-01\n", "COVARIANCE_STOP is missing at the end of the file"),
+        (
+            SIMPLE + "COVARIANCE_START\nEPOCH = 2029-03-01\n1\nEPOCH = 2\n",
+            "the covariance has 1 rows, it must have 6",
+        ),
+        (
+            SIMPLE + "COVARIANCE_START\nEPOCH = 2029-03-01\n",
+            "COVARIANCE_STOP is missing at the end of the file",
+        ),
     ],
 )
 def test_damaged_file_is_refused_with_its_line(text: str | bytes, problem: str) -> None:

@@ -1,9 +1,10 @@
-"""Random polytopes of R^3 to R^6 against exact rational arithmetic (PPL): nothing lost, nothing refused, little added.
+"""Random polytopes of R^3 to R^6 against exact rational arithmetic (PPL): nothing lost, nothing
+refused, little added.
 
-A check compares one operation with its exact result on the same floats. The exact set satisfies the facets of the
-computed one: in rationals without a tolerance if it has an interior, within the rounding of one scalar product if it is
-flat. Each exact vertex is close to the hull of the computed vertices; the computed set extends little beyond the exact
-facets, and no facet is missing.
+A check compares one operation with its exact result on the same floats. The exact set satisfies the
+facets of the computed one: in rationals without a tolerance if it has an interior, within the
+rounding of one scalar product if it is flat. Each exact vertex is close to the hull of the computed
+vertices; the computed set extends little beyond the exact facets, and no facet is missing.
 """
 
 from __future__ import annotations
@@ -22,44 +23,63 @@ from infoset.geometry.polytope import Polytope
 from tests.rationals import Fraction
 from tests.rendezvous.reachability.rationals import polyhedron_of, vertices_of
 
-pytestmark = pytest.mark.skipif(find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'")
+pytestmark = pytest.mark.skipif(
+    find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'"
+)
 
 KINDS = ["round", "flat", "touching", "integers", "mixed units"]
 SEEDS = 20
-"""Sets of a kind in a space; each has eight checks: 3 200 in all. By default one set of each kind is checked."""
+"""Sets of a kind in a space; each has eight checks: 3 200 in all. By default one set of each kind
+is checked.
+"""
 MAX_EXCESS = 1e-9
 """Extension beyond exact facets, relative to the widths of the sets along the axes."""
 MAX_FLAT_EXCESS = 1e-7
-"""The same where the exact result is flat: rounding of its facets decides how far they are from parallel ones."""
+"""The same where the exact result is flat: rounding of its facets decides how far they are from
+parallel ones.
+"""
 MAX_LOSS = 1e-12
 """Distance of exact vertices from the hull of the computed ones, in the same widths."""
 OUTWARD, FLAT_ROUNDING = 0.0, 1e-13
 """Distance of exact vertices beyond the computed facets, relative to the terms of normal . x."""
 STEP = 1e-6
-"""Distance from a facet, relative to that of the centre, of points that are clearly inside or outside."""
+"""Distance from a facet, relative to that of the centre, of points that are clearly inside or
+outside.
+"""
 POINTS = {3: 12, 4: 12, 5: 11, 6: 10}
 """Points of a set in each space."""
 
 
 class Exact:
-    """A bounded polyhedron of PPL, its vertices as rationals and its facets as floats; `widths` are those of inputs."""
+    """A bounded polyhedron of PPL, its vertices as rationals and its facets as floats; `widths` are
+    those of inputs.
+    """
 
     def __init__(self, polyhedron: Any, widths: Floats) -> None:
-        self.polyhedron, self.widths, self.space = polyhedron, widths, polyhedron.space_dimension()
+        self.polyhedron = polyhedron
+        self.widths = widths
+        self.space = polyhedron.space_dimension()
         self.is_empty = bool(polyhedron.is_empty())
         self.vertices = [] if self.is_empty else vertices_of(polyhedron)
         self.points = np.array(self.vertices, dtype=float).reshape(-1, self.space)
         self.solid = not self.is_empty and polyhedron.affine_dimension() == self.space
-        rows, limits, flat, levels = list[list[float]](), list[float](), list[list[float]](), list[float]()
+        rows = list[list[float]]()
+        limits = list[float]()
+        flat = list[list[float]]()
+        levels = list[float]()
         for row in polyhedron.minimized_constraints():
             # PPL writes a . x + b >= 0 with integers that may be larger than a float.
-            numbers = [-int(row.coefficient(_variable(i))) for i in range(self.space)] + [int(row.inhomogeneous_term())]
+            numbers = [-int(row.coefficient(_variable(i))) for i in range(self.space)] + [
+                int(row.inhomogeneous_term())
+            ]
             size = max(map(abs, numbers[:-1]))
             *normal, limit = (float(Fraction(number, size or 1)) for number in numbers)
             (rows if row.is_inequality() else flat).append(normal)
             (limits if row.is_inequality() else levels).append(limit)
-        self.normals, self.offsets = np.array(rows).reshape(-1, self.space), np.array(limits)
-        self.across, self.levels = np.array(flat).reshape(-1, self.space), np.array(levels)
+        self.normals = np.array(rows).reshape(-1, self.space)
+        self.offsets = np.array(limits)
+        self.across = np.array(flat).reshape(-1, self.space)
+        self.levels = np.array(levels)
 
     @classmethod
     def hull(cls, points: list[list[Fraction]], widths: Floats) -> Exact:
@@ -102,11 +122,14 @@ def rationals(points: Floats) -> list[list[Fraction]]:
     return [[Fraction(float(value)) for value in point] for point in points]
 
 
-# The judge --------------------------------------------------------------------------------------------------------
+# The judge
+# --------------------------------------------------------------------------------------------------
 
 
 def judge(got: Polytope, exact: Exact) -> float:
-    """Fail if the computed set is wrong; return its extension beyond the exact one, relative to the inputs' widths."""
+    """Fail if the computed set is wrong; return its extension beyond the exact one, relative to the
+    inputs' widths.
+    """
     assert got.is_empty == exact.is_empty, f"empty: {got.is_empty}, exactly {exact.is_empty}"
     if exact.is_empty:
         return 0.0
@@ -125,20 +148,29 @@ def judge(got: Polytope, exact: Exact) -> float:
 
 
 def _assert_facets_hold(got: Polytope, exact: Exact) -> None:
-    """Each exact vertex satisfies each computed facet; only those that rounding could violate need rationals."""
+    """Each exact vertex satisfies each computed facet; only those that rounding could violate need
+    rationals.
+    """
     rows, limits = got.constraints()
     terms = np.abs(exact.points).max(axis=0) @ np.abs(rows).T + np.abs(limits)
     close = exact.points @ rows.T - limits > -1e-13 * terms
     solid = got.dimension == got.space
     for i, j in zip(*np.nonzero(close), strict=True):
-        beyond = sum((Fraction(float(a)) * x for a, x in zip(rows[j], exact.vertices[i], strict=True)), Fraction(0))
+        beyond = sum(
+            (Fraction(float(a)) * x for a, x in zip(rows[j], exact.vertices[i], strict=True)),
+            Fraction(0),
+        )
         beyond -= Fraction(float(limits[j]))
         if beyond > (OUTWARD if solid else FLAT_ROUNDING) * terms[j]:
-            raise AssertionError(f"a vertex is {float(beyond / terms[j]):.2g} of the terms beyond a facet")
+            raise AssertionError(
+                f"a vertex is {float(beyond / terms[j]):.2g} of the terms beyond a facet"
+            )
 
 
 def _excess(points: Floats, exact: Exact) -> float:
-    """Distance of points beyond the exact facets or from the affine hull, relative to the widths of the inputs."""
+    """Distance of points beyond the exact facets or from the affine hull, relative to the widths of
+    the inputs.
+    """
     beyond = points @ exact.normals.T - exact.offsets
     away = np.abs(points @ exact.across.T - exact.levels)
     sizes = np.abs(exact.normals) @ exact.widths, np.abs(exact.across) @ exact.widths
@@ -147,7 +179,9 @@ def _excess(points: Floats, exact: Exact) -> float:
 
 
 def _assert_members(got: Polytope, exact: Exact) -> None:
-    """Points on the exact facets, moved a little to the centre, are inside; moved away from it, outside."""
+    """Points on the exact facets, moved a little to the centre, are inside; moved away from it,
+    outside.
+    """
     centre = exact.points.mean(axis=0)
     depth = exact.offsets - exact.normals @ centre
     heights = exact.points @ exact.normals.T - exact.offsets
@@ -162,15 +196,21 @@ def _assert_members(got: Polytope, exact: Exact) -> None:
     )
 
 
-# The sets ---------------------------------------------------------------------------------------------------------
+# The sets
+# --------------------------------------------------------------------------------------------------
 
 
 def points_of(kind: str, space: int, random: np.random.Generator) -> Floats:
     points = random.normal(size=(POINTS[space], space))
     match kind:
         case "flat":
-            points = np.round(points * 2.0**16) / 2.0**16  # sums of few such numbers are exact: the set is flat
-            points[:, -1] = points[:, :2] @ [[0.0, 0.0], [1.0, 0.0], [1.0, -2.0]][int(random.integers(3))] + 0.25
+            points = (
+                np.round(points * 2.0**16) / 2.0**16
+            )  # sums of few such numbers are exact: the set is flat
+            points[:, -1] = (
+                points[:, :2] @ [[0.0, 0.0], [1.0, 0.0], [1.0, -2.0]][int(random.integers(3))]
+                + 0.25
+            )
         case "integers":
             points = random.integers(-3, 4, points.shape).astype(float)
         case "mixed units":
@@ -181,9 +221,12 @@ def points_of(kind: str, space: int, random: np.random.Generator) -> Floats:
 
 
 def pair_of(kind: str, points: Floats, random: np.random.Generator) -> Floats:
-    """Points of another set; for `touching`, one that has a vertex, an edge or more in common with the first."""
+    """Points of another set; for `touching`, one that has a vertex, an edge or more in common with
+    the first.
+    """
     if kind == "touching":
-        # The mirrored set at a support plane: what is common is the face in which the plane touches.
+        # The mirrored set at a support plane: what is common is the face in which the plane
+        # touches.
         axis = int(random.integers(points.shape[1]))
         other = points.copy()
         other[:, axis] = 2.0 * points[:, axis].max() - points[:, axis]
@@ -202,24 +245,39 @@ def widths_of(*sets: Floats) -> Floats:
     return np.asarray(np.where(widths > 0.0, widths, 1e-9 * widths.max(initial=1e-300)))
 
 
-def checks(kind: str, space: int, seed: int) -> Iterator[tuple[str, Callable[[], Polytope], Callable[[], Exact]]]:
+def checks(
+    kind: str, space: int, seed: int
+) -> Iterator[tuple[str, Callable[[], Polytope], Callable[[], Exact]]]:
     """Yield operations and their exact results."""
     random = np.random.default_rng([KINDS.index(kind), space, seed])
     points = points_of(kind, space, random)
     others = pair_of(kind, points, random)
-    one, two, widths = Polytope.from_vertices(points), Polytope.from_vertices(others), widths_of(points)
-    exact_one, exact_two = Exact.hull(rationals(points), widths), Exact.hull(rationals(others), widths)
+    one = Polytope.from_vertices(points)
+    two = Polytope.from_vertices(others)
+    widths = widths_of(points)
+    exact_one = Exact.hull(rationals(points), widths)
+    exact_two = Exact.hull(rationals(others), widths)
     yield "hull", lambda: Polytope.from_vertices(points), lambda: exact_one
 
-    # Half-spaces that touch an ellipsoid with the axes `widths` (integers: lattice rows), and equations of a flat set.
+    # Half-spaces that touch an ellipsoid with the axes `widths` (integers: lattice rows), and
+    # equations of a flat set.
     normals = (
-        random.integers(-2, 3, (2 * space, space)) if kind == "integers" else random.normal(size=(space + 4, space))
+        random.integers(-2, 3, (2 * space, space))
+        if kind == "integers"
+        else random.normal(size=(space + 4, space))
     )
     rows = np.vstack([normals / widths, np.diag(1.0 / widths), -np.diag(1.0 / widths)])
     rows = rows[np.any(rows, axis=1)]
     limits = np.full(len(rows), 3.0 if kind == "integers" else 1.0)
-    flat, levels = (exact_one.across, exact_one.levels) if kind == "flat" else (np.zeros((0, space)), np.zeros(0))
-    table = [[*row, limit] for row, limit in zip(rationals(rows), map(Fraction, limits.tolist()), strict=True)]
+    flat, levels = (
+        (exact_one.across, exact_one.levels)
+        if kind == "flat"
+        else (np.zeros((0, space)), np.zeros(0))
+    )
+    table = [
+        [*row, limit]
+        for row, limit in zip(rationals(rows), map(Fraction, limits.tolist()), strict=True)
+    ]
     for sign in (1, -1):
         table += [
             [*(sign * n for n in row), sign * level]
@@ -234,7 +292,11 @@ def checks(kind: str, space: int, seed: int) -> Iterator[tuple[str, Callable[[],
     yield "intersection", lambda: one & two, lambda: both
 
     few = others[:2] if space >= 5 else others[: space + 1]
-    sums = [[a + b for a, b in zip(p, q, strict=True)] for p in exact_one.vertices for q in rationals(few)]
+    sums = [
+        [a + b for a, b in zip(p, q, strict=True)]
+        for p in exact_one.vertices
+        for q in rationals(few)
+    ]
     yield (
         "sum",
         lambda: one + Polytope.from_vertices(few),
@@ -253,7 +315,10 @@ def checks(kind: str, space: int, seed: int) -> Iterator[tuple[str, Callable[[],
 
     # The preimage under a regular matrix, and that of an image under a tall one.
     def composed(of: Exact, matrix: Floats, reach: Floats) -> Exact:
-        exact_rows = [[*(np.array(row[:-1]) @ np.array(rationals(matrix))).tolist(), row[-1]] for row in of.rows()]
+        exact_rows = [
+            [*(np.array(row[:-1]) @ np.array(rationals(matrix))).tolist(), row[-1]]
+            for row in of.rows()
+        ]
         return Exact.of_rows(exact_rows, matrix.shape[1], reach)
 
     reach = np.abs(np.linalg.inv(regular)) @ widths
@@ -281,7 +346,8 @@ def checks(kind: str, space: int, seed: int) -> Iterator[tuple[str, Callable[[],
 def test_operations_lose_nothing_and_add_little(
     kind: str, space: int, count: int, record_property: Callable[[str, object], None]
 ) -> None:
-    wrong, excess = [], dict[str, float]()
+    wrong = []
+    excess = dict[str, float]()
     for seed in range(count):
         for name, compute, exactly in checks(kind, space, seed):
             try:
@@ -300,4 +366,8 @@ def test_cones_and_cylinders_are_unbounded(space: int) -> None:
     assert (len(cone.vertices), len(cone.directions), len(cone.lines)) == (1, space, 0)
     cube = Polytope.from_box(-np.ones(space), np.ones(space))
     cylinder = cube.preimage(random.normal(size=(space, space + 1)))
-    assert (len(cylinder.vertices), len(cylinder.directions), len(cylinder.lines)) == (2**space, 0, 1)
+    assert (len(cylinder.vertices), len(cylinder.directions), len(cylinder.lines)) == (
+        2**space,
+        0,
+        1,
+    )

@@ -1,4 +1,6 @@
-"""Extreme rays in integers against another exact library (PPL), and what they are of sets without vertices."""
+"""Extreme rays in integers against another exact library (PPL), and what they are of sets without
+vertices.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,9 @@ from infoset.geometry.polytope import cone
 from tests.infoset.geometry.polytope.exact_sets import polyhedron
 from tests.rationals import Fraction
 
-needs_ppl = pytest.mark.skipif(find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'")
+needs_ppl = pytest.mark.skipif(
+    find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'"
+)
 
 
 def rows_of(seed: int) -> tuple[Floats, Floats]:
@@ -27,9 +31,11 @@ def rows_of(seed: int) -> tuple[Floats, Floats]:
         rows = random.normal(size=(count, space)) * 10.0 ** random.integers(-12, 13, space)
         limits = random.normal(size=count) + 0.7
     if seed % 4 == 1:
-        rows, limits = np.vstack([rows, -rows[:1]]), np.append(limits, -limits[0])
+        rows = np.vstack([rows, -rows[:1]])
+        limits = np.append(limits, -limits[0])
     if seed % 3 == 0:
-        rows, limits = np.vstack([rows, np.eye(space), -np.eye(space)]), np.append(limits, np.full(2 * space, 3.0))
+        rows = np.vstack([rows, np.eye(space), -np.eye(space)])
+        limits = np.append(limits, np.full(2 * space, 3.0))
     return rows, limits
 
 
@@ -43,9 +49,16 @@ def test_vertices_directions_and_lines_are_those_of_ppl(count: int) -> None:
         found = cone.vertices_of(cone.rationals(rows), cone.rationals(limits[None])[0])
 
         generators = list(polyhedron(rows, limits).minimized_generators())
-        entries = [[int(one.coefficient(ppl.Variable(i))) for i in range(rows.shape[1])] for one in generators]
+        entries = [
+            [int(one.coefficient(ppl.Variable(i))) for i in range(rows.shape[1])]
+            for one in generators
+        ]
         pairs = list(zip(generators, entries, strict=True))
-        points = {tuple(Fraction(x, int(one.divisor())) for x in row) for one, row in pairs if one.is_point()}
+        points = {
+            tuple(Fraction(x, int(one.divisor())) for x in row)
+            for one, row in pairs
+            if one.is_point()
+        }
         directions = {tuple(row) for one, row in pairs if one.is_ray()}
         assert len(found.points) == len(points), seed
         if not points:
@@ -54,10 +67,12 @@ def test_vertices_directions_and_lines_are_those_of_ppl(count: int) -> None:
         assert len(found.directions) == len(directions), seed
         if not found.lines:  # modulo lines, points and directions are not unique
             assert {tuple(Fraction(x) for x in point) for point in found.points} == points, seed
-            shortest = {tuple(cone.whole([fractions.Fraction(x) for x in row])) for row in directions}
-            assert {tuple(cone.whole([fractions.Fraction(x) for x in row])) for row in found.directions} == shortest, (
-                seed
-            )
+            shortest = {
+                tuple(cone.whole([fractions.Fraction(x) for x in row])) for row in directions
+            }
+            assert {
+                tuple(cone.whole([fractions.Fraction(x) for x in row])) for row in found.directions
+            } == shortest, seed
 
 
 def test_half_plane_has_a_point_a_direction_and_a_line() -> None:
@@ -76,4 +91,6 @@ def test_null_space_of_mixed_units_is_exact() -> None:
     basis = cone.null_space(matrix)
 
     assert len(basis) == 2
-    assert all(entry == 0 for (entry,) in cone.product(matrix, [[fractions.Fraction(x)] for x in basis[0]]))
+    assert all(
+        entry == 0 for (entry,) in cone.product(matrix, [[fractions.Fraction(x)] for x in basis[0]])
+    )

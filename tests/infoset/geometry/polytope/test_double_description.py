@@ -1,4 +1,6 @@
-"""Cases that were wrong or refused before polytopes had one double description, and its invariants."""
+"""Cases that were wrong or refused before polytopes had one double description, and its
+invariants.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,9 @@ def test_vertices_are_the_points_bit_for_bit() -> None:
 
 
 @pytest.mark.parametrize("matrix", [[[1.0], [2.0]], [[0.3], [0.1]], [[1e-6], [1e6]]])
-def test_the_preimage_of_a_flat_set_under_a_tall_matrix_is_the_set(matrix: list[list[float]]) -> None:
+def test_the_preimage_of_a_flat_set_under_a_tall_matrix_is_the_set(
+    matrix: list[list[float]],
+) -> None:
     interval = Polytope.from_box([0.0], [1.0])
     back = interval.linear_map(matrix).preimage(matrix)
     np.testing.assert_allclose(np.sort(back.vertices, axis=0), [[0.0], [1.0]], rtol=0.0, atol=1e-12)
@@ -28,23 +32,30 @@ def test_the_preimage_of_a_flat_set_under_a_tall_matrix_is_the_set(matrix: list[
 @pytest.mark.parametrize(("points", "space"), [(14, 5), (14, 6)])
 def test_gaussian_polytopes_of_five_and_six_dimensions_intersect(points: int, space: int) -> None:
     random = np.random.default_rng([5, points, 0])
-    one, two = (Polytope.from_vertices(random.normal(size=(points, space)) * size) for size in (1.0, 0.8))
+    one, two = (
+        Polytope.from_vertices(random.normal(size=(points, space)) * size) for size in (1.0, 0.8)
+    )
     both = one & two
     assert space == 6 or len(both.vertices) == 516
     assert both.is_subset(one, 1e-12)
     assert both.is_subset(two, 1e-12)
     inside = random.normal(size=(2000, space)) * 0.3
-    np.testing.assert_array_equal(both.contains(inside), one.contains(inside) & two.contains(inside))
+    np.testing.assert_array_equal(
+        both.contains(inside), one.contains(inside) & two.contains(inside)
+    )
 
 
 def test_sets_that_touch_in_a_vertex_meet_in_it() -> None:
-    one, two = Polytope.from_vertices([(1, 0), (2, -3), (0, 1), (2, -2)]), Polytope.from_vertices([(1, 0), (7, 0)])
+    one = Polytope.from_vertices([(1, 0), (2, -3), (0, 1), (2, -2)])
+    two = Polytope.from_vertices([(1, 0), (7, 0)])
     np.testing.assert_allclose((one & two).vertices, [[1.0, 0.0]], rtol=0.0, atol=1e-15)
 
 
 @pytest.mark.parametrize("space", [2, 3, 4, 5])
 def test_incidence_is_that_of_vertices_and_facets(space: int) -> None:
-    """A sum of segments, cut and mapped: vertices are on the facets that their bits name, to 1e-11, and on no other."""
+    """A sum of segments, cut and mapped: vertices are on the facets that their bits name, to 1e-11,
+    and on no other.
+    """
     random = np.random.default_rng(space)
     one = Polytope.from_box(-np.ones(space), np.ones(space))
     for _ in range(3):
@@ -61,4 +72,6 @@ def test_incidence_is_that_of_vertices_and_facets(space: int) -> None:
 def test_flags_are_packed() -> None:
     flags = np.random.default_rng(0).random((70, 130)) < 0.5
     np.testing.assert_array_equal(unpacked(packed(flags), 130), flags)
-    np.testing.assert_array_equal(packed(flags).view(np.uint8)[:, :17], np.packbits(flags, axis=1, bitorder="little"))
+    np.testing.assert_array_equal(
+        packed(flags).view(np.uint8)[:, :17], np.packbits(flags, axis=1, bitorder="little")
+    )

@@ -1,7 +1,8 @@
-"""Random kinds of polytopes that once had wrong answers, against determinants and exact rationals (PPL).
+"""Random kinds of polytopes that once had wrong answers, against determinants and exact rationals
+(PPL).
 
-Volumes of sums, preimages under singular matrices, differences of flat sets, and half-spaces in mixed units. The full
-numbers of cases are in the thorough tier.
+Volumes of sums, preimages under singular matrices, differences of flat sets, and half-spaces in
+mixed units. The full numbers of cases are in the thorough tier.
 """
 
 from __future__ import annotations
@@ -19,13 +20,18 @@ from tests.infoset.geometry.polytope.exact_sets import polyhedron
 from tests.rationals import Fraction
 from tests.rendezvous.reachability.rationals import polyhedron_of, vertices_of
 
-needs_ppl = pytest.mark.skipif(find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'")
+needs_ppl = pytest.mark.skipif(
+    find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'"
+)
 
 MAX_ERROR = 1e-9
-"""Relative error of volumes and widths: a thousand times the documented excess of one operation, 1e-12."""
+"""Relative error of volumes and widths: a thousand times the documented excess of one operation,
+1e-12.
+"""
 
 
-# Volumes ----------------------------------------------------------------------------------------------------------
+# Volumes
+# --------------------------------------------------------------------------------------------------
 
 
 def system_of(seed: int) -> Floats:
@@ -38,9 +44,13 @@ def system_of(seed: int) -> Floats:
 
 
 def reached(matrix: Floats) -> tuple[Polytope, float]:
-    """The sum of a cube and its images under three powers of a matrix, and its volume from determinants."""
+    """The sum of a cube and its images under three powers of a matrix, and its volume from
+    determinants.
+    """
     cube = Polytope.from_box([-1.0] * 3, [1.0] * 3)
-    whole, power, generators = cube, np.eye(3), [np.eye(3)]
+    whole = cube
+    power = np.eye(3)
+    generators = [np.eye(3)]
     for _ in range(3):
         power = matrix @ power
         whole = whole + power @ cube
@@ -50,7 +60,9 @@ def reached(matrix: Floats) -> tuple[Polytope, float]:
 
 
 def test_volume_and_centroid_of_a_sum_with_nearly_parallel_facets() -> None:
-    """Formerly 48.2321 and (0.08, 0.002, -0.01): one facet was two, each with some of its vertices."""
+    """Formerly 48.2321 and (0.08, 0.002, -0.01): one facet was two, each with some of its
+    vertices.
+    """
     whole, volume = reached(np.array([[0.0, -0.3, 0.0], [-0.4, 0.1, 0.4], [0.2, 0.3, -0.1]]))
 
     assert volume == pytest.approx(51.0737367, rel=1e-8)
@@ -73,7 +85,9 @@ def edges_of(one: Polytope) -> list[tuple[int, int]]:
         pytest.param(tuple(range(1000)), marks=pytest.mark.thorough),
     ],
 )
-def test_volumes_of_sums_and_of_their_parts_are_those_of_determinants(seeds: tuple[int, ...]) -> None:
+def test_volumes_of_sums_and_of_their_parts_are_those_of_determinants(
+    seeds: tuple[int, ...],
+) -> None:
     """Formerly 14 of these 1000 sums, and 11 of their halves, had a wrong volume."""
     for seed in seeds:
         whole, volume = reached(system_of(seed))
@@ -81,16 +95,20 @@ def test_volumes_of_sums_and_of_their_parts_are_those_of_determinants(seeds: tup
 
         assert whole.volume() == pytest.approx(volume, rel=MAX_ERROR), seed
         np.testing.assert_allclose(whole.centroid(), 0.0, rtol=0.0, atol=MAX_ERROR)
-        assert whole.cut(normal, upper=0.0).volume() == pytest.approx(0.5 * volume, rel=MAX_ERROR), seed
+        assert whole.cut(normal, upper=0.0).volume() == pytest.approx(
+            0.5 * volume, rel=MAX_ERROR
+        ), seed
 
 
-# Preimages --------------------------------------------------------------------------------------------------------
+# Preimages
+# --------------------------------------------------------------------------------------------------
 
 
 def singular_case(seed: int) -> tuple[Floats, Floats, Floats]:
     """Vertices, a matrix with a null space, and an offset, all integers, some in mixed units."""
     random = np.random.default_rng(seed)
-    space, size = int(random.integers(2, 5)), int(random.integers(1, 5))
+    space = int(random.integers(2, 5))
+    size = int(random.integers(1, 5))
     rank = int(random.integers(0, min(space, size - 1) + 1))
     points = random.integers(-3, 4, (int(random.integers(1, space + 4)), space)).astype(float)
     factors = random.integers(-3, 4, (space, rank)), random.integers(-3, 4, (rank, size))
@@ -104,16 +122,22 @@ def singular_case(seed: int) -> tuple[Floats, Floats, Floats]:
 @needs_ppl
 @pytest.mark.parametrize("count", [200, pytest.param(2800, marks=pytest.mark.thorough)])
 def test_preimage_under_a_singular_matrix_is_empty_or_unbounded_as_exactly(count: int) -> None:
-    """Formerly about 1 % of such preimages were called unbounded where they are empty, or the other way round."""
+    """Formerly about 1 % of such preimages were called unbounded where they are empty, or the other
+    way round.
+    """
     import ppl
 
     for seed in range(count):
         points, matrix, offset = singular_case(seed)
-        image = ppl.Generator_System(polyhedron_of([[Fraction(value) for value in offset.tolist()]]).generators())
+        image = ppl.Generator_System(
+            polyhedron_of([[Fraction(value) for value in offset.tolist()]]).generators()
+        )
         for column in matrix.T:
             entries = [int(Fraction(value) * 2**45) for value in column.tolist()]
             if any(entries):
-                image.insert(ppl.line(sum(entry * ppl.Variable(i) for i, entry in enumerate(entries))))
+                image.insert(
+                    ppl.line(sum(entry * ppl.Variable(i) for i, entry in enumerate(entries)))
+                )
         common = polyhedron_of([[Fraction(value) for value in point] for point in points.tolist()])
         common.intersection_assign(ppl.C_Polyhedron(image))
         one = Polytope.from_vertices(points)
@@ -123,7 +147,8 @@ def test_preimage_under_a_singular_matrix_is_empty_or_unbounded_as_exactly(count
         assert found.is_bounded == common.is_empty(), seed
 
 
-# Differences ------------------------------------------------------------------------------------------------------
+# Differences
+# --------------------------------------------------------------------------------------------------
 
 
 def test_difference_of_a_flat_set_and_a_segment_across_it_is_empty() -> None:
@@ -160,12 +185,15 @@ def test_differences_of_flat_sets_are_the_exact_ones(count: int) -> None:
         exact = polyhedron(normals, limits - (other @ normals.T).max(axis=0))
         assert found.is_empty == exact.is_empty(), seed
         if not exact.is_empty():
-            vertices = np.array([[float(value) for value in vertex] for vertex in vertices_of(exact)])
+            vertices = np.array(
+                [[float(value) for value in vertex] for vertex in vertices_of(exact)]
+            )
             apart = np.abs(vertices[:, None] - found.vertices).max(axis=2)
             assert max(apart.min(axis=0).max(), apart.min(axis=1).max()) <= MAX_ERROR, seed
 
 
-# Mixed units ------------------------------------------------------------------------------------------------------
+# Mixed units
+# --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -180,25 +208,32 @@ def test_box_in_mixed_units_is_bounded(lower: list[float], upper: list[float]) -
     """Formerly 'unbounded'."""
     unit = np.eye(len(lower))
 
-    box = Polytope.from_constraints(np.vstack([unit, -unit]), np.concatenate([upper, np.negative(lower)]))
+    box = Polytope.from_constraints(
+        np.vstack([unit, -unit]), np.concatenate([upper, np.negative(lower)])
+    )
 
     np.testing.assert_array_equal(box.bounding_box(), [lower, upper])
 
 
 def far_case(seed: int) -> tuple[Floats, Floats, Floats, Floats]:
-    """Half-spaces of a thin box far from the origin in mixed units, of every second one with three oblique cuts."""
+    """Half-spaces of a thin box far from the origin in mixed units, of every second one with three
+    oblique cuts.
+    """
     random = np.random.default_rng(seed)
     space = int(random.integers(2, 5))
     middle = random.choice([-1.0, 1.0], space) * 10.0 ** random.uniform(-12.0, 12.0, space)
     # Cuts that miss a box without a width by less than rounding touch it.
     width = np.abs(middle) * 10.0 ** random.uniform(-15.0 if seed % 2 else -17.0, -6.0, space)
-    lower, upper = middle - 0.5 * width, middle + 0.5 * width
-    rows, limits = np.vstack([np.eye(space), -np.eye(space)]), np.concatenate([upper, -lower])
+    lower = middle - 0.5 * width
+    upper = middle + 0.5 * width
+    rows = np.vstack([np.eye(space), -np.eye(space)])
+    limits = np.concatenate([upper, -lower])
     if seed % 2:
         cuts = random.normal(size=(3, space)) / width
         cuts /= 2.0 ** np.frexp(np.abs(cuts).max(axis=1))[1][:, None]
         levels = cuts @ middle + random.uniform(-0.15, 0.5, 3) * (np.abs(cuts) @ width)
-        rows, limits = np.vstack([rows, cuts]), np.concatenate([limits, levels])
+        rows = np.vstack([rows, cuts])
+        limits = np.concatenate([limits, levels])
     order = random.permutation(len(rows))
     return rows[order], limits[order], lower, upper
 
@@ -218,26 +253,41 @@ def test_sets_in_mixed_units_far_from_the_origin_are_the_exact_ones(count: int) 
             continue
         assert found.dimension == exact.affine_dimension(), seed
         vertices = vertices_of(exact)
-        assert found.contains([[float(value) for value in vertex] for vertex in vertices]).all(), seed
+        assert found.contains([[float(value) for value in vertex] for vertex in vertices]).all(), (
+            seed
+        )
         for axis in range(found.space):
-            assert width_error(found, axis, [vertex[axis] for vertex in vertices]) <= MAX_ERROR, seed
+            assert width_error(found, axis, [vertex[axis] for vertex in vertices]) <= MAX_ERROR, (
+                seed
+            )
         if not seed % 2:
             np.testing.assert_array_equal(found.bounding_box(), [lower, upper])
 
 
 def width_error(found: Polytope, axis: int, values: list[Fraction]) -> float:
-    """Distance of the ends of a set along an axis, as stored, from the exact ones, relative to the exact width."""
-    low, high = float(found.points[:, axis].min()), float(found.points[:, axis].max())
-    centre, scale = Fraction(float(found.centre[axis])), Fraction(float(found.scale[axis]))
+    """Distance of the ends of a set along an axis, as stored, from the exact ones, relative to the
+    exact width.
+    """
+    low = float(found.points[:, axis].min())
+    high = float(found.points[:, axis].max())
+    centre = Fraction(float(found.centre[axis]))
+    scale = Fraction(float(found.scale[axis]))
     ends = zip((low, high), (min(values), max(values)), strict=True)
     error = max(abs(centre + scale * Fraction(end) - exact) for end, exact in ends)
-    return float(error / (max(values) - min(values))) if max(values) > min(values) else float(error > 0)
+    return (
+        float(error / (max(values) - min(values)))
+        if max(values) > min(values)
+        else float(error > 0)
+    )
 
 
 @pytest.mark.parametrize("junk", [1e-17, -1e-17])
 def test_row_that_is_rounding_does_not_empty_a_thin_set_in_mixed_units(junk: float) -> None:
-    """A row 1e15 times shorter than the others is no constraint, also where exact vertices decide."""
-    lower, upper = np.array([7e6 - 1e-6, -1.0, -1.0]), np.array([7e6 + 1e-6, 1.0, 1.0])
+    """A row 1e15 times shorter than the others is no constraint, also where exact vertices
+    decide.
+    """
+    lower = np.array([7e6 - 1e-6, -1.0, -1.0])
+    upper = np.array([7e6 + 1e-6, 1.0, 1.0])
     rows = np.vstack([np.eye(3), -np.eye(3), [[0.0, junk, -junk]]])
 
     found = Polytope.from_constraints(rows, np.concatenate([upper, -lower, [-3e-17]]))
@@ -255,12 +305,15 @@ def test_set_without_an_end_along_one_axis_is_unbounded_along_it(width: float) -
     assert len(found.vertices) == 2
 
 
-# Cuts ------------------------------------------------------------------------------------------------------------
+# Cuts
+# --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("upper", [-0.5, 0.5])
 def test_an_intersection_with_a_very_long_set_does_not_depend_on_the_order(upper: float) -> None:
-    """Its honest facets are 1e15 times shorter than others, and were taken for rounding: the result was empty."""
+    """Its honest facets are 1e15 times shorter than others, and were taken for rounding: the result
+    was empty.
+    """
     square = Polytope.from_box([-1.0, -1.0], [1.0, 1.0])
     long = Polytope.from_box([0.0, -1.4e11], [1.25e-4, upper])
     for both in (square & long, long & square):
@@ -275,12 +328,17 @@ def test_a_thin_part_loses_only_the_dimension_in_which_it_is_flat(seed: int) -> 
     turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
     bar = Polytope.from_box([-1.0] * 3, [1.0] * 3).cut(turn, [-0.5, 0.0, 0.0], [0.5, 2e-10, 3e-12])
     assert bar.dimension == 2
-    corners = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (0.0, 2e-10) for z in (0.0, 3e-12)]) @ turn
+    corners = (
+        np.array([(x, y, z) for x in (-0.5, 0.5) for y in (0.0, 2e-10) for z in (0.0, 3e-12)])
+        @ turn
+    )
     assert bar.contains(corners, SNAP).all()
 
 
 def test_a_cut_of_a_small_flat_set_is_as_precise_as_the_set() -> None:
-    """The coordinate that is zero has no width: an oblique half-space was compared with a width of one."""
+    """The coordinate that is zero has no width: an oblique half-space was compared with a width of
+    one.
+    """
     segment = Polytope.from_box([0.0, 0.0], [1e-13, 0.0])
     assert segment.cut([1.0, 1.0], upper=-9e-13).is_empty
     square = Polytope.from_box([0.0, 0.0, 0.0], [1e-10, 1e-10, 0.0])

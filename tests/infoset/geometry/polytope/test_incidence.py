@@ -1,4 +1,6 @@
-"""The proof that vertices and facets are all: it accepts polytopes, and nothing that was changed."""
+"""The proof that vertices and facets are all: it accepts polytopes, and nothing that was
+changed.
+"""
 
 from __future__ import annotations
 
@@ -68,7 +70,9 @@ def test_vertices_and_facets_of_a_polytope_are_closed(name: str) -> None:
 
 @pytest.mark.parametrize("name", POLYTOPES)
 @pytest.mark.parametrize("by_facets", [False, True])
-def test_a_changed_bit_or_a_missing_or_doubled_vertex_is_refused(name: str, by_facets: bool) -> None:
+def test_a_changed_bit_or_a_missing_or_doubled_vertex_is_refused(
+    name: str, by_facets: bool
+) -> None:
     one = polytope(name)
     on: Flags = one.incidence.T.copy() if by_facets else one.incidence
     random = np.random.default_rng(len(on))
@@ -119,7 +123,9 @@ def test_a_moved_vertex_is_put_back_and_a_facet_that_cuts_it_off_is_refused(name
 
 
 def half_spaces_of(seed: int) -> tuple[Floats, Floats]:
-    """Half-spaces of a bounded set: round, in mixed units, with integers, or a thin box far away."""
+    """Half-spaces of a bounded set: round, in mixed units, with integers, or a thin box far
+    away.
+    """
     random = np.random.default_rng([seed, 5])
     space = int(random.integers(2, 6))
     unit = np.vstack([np.eye(space), -np.eye(space)])
@@ -131,7 +137,9 @@ def half_spaces_of(seed: int) -> tuple[Floats, Floats]:
             rows = rows / units
         case 2:
             rows = np.vstack([random.integers(-2, 3, (2 * space, space)), unit])
-            limits = np.append(random.integers(1, 4, 2 * space).astype(float), np.full(2 * space, 3.0))
+            limits = np.append(
+                random.integers(1, 4, 2 * space).astype(float), np.full(2 * space, 3.0)
+            )
         case 3:
             middle = random.normal(size=space) * 10.0 ** random.integers(0, 4, space)
             widths = np.abs(middle) * 10.0 ** random.uniform(-9.0, -3.0, space)
@@ -140,12 +148,16 @@ def half_spaces_of(seed: int) -> tuple[Floats, Floats]:
     return rows, limits
 
 
-@pytest.mark.skipif(find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'")
+@pytest.mark.skipif(
+    find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'"
+)
 @pytest.mark.parametrize("count", [40, pytest.param(1600, marks=pytest.mark.thorough)])
 def test_vertices_that_are_accepted_without_integers_are_all_vertices(
     count: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Where the proof fails, integers decide: they are switched off here, and such sets left out."""
+    """Where the proof fails, integers decide: they are switched off here, and such sets left
+    out.
+    """
     accepted = 0
     monkeypatch.setattr(construction, "_with_integers", lambda *_: construction.empty(1))
     for seed in range(count):
@@ -179,7 +191,9 @@ def is_accepted(one: PolytopeArrays, right: PolytopeArrays) -> bool:
 
 
 def changed(one: PolytopeArrays, random: np.random.Generator) -> dict[str, PolytopeArrays]:
-    """Eight changes of a set: its bits, its vertices or its facets are no longer those of a polytope."""
+    """Eight changes of a set: its bits, its vertices or its facets are no longer those of a
+    polytope.
+    """
     on = one.incidence
     vertex = int(random.integers(len(on)))
     facet = int(random.integers(on.shape[1]))
@@ -206,19 +220,29 @@ def changed(one: PolytopeArrays, random: np.random.Generator) -> dict[str, Polyt
         "a bit lost": replace(one, incidence=lost_bit),
         "a vertex dropped": replace(one, points=one.points[others], incidence=on[others]),
         "a vertex doubled": replace(
-            one, points=np.vstack([one.points, one.points[vertex]]), incidence=np.vstack([on, on[vertex]])
+            one,
+            points=np.vstack([one.points, one.points[vertex]]),
+            incidence=np.vstack([on, on[vertex]]),
         ),
         "a facet dropped": replace(one, facets=one.facets[sides], incidence=on[:, sides]),
         "a vertex moved outward": moves[0],
         "a vertex moved inward": moves[1],
-        "a half-space that cuts": replace(one, facets=np.vstack([one.facets, row]), incidence=unknown),
+        "a half-space that cuts": replace(
+            one, facets=np.vstack([one.facets, row]), incidence=unknown
+        ),
     }
 
 
 @pytest.mark.parametrize("count", [16, pytest.param(151, marks=pytest.mark.thorough)])
 def test_changed_results_are_refused_or_put_back(count: int) -> None:
     """Eight changes of each set: of 151 sets 1208, none of which passes."""
-    combinatorial = ["a bit set", "a bit lost", "a vertex dropped", "a vertex doubled", "a facet dropped"]
+    combinatorial = [
+        "a bit set",
+        "a bit lost",
+        "a vertex dropped",
+        "a vertex doubled",
+        "a facet dropped",
+    ]
     for seed in range(count):
         random = np.random.default_rng([seed, 7])
         one = Polytope.from_constraints(*half_spaces_of(seed))

@@ -26,7 +26,9 @@ def solved(matrix: list[list[Fraction]], right: list[Fraction]) -> list[Fraction
         for row in range(len(table)):
             if row != column:
                 factor = table[row][column] / table[column][column]
-                table[row] = [a - factor * b for a, b in zip(table[row], table[column], strict=True)]
+                table[row] = [
+                    a - factor * b for a, b in zip(table[row], table[column], strict=True)
+                ]
     return [row[-1] / row[i] for i, row in enumerate(table)]
 
 
@@ -37,12 +39,16 @@ def dot(one: list[Fraction], two: list[Fraction]) -> Fraction:
 def exact_closest(vertices: Floats, point: Floats) -> Floats:
     """The combination of at most n vertices that satisfies the conditions of optimality."""
     start = [Fraction(float(value)) for value in point]
-    steps = [[Fraction(float(a)) - b for a, b in zip(vertex, start, strict=True)] for vertex in vertices]
+    steps = [
+        [Fraction(float(a)) - b for a, b in zip(vertex, start, strict=True)] for vertex in vertices
+    ]
     for size in range(1, len(start) + 1):
         for chosen in itertools.combinations(range(len(steps)), size):
             first = steps[chosen[0]]
             edges = [[a - b for a, b in zip(steps[k], first, strict=True)] for k in chosen[1:]]
-            shares = solved([[dot(a, b) for a in edges] for b in edges], [-dot(edge, first) for edge in edges])
+            shares = solved(
+                [[dot(a, b) for a in edges] for b in edges], [-dot(edge, first) for edge in edges]
+            )
             if shares is None or any(share < 0 for share in shares) or sum(shares) > 1:
                 continue
             least = list(first)
@@ -58,7 +64,9 @@ def test_closest_point_of_a_tetrahedron_is_the_middle_of_its_face(far: float) ->
     """From 1e9 it was a vertex: rounding of the distance hid the differences of the vertices."""
     corners = Polytope.from_vertices([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 
-    np.testing.assert_allclose(corners.closest_point([far] * 3), [1.0 / 3.0] * 3, rtol=0.0, atol=MAX_ERROR)
+    np.testing.assert_allclose(
+        corners.closest_point([far] * 3), [1.0 / 3.0] * 3, rtol=0.0, atol=MAX_ERROR
+    )
 
 
 @pytest.mark.parametrize("count", [100, pytest.param(1500, marks=pytest.mark.thorough)])
@@ -71,7 +79,9 @@ def test_closest_points_of_far_points_are_the_exact_ones(count: int) -> None:
         if seed % 3 == 0:
             points = random.integers(-3, 4, points.shape).astype(float)
         one = Polytope.from_vertices(points)
-        direction = random.normal(size=space) if seed % 2 else random.integers(-1, 2, space).astype(float)
+        direction = (
+            random.normal(size=space) if seed % 2 else random.integers(-1, 2, space).astype(float)
+        )
         far = direction * 10.0 ** random.uniform(0.0, 12.0)
 
         wanted = exact_closest(one.vertices, far)
@@ -87,7 +97,8 @@ def test_distance_of_far_sets_is_that_of_their_faces(far: float) -> None:
 
     pair = nearest_pair(cube, cube + np.array([far + 2.0, 0.0, far + 2.0]))
 
-    # The edges x = z = 1 and x = z = far + 2 face each other: any two points of them with the same y are nearest.
+    # The edges x = z = 1 and x = z = far + 2 face each other: any two points of them with the same
+    # y are nearest.
     np.testing.assert_array_equal(pair.difference[[0, 2]], [-far - 1.0, -far - 1.0])
     np.testing.assert_array_equal(pair.point[[0, 2]], [1.0, 1.0])
     assert abs(pair.difference[1]) <= MAX_ERROR
@@ -95,7 +106,8 @@ def test_distance_of_far_sets_is_that_of_their_faces(far: float) -> None:
 
 def test_nearest_points_of_sets_that_meet_coincide() -> None:
     random = np.random.default_rng(0)
-    one, two = random.normal(size=(30, 3)), random.normal(size=(30, 3))
+    one = random.normal(size=(30, 3))
+    two = random.normal(size=(30, 3))
 
     pair = nearest_pair(one, two)
 

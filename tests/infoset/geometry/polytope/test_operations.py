@@ -1,4 +1,6 @@
-"""Operations of polytopes of R^3 and R^4 against exact rational polytopes, published cases, and mended mistakes."""
+"""Operations of polytopes of R^3 and R^4 against exact rational polytopes, published cases, and
+mended mistakes.
+"""
 
 from __future__ import annotations
 
@@ -17,15 +19,20 @@ from infoset.geometry.tolerances import ON, SNAP
 from tests.rationals import Fraction
 from tests.rendezvous.reachability.rationals import RationalSet, polyhedron_of, rounded, vertices_of
 
-needs_ppl = pytest.mark.skipif(find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'")
+needs_ppl = pytest.mark.skipif(
+    find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'"
+)
 
 some = settings(max_examples=15, deadline=None)
-SEED, SPACE = st.integers(0, 10**6), st.integers(3, 4)
+SEED = st.integers(0, 10**6)
+SPACE = st.integers(3, 4)
 KIND = st.sampled_from(["plain", "flat", "segment", "point", "mixed", "lattice"])
 
 
 def points_of(kind: str, seed: int, space: int) -> Floats:
-    """Points of a set with an interior, of a flat set, of a set with axes 1e9 times longer than others, ..."""
+    """Points of a set with an interior, of a flat set, of a set with axes 1e9 times longer than
+    others, ...
+    """
     random = np.random.default_rng(seed)
     points = random.uniform(-1.0, 1.0, (space + 5, space))
     if kind == "lattice":
@@ -44,7 +51,8 @@ def exactly(points: Floats) -> list[list[Fraction]]:
 def assert_same(got: Polytope, exact: RationalSet, size: Floats) -> None:
     """Each vertex of one set is within 1e-9 of the other set, in units of the sizes of the axes.
 
-    The bounds of a set that counts as flat can be as far away as its thickness: 1e-9 on both sides of its centre.
+    The bounds of a set that counts as flat can be as far away as its thickness: 1e-9 on both sides
+    of its centre.
     """
     assert got.is_empty == (not len(exact.vertices))
     if got.is_empty:
@@ -53,7 +61,9 @@ def assert_same(got: Polytope, exact: RationalSet, size: Floats) -> None:
     scaled = Polytope.from_vertices(got.vertices / size)
     assert float(wanted.margin(scaled.vertices).min()) >= -1e-9
     assert float(scaled.margin(wanted.vertices).min()) >= -1e-9
-    assert np.abs(got.bounding_box() - exact.bounds.T).max(axis=0) / size == pytest.approx(0.0, abs=2e-9)
+    assert np.abs(got.bounding_box() - exact.bounds.T).max(axis=0) / size == pytest.approx(
+        0.0, abs=2e-9
+    )
 
 
 @needs_ppl
@@ -63,17 +73,25 @@ def assert_same(got: Polytope, exact: RationalSet, size: Floats) -> None:
 @example(seed=7293, space=4, kind="lattice", other_kind="mixed")
 def test_operations_on_two_sets(seed: int, space: int, kind: str, other_kind: str) -> None:
     points = points_of(kind, seed, space)
-    others = points_of("mixed" if kind == "mixed" else other_kind, seed if kind == "mixed" else seed + 1, space)
+    others = points_of(
+        "mixed" if kind == "mixed" else other_kind, seed if kind == "mixed" else seed + 1, space
+    )
     others = 0.5 * others + 0.25 * points.mean(axis=0)
     size = np.maximum(np.abs(points).max(axis=0), np.abs(others).max(axis=0)) + 1e-300
     size = np.maximum(size, 1e-9 * size.max())
-    one, two = Polytope.from_vertices(points), Polytope.from_vertices(others)
-    exact_one, exact_two = polyhedron_of(exactly(points)), polyhedron_of(exactly(others))
+    one = Polytope.from_vertices(points)
+    two = Polytope.from_vertices(others)
+    exact_one = polyhedron_of(exactly(points))
+    exact_two = polyhedron_of(exactly(others))
     assert_same(one, rounded(exact_one), size)
     both = polyhedron_of(exactly(points))
     both.poly_hull_assign(exact_two)
     assert_same(one.convex_hull(two), rounded(both), size)
-    sums = [[a + b for a, b in zip(p, q, strict=True)] for p in vertices_of(exact_one) for q in vertices_of(exact_two)]
+    sums = [
+        [a + b for a, b in zip(p, q, strict=True)]
+        for p in vertices_of(exact_one)
+        for q in vertices_of(exact_two)
+    ]
     assert_same(one + two, rounded(polyhedron_of(sums)), size)
     if kind not in ("plain", "mixed", "lattice") or other_kind not in ("plain", "mixed", "lattice"):
         return  # rounding decides whether flat sets meet
@@ -84,7 +102,9 @@ def test_operations_on_two_sets(seed: int, space: int, kind: str, other_kind: st
     less = polyhedron_of(exactly(points))
     small = exactly(0.05 * (others - others.mean(axis=0)))
     for q in small:
-        less.intersection_assign(polyhedron_of([[a - b for a, b in zip(p, q, strict=True)] for p in exactly(points)]))
+        less.intersection_assign(
+            polyhedron_of([[a - b for a, b in zip(p, q, strict=True)] for p in exactly(points)])
+        )
     part = Polytope.from_vertices(np.array(small, dtype=float))
     if less.is_empty() or less.affine_dimension() == space:
         assert_same(one.minkowski_difference(part), rounded(less), size)
@@ -100,12 +120,17 @@ def test_maps_projections_and_slices(seed: int, space: int, kind: str) -> None:
     one = Polytope.from_vertices(points)
     size = np.maximum(np.abs(points).max(axis=0), 1e-9 * np.abs(points).max())
     random = np.random.default_rng(seed + 2)
-    matrix, offset = random.integers(-2, 3, (2, space)).astype(float), random.integers(-2, 3, 2).astype(float)
-    image = np.array(exactly(points)) @ np.array(exactly(matrix)).T + np.array([Fraction(float(v)) for v in offset])
+    matrix = random.integers(-2, 3, (2, space)).astype(float)
+    offset = random.integers(-2, 3, 2).astype(float)
+    image = np.array(exactly(points)) @ np.array(exactly(matrix)).T + np.array(
+        [Fraction(float(v)) for v in offset]
+    )
     reach = np.full(2, float(size.max()) + 2.0)
     assert_same(one.affine_map(matrix, offset), rounded(polyhedron_of(image.tolist())), reach)
     assert_same(
-        one.project([0, space - 1]), rounded(polyhedron_of(exactly(points[:, [0, space - 1]]))), size[[0, space - 1]]
+        one.project([0, space - 1]),
+        rounded(polyhedron_of(exactly(points[:, [0, space - 1]]))),
+        size[[0, space - 1]],
     )
     if kind == "plain":
         square = np.eye(space) + np.triu(random.integers(-1, 2, (space, space)), 1)
@@ -125,7 +150,9 @@ def test_maps_projections_and_slices(seed: int, space: int, kind: str) -> None:
 @some
 @given(SEED, SPACE, KIND)
 def test_measures(seed: int, space: int, kind: str) -> None:
-    """Identities: the centre of the largest ball, samples inside, distances, reduced sets outside."""
+    """Identities: the centre of the largest ball, samples inside, distances, reduced sets
+    outside.
+    """
     points = points_of(kind, seed, space)
     one = Polytope.from_vertices(points)
     size = float(np.abs(points).max())
@@ -139,13 +166,16 @@ def test_measures(seed: int, space: int, kind: str) -> None:
     far = one.vertices[0] + 3.0 * size * np.eye(space)[0]
     near = one.closest_point(far)
     assert one.contains(near, 1e-9 * size)
-    # The nearest point is the one with the variational inequality (x - near) . (y - near) <= 0 for all y of the set.
+    # The nearest point is the one with the variational inequality (x - near) . (y - near) <= 0 for
+    # all y of the set.
     assert float(((one.vertices - near) @ (far - near)).max()) <= 1e-8 * size**2
     assert one.distance(far) == pytest.approx(float(np.linalg.norm(far - near)), rel=1e-9)
     moved = one.translate(4.0 * size * np.eye(space)[0])
     assert one.hausdorff_distance(moved) == pytest.approx(4.0 * size, rel=1e-9)
     assert one.distance(moved) <= 4.0 * size * (1.0 + 1e-15)
-    assert one.diameter() == pytest.approx(max(float(np.linalg.norm(p - q)) for p in points for q in points), rel=1e-9)
+    assert one.diameter() == pytest.approx(
+        max(float(np.linalg.norm(p - q)) for p in points for q in points), rel=1e-9
+    )
     if kind == "plain":
         fewer = one.reduce_outward(2 * space + 2)
         assert len(fewer.normals) <= 2 * space + 2
@@ -156,15 +186,20 @@ def test_measures(seed: int, space: int, kind: str) -> None:
         apart = np.abs(again.vertices[:, None] - one.vertices).max(axis=2)
         assert max(apart.min(axis=0).max(), apart.min(axis=1).max()) <= 1e-10 * size
         share = one.cut(np.eye(space)[0], upper=float(one.centroid()[0])).volume() / one.volume()
-        assert float((one.sample(20_000)[:, 0] < one.centroid()[0]).mean()) == pytest.approx(share, abs=0.02)
+        assert float((one.sample(20_000)[:, 0] < one.centroid()[0]).mean()) == pytest.approx(
+            share, abs=0.02
+        )
 
 
 @pytest.mark.parametrize("space", [1, 2, 3, 5])
 def test_boxes_are_exact(space: int) -> None:
     """Formerly [0, 0] .. [1, 2] reached to -2.2e-16, and vertices had a positive excess."""
-    lower, upper = np.zeros(space), np.arange(1.0, space + 1.0) / 3.0
+    lower = np.zeros(space)
+    upper = np.arange(1.0, space + 1.0) / 3.0
     box = Polytope.from_box(lower, upper)
-    assert sorted(map(tuple, box.vertices.tolist())) == sorted(itertools.product(*zip(lower, upper, strict=True)))
+    assert sorted(map(tuple, box.vertices.tolist())) == sorted(
+        itertools.product(*zip(lower, upper, strict=True))
+    )
     assert (box.margin(box.vertices) >= 0.0).all()
     assert not box.contains(upper + 1e-14).all()
     flat = Polytope.from_box([0.0] * space, [0.0] * (space - 1) + [1e-12])
@@ -177,7 +212,9 @@ def test_an_empty_set_that_is_unbounded_by_its_directions_is_empty() -> None:
     assert empty.is_empty
     with pytest.raises(EmptyPolytopeError, match=r"the polytope is empty$"):
         empty.needed()
-    assert not Polytope.from_constraints([[1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [2.0, 10.0, 11.0]).is_bounded
+    assert not Polytope.from_constraints(
+        [[1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [2.0, 10.0, 11.0]
+    ).is_bounded
 
 
 def test_cuts_and_pairs_without_a_common_point_are_empty() -> None:
@@ -191,13 +228,15 @@ def test_cuts_and_pairs_without_a_common_point_are_empty() -> None:
         ([1, 0, 0], np.inf, np.inf),
     ):
         assert cube.cut(normal, lower, upper).is_empty
-    floor, tall = Polytope.from_box([0, 0, 0], [1, 1, 0]), Polytope.from_box([0, 0, 0], [1.5, 1, 0.2])
+    floor = Polytope.from_box([0, 0, 0], [1, 1, 0])
+    tall = Polytope.from_box([0, 0, 0], [1.5, 1, 0.2])
     assert floor.minkowski_difference(tall).is_empty
     assert (Polytope.from_vertices([[2, 2], [3, 3]]) & Polytope.from_box([0, 0], [1, 1])).is_empty
 
 
 def test_operations_on_empty_sets() -> None:
-    empty, box = Polytope.empty(3), Polytope.from_box([0.0] * 3, [1.0] * 3)
+    empty = Polytope.empty(3)
+    box = Polytope.from_box([0.0] * 3, [1.0] * 3)
     made = [
         empty & box, box & empty, empty + box, box + empty, np.eye(3) @ empty, empty.translate([1.0, 0.0, 0.0]),
         empty.preimage(np.eye(3)), empty.cut([1.0, 0.0, 0.0], 0.0, 1.0), empty.slice([0], 0.0), empty.project([0, 1]),
@@ -212,7 +251,12 @@ def test_operations_on_empty_sets() -> None:
     assert [0.5] * 3 not in empty
     assert float(empty.support_function([1.0, 0.0, 0.0])) == -np.inf
     assert repr(empty) == "<empty polytope in R^3: 0 vertices, 0 facets>"
-    for measure in (Polytope.centroid, Polytope.bounding_box, Polytope.chebyshev_centre, Polytope.sample):
+    for measure in (
+        Polytope.centroid,
+        Polytope.bounding_box,
+        Polytope.chebyshev_centre,
+        Polytope.sample,
+    ):
         with pytest.raises(EmptyPolytopeError):
             measure(empty, *([3] if measure is Polytope.sample else []))
     with pytest.raises(ValueError, match="unbounded"):
@@ -222,17 +266,27 @@ def test_operations_on_empty_sets() -> None:
 
 
 @pytest.mark.parametrize("small", [1e-3, 1e-6, 3e-7, 1e-9])
-def test_a_part_that_is_far_smaller_than_the_sets_is_found_in_its_own_coordinates(small: float) -> None:
-    """Parts that are 1e12 times narrower than the first set were a point or a segment beside the part."""
+def test_a_part_that_is_far_smaller_than_the_sets_is_found_in_its_own_coordinates(
+    small: float,
+) -> None:
+    """Parts that are 1e12 times narrower than the first set were a point or a segment beside the
+    part.
+    """
     wide = 1.0 / small
-    tall, broad = Polytope.from_box([-small, -wide], [small, wide]), Polytope.from_box([-wide, -small], [wide, small])
+    tall = Polytope.from_box([-small, -wide], [small, wide])
+    broad = Polytope.from_box([-wide, -small], [wide, small])
     both = tall & broad
     assert both.contains([[-small, -small], [small, small], [-small, small]]).all()
     np.testing.assert_allclose(both.bounding_box(), [[-small] * 2, [small] * 2], rtol=1e-9)
-    line, square = Polytope.from_vertices([[-wide, 0.0], [wide, 0.0]]), Polytope.from_box([-small] * 2, [small] * 2)
+    line = Polytope.from_vertices([[-wide, 0.0], [wide, 0.0]])
+    square = Polytope.from_box([-small] * 2, [small] * 2)
     for piece in (line & square, square & line):
-        np.testing.assert_allclose(piece.bounding_box(), [[-small, 0.0], [small, 0.0]], rtol=1e-9, atol=1e-300)
-    less = Polytope.from_box([0.0] * 2, [1e6] * 2).minkowski_difference(Polytope.from_box([0.0] * 2, [1e6 - small] * 2))
+        np.testing.assert_allclose(
+            piece.bounding_box(), [[-small, 0.0], [small, 0.0]], rtol=1e-9, atol=1e-300
+        )
+    less = Polytope.from_box([0.0] * 2, [1e6] * 2).minkowski_difference(
+        Polytope.from_box([0.0] * 2, [1e6 - small] * 2)
+    )
     assert less.contains([small / 2.0] * 2)
 
 
@@ -251,13 +305,18 @@ def test_axes_of_very_different_sizes() -> None:
 
 def test_balls_and_zonotopes() -> None:
     for space, most in ((1, 1.0), (2, 1.09), (3, 1.13), (4, 1.17), (5, 1.19)):
-        outer, inner = (Polytope.from_ball(np.ones(space), 2.0, outer=outer) for outer in (True, False))
+        outer, inner = (
+            Polytope.from_ball(np.ones(space), 2.0, outer=outer) for outer in (True, False)
+        )
         for one, depth in ((outer, 2.0), (inner, 2.0 / most)):
             assert (one.offsets - one.normals.sum(axis=1)).min() >= depth - 1e-14
             assert np.linalg.norm(one.normals, axis=1) == pytest.approx(1.0)
             if space < 5:  # a hull of 3840 points takes long
                 hull = Polytope.from_vertices(one.vertices)
-                assert (len(hull.vertices), len(hull.normals)) == (len(one.vertices), len(one.normals))
+                assert (len(hull.vertices), len(hull.normals)) == (
+                    len(one.vertices),
+                    len(one.normals),
+                )
                 assert hull.equals(one, 1e-12)
         assert outer.chebyshev_centre()[1] == pytest.approx(2.0)
         assert np.linalg.norm(inner.vertices - 1.0, axis=1) == pytest.approx(2.0)
@@ -272,10 +331,12 @@ def test_balls_and_zonotopes() -> None:
     assert Polytope.from_zonotope(Zonotope([1.0, 2.0], [])).dimension == 0
 
 
-# Published cases ----------------------------------------------------------------------------------------------------
+# Published cases
+# --------------------------------------------------------------------------------------------------
 
 THERE_AND_BACK = [
-    # cddlib issue 34 (also CDDLib.jl issue 47): "Numerically inconsistent"; vertices were doubled 2.5e-9 apart here.
+    # cddlib issue 34 (also CDDLib.jl issue 47): "Numerically inconsistent"; vertices were doubled
+    # 2.5e-9 apart here.
     [(-8.02, -2.955, -2.412), (-7.942, -2.622, -2.362), (-7.956, -1.271, -2.403), (-7.878, -0.937, -2.353),
      (-7.763, 1.284, -2.392), (-7.685, 1.617, -2.342), (-7.699, 2.968, -2.383), (-7.621, 3.301, -2.333),
      (-6.495, 3.278, -1.779), (0.773, 3.13, -2.645)],
@@ -304,11 +365,12 @@ def test_published_vertices_come_back(points: list[tuple[float, ...]]) -> None:
 
 
 def vertex_errors(one: Polytope) -> Floats:
-    """Bounds of the errors of vertices, in scaled coordinates, shape (v,), for every order of operations.
+    """Bounds of the errors of vertices, in scaled coordinates, shape (v,), for every order of
+    operations.
 
-    A vertex counts as on a row within `ON` of each coordinate, as the same as another one within `SNAP`, and moves to
-    the outer sides of its rows by at most `SNAP`. A vertex with the matrix of rows R and heights h is within |h| / s of
-    the exact one, with s the least singular value of R.
+    A vertex counts as on a row within `ON` of each coordinate, as the same as another one within
+    `SNAP`, and moves to the outer sides of its rows by at most `SNAP`. A vertex with the matrix of
+    rows R and heights h is within |h| / s of the exact one, with s the least singular value of R.
     """
     errors = []
     for on in one.incidence:
@@ -319,7 +381,8 @@ def vertex_errors(one: Polytope) -> Floats:
 
 
 CONSTRAINTS: list[tuple[list[tuple[float, ...]], int]] = [
-    # Rows (b, -a) of b - a x >= 0 with the number of vertices. cddlib issue 34, of 19 August 2026: a ray was reported.
+    # Rows (b, -a) of b - a x >= 0 with the number of vertices. cddlib issue 34, of 19 August 2026:
+    # a ray was reported.
     ([(1.3660253171818983, -0.49999999999999994, -0.8660254037844387), (0.36602545378443874, -0.8660254037844387,
       0.49999999999999994), (1, 0, 1), (1, -1, 0), (1, 0, -1), (1, 1, 0)], 5),
     # cddlib issue 67: two of five vertices were missing.
@@ -330,7 +393,8 @@ CONSTRAINTS: list[tuple[list[tuple[float, ...]], int]] = [
     ([(0, -1, -1), (-1, 1, 0), (-1, 0, 1)], 0),
     # LazySets issue 994: a triangle.
     ([(0.25, 0, -1), (0.25, -1, 0), (0, 1, 1)], 3),
-    # polytope, tulip-control issue 23: boxes of 30000 and 40000 by 25; the result depended on the order.
+    # polytope, tulip-control issue 23: boxes of 30000 and 40000 by 25; the result depended on the
+    # order.
     ([(30000, -1, 0), (25, 0, -1), (0, 1, 0), (0, 0, 1), (40000, -1, 0), (25, 0, -1), (0, 1, 0), (0, 0, 1)], 4),
     ([(40000, -1, 0), (25, 0, -1), (0, 1, 0), (0, 0, 1), (30000, -1, 0), (25, 0, -1), (0, 1, 0), (0, 0, 1)], 4),
     # pycvxset issue 2: the unit square. test_polytope_binary.py: an empty box.
@@ -346,12 +410,18 @@ def test_published_constraints(rows: list[tuple[float, ...]], count: int) -> Non
     polytope = Polytope.from_constraints(-array[:, 1:], array[:, 0])
     assert int(polygon.counts) == len(polytope.vertices) == count
     gaps = np.abs(polytope.vertices[:, None] - polygon.polygon()[None]).max(axis=-1, initial=0.0)
-    assert count == 0 or float(gaps.min(axis=1).max()) <= 1e-11 * float(np.abs(polygon.polygon()).max())
+    assert count == 0 or float(gaps.min(axis=1).max()) <= 1e-11 * float(
+        np.abs(polygon.polygon()).max()
+    )
 
 
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
-@pytest.mark.parametrize("large", [[1e9, 1.0, 1e-9], [1e9, 1.0, 1.0], [1e9, 1e9, 1e9], [1.0, 1.0, 1e-9]])
-def test_intersections_with_sets_that_are_a_billion_times_larger(large: list[float], size: float) -> None:
+@pytest.mark.parametrize(
+    "large", [[1e9, 1.0, 1e-9], [1e9, 1.0, 1.0], [1e9, 1e9, 1e9], [1.0, 1.0, 1e-9]]
+)
+def test_intersections_with_sets_that_are_a_billion_times_larger(
+    large: list[float], size: float
+) -> None:
     upper = np.array(large)
     both = Polytope.from_box(np.zeros(3), upper) & Polytope.from_box(np.zeros(3), np.full(3, size))
     lower, most = both.bounding_box()
@@ -370,7 +440,8 @@ def test_a_simplex_is_one_simplex(states: int) -> None:
 
 
 def test_other_published_cases() -> None:
-    # polytope issue 93: the constraints leave the direction (0, 0, 1, 1) free; vertices of 3e13 were returned.
+    # polytope issue 93: the constraints leave the direction (0, 0, 1, 1) free; vertices of 3e13
+    # were returned.
     rows = np.array(
         [
             [-1, 0, 0, 0],
@@ -393,11 +464,16 @@ def test_other_published_cases() -> None:
         True,
     ]
     assert segment.cut([1.0, 0.0], 2.97, 2.97).is_empty
-    np.testing.assert_allclose(segment.cut([1.0, 0.0], 3.97, 3.97).vertices, [[3.97, 3.176]], rtol=1e-12)
-    # pycvxset, test_polytope_binary.py: a flat square less a cube is empty; less itself it is a point.
+    np.testing.assert_allclose(
+        segment.cut([1.0, 0.0], 3.97, 3.97).vertices, [[3.97, 3.176]], rtol=1e-12
+    )
+    # pycvxset, test_polytope_binary.py: a flat square less a cube is empty; less itself it is a
+    # point.
     flat = Polytope.from_box([-1.0, -1.0, 0.0], [1.0, 1.0, 0.0])
     assert flat.minkowski_difference(Polytope.from_box([-1.0] * 3, [1.0] * 3)).is_empty
-    np.testing.assert_allclose(flat.minkowski_difference(flat).vertices, [[0.0, 0.0, 0.0]], atol=1e-12)
+    np.testing.assert_allclose(
+        flat.minkowski_difference(flat).vertices, [[0.0, 0.0, 0.0]], atol=1e-12
+    )
     # pycvxset, test_polytope_unary.py: the projection of a cylinder.
     cylinder = [[-1, 0, 0], [0, -1, 0], [1, 1, 0], [0, 0, 1], [0, 0, -1]]
     shade = Polytope.from_constraints(cylinder, [0, 0, 1, 1, 1]).project([0, 1])
@@ -406,14 +482,20 @@ def test_other_published_cases() -> None:
 
 @pytest.mark.parametrize("space", [2, 3])
 def test_no_facet_of_an_image_excludes_an_exact_vertex(space: int) -> None:
-    """In rationals, in the coordinates of the image: formerly one of two such maps, by up to 1e-16."""
-    random, mapped, exact = np.random.default_rng(space), 0, np.vectorize(Fraction, otypes=[object])
+    """In rationals, in the coordinates of the image: formerly one of two such maps, by up to
+    1e-16.
+    """
+    random = np.random.default_rng(space)
+    mapped = 0
+    exact = np.vectorize(Fraction, otypes=[object])
     for _ in range(100):
         matrix = random.integers(-7, 8, (space, space)).astype(float)
         if abs(np.linalg.det(matrix)) < 0.5:
             continue
-        lower, upper = random.integers(-5, 0, space), random.integers(1, 6, space)
-        image, mapped = Polytope.from_box(lower, upper).linear_map(matrix), mapped + 1
+        lower = random.integers(-5, 0, space)
+        upper = random.integers(1, 6, space)
+        image = Polytope.from_box(lower, upper).linear_map(matrix)
+        mapped = mapped + 1
         facets, centre, scale = map(exact, (image.facets, image.centre, image.scale))
         for corner in itertools.product(*zip(lower.tolist(), upper.tolist(), strict=True)):
             point = (exact(matrix) @ np.array(corner) - centre) / scale

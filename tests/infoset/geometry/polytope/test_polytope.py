@@ -19,7 +19,9 @@ from infoset.geometry.polytope import (
 )
 from tests.rendezvous.reachability.rationals import rational_hull, rational_intersection
 
-needs_ppl = pytest.mark.skipif(find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'")
+needs_ppl = pytest.mark.skipif(
+    find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'"
+)
 
 
 def random_points(seed: int, count: int, size: int, rank: int) -> Floats:
@@ -51,7 +53,9 @@ def test_cross_polytope_and_simplex_counts() -> None:
     for size in (2, 3, 4, 5):
         cross = Polytope.from_vertices(np.vstack([np.eye(size), -np.eye(size)]))
         assert (len(cross.vertices), len(cross.normals)) == (2 * size, 2**size)
-        simplex = Polytope.from_constraints(np.vstack([-np.eye(size), np.ones((1, size))]), [*[0.0] * size, 1.0])
+        simplex = Polytope.from_constraints(
+            np.vstack([-np.eye(size), np.ones((1, size))]), [*[0.0] * size, 1.0]
+        )
         assert (len(simplex.vertices), len(simplex.normals)) == (size + 1, size + 1)
         assert simplex.volume() == pytest.approx(1.0 / np.prod(np.arange(1, size + 1)))
 
@@ -67,7 +71,12 @@ def test_redundant_points_and_halfspaces_are_dropped() -> None:
 
 @needs_ppl
 @settings(max_examples=30, deadline=None)
-@given(seed=st.integers(0, 10**6), size=st.integers(2, 6), flat=st.integers(0, 3), extra=st.integers(1, 8))
+@given(
+    seed=st.integers(0, 10**6),
+    size=st.integers(2, 6),
+    flat=st.integers(0, 3),
+    extra=st.integers(1, 8),
+)
 def test_hull_is_the_exact_one(seed: int, size: int, flat: int, extra: int) -> None:
     rank = max(1, size - flat)
     points = random_points(seed, rank + extra, size, rank)
@@ -77,7 +86,9 @@ def test_hull_is_the_exact_one(seed: int, size: int, flat: int, extra: int) -> N
     assert float(hull.margin(points).min()) > -1e-9 * np.abs(points).max()
     found = directions(seed, size)
     np.testing.assert_allclose(
-        hull.support_function(found), (points @ found.T).max(axis=0), atol=1e-9 * np.abs(points).max()
+        hull.support_function(found),
+        (points @ found.T).max(axis=0),
+        atol=1e-9 * np.abs(points).max(),
     )
     if rank == size:  # floats that are flat to rounding only are not flat in rationals
         exact = rational_hull(points)
@@ -86,14 +97,26 @@ def test_hull_is_the_exact_one(seed: int, size: int, flat: int, extra: int) -> N
 
 @needs_ppl
 @settings(max_examples=20, deadline=None)
-@given(seed=st.integers(0, 10**6), size=st.integers(2, 6), rank=st.integers(1, 5), extra=st.integers(1, 6))
+@given(
+    seed=st.integers(0, 10**6),
+    size=st.integers(2, 6),
+    rank=st.integers(1, 5),
+    extra=st.integers(1, 6),
+)
 def test_flat_hull_is_the_exact_one(seed: int, size: int, rank: int, extra: int) -> None:
     generator = np.random.default_rng(seed)
     rank = min(rank, size)
-    points = (generator.integers(-9, 10, (rank + extra, rank)) @ generator.integers(-9, 10, (rank, size))).astype(float)
-    exact, hull = rational_hull(points), Polytope.from_vertices(points)
+    points = (
+        generator.integers(-9, 10, (rank + extra, rank)) @ generator.integers(-9, 10, (rank, size))
+    ).astype(float)
+    exact = rational_hull(points)
+    hull = Polytope.from_vertices(points)
     facets = 0 if hull.dimension == 0 else len(hull.normals)
-    assert (hull.dimension, len(hull.vertices), facets) == (exact.dimension, len(exact.vertices), exact.facets)
+    assert (hull.dimension, len(hull.vertices), facets) == (
+        exact.dimension,
+        len(exact.vertices),
+        exact.facets,
+    )
 
 
 @needs_ppl
@@ -143,7 +166,10 @@ def test_cut_and_product() -> None:
     assert half.volume() == pytest.approx(4.0)
     assert cube.cut([[1.0, 1.0, 1.0]], upper=[5.0]) is cube
     assert cube.cut([[1.0, 0.0, 0.0]], upper=[-2.0]).is_empty
-    both = product(Polytope.from_box([0.0], [1.0]), Polytope.from_vertices([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
+    both = product(
+        Polytope.from_box([0.0], [1.0]),
+        Polytope.from_vertices([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]),
+    )
     assert (len(both.vertices), len(both.normals)) == (6, 5)
     assert both.volume() == pytest.approx(0.5)
 
@@ -155,11 +181,17 @@ def test_projection_by_supports_is_the_projection(size: int) -> None:
     def furthest(direction: Floats) -> Floats:
         return solid.support_vector(np.concatenate([direction, np.zeros(5 - size)]))[:size]
 
-    found, expected = polytope_from_support(furthest, size), solid.project(range(size))
-    assert (len(found.vertices), len(found.normals)) == (len(expected.vertices), len(expected.normals))
+    found = polytope_from_support(furthest, size)
+    expected = solid.project(range(size))
+    assert (len(found.vertices), len(found.normals)) == (
+        len(expected.vertices),
+        len(expected.normals),
+    )
     seen = directions(1, size)
     np.testing.assert_allclose(
-        found.support_function(seen), expected.support_function(seen), atol=1e-9 * np.abs(solid.vertices).max()
+        found.support_function(seen),
+        expected.support_function(seen),
+        atol=1e-9 * np.abs(solid.vertices).max(),
     )
 
 
@@ -167,7 +199,9 @@ def test_projection_of_a_flat_set_and_of_one_with_too_many_facets() -> None:
     flat = Polytope.from_vertices([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]])
     assert polytope_from_support(flat.support_vector, 3).dimension == 2
     with pytest.raises(ArithmeticError, match="over 20 facets"):
-        polytope_from_support(lambda direction: direction / np.linalg.norm(direction), 2, max_facets=20)
+        polytope_from_support(
+            lambda direction: direction / np.linalg.norm(direction), 2, max_facets=20
+        )
 
 
 @pytest.mark.parametrize("junk", [0.0, 1e-17, -1e-17])
@@ -191,11 +225,14 @@ def test_a_far_constraint_does_not_hide_a_set(far: float) -> None:
 
 def test_units_that_differ_by_1e30() -> None:
     """Formerly an error: the sizes differed too much for a hull."""
-    units, row = np.array([1e15, 1.0, 1e-15]), np.array([0.5, -0.7, -0.2])
+    units = np.array([1e15, 1.0, 1e-15])
+    row = np.array([0.5, -0.7, -0.2])
     plain = Polytope.from_box(np.zeros(3), np.ones(3)).cut(row, upper=-0.2)
     cut = Polytope.from_box(np.zeros(3), units).cut(row / units, upper=-0.2)
     assert len(cut.vertices) == len(plain.vertices)
-    assert np.sort(cut.vertices / units, axis=0) == pytest.approx(np.sort(plain.vertices, axis=0), abs=1e-12)
+    assert np.sort(cut.vertices / units, axis=0) == pytest.approx(
+        np.sort(plain.vertices, axis=0), abs=1e-12
+    )
 
 
 FLAT_SETS = {
@@ -209,21 +246,31 @@ FLAT_SETS = {
 
 @pytest.mark.parametrize("name", FLAT_SETS)
 def test_flat_sets_in_mixed_units_and_far_from_the_origin(name: str) -> None:
-    """Formerly most operations on flat sets whose units differ by 1e8 lost vertices, or gave points or no set."""
-    points, scale, far = np.array(FLAT_SETS[name]), np.array([2.0**13, 1.0, 2.0**-13]), 1e6
+    """Formerly most operations on flat sets whose units differ by 1e8 lost vertices, or gave points
+    or no set.
+    """
+    points = np.array(FLAT_SETS[name])
+    scale = np.array([2.0**13, 1.0, 2.0**-13])
+    far = 1e6
     origin = far * np.array([1.0, -2.0, 1.0])
     # The same set at the origin with equal units is the reference.
-    plain, other = Polytope.from_vertices(points), Polytope.from_vertices((points + origin) * scale)
+    plain = Polytope.from_vertices(points)
+    other = Polytope.from_vertices((points + origin) * scale)
     centre = points.mean(axis=0).round(2)
     cube, box = (Polytope.from_box(-size, size) for size in (np.full(3, 2.0), 2.0 * scale))
     around = (centre + origin) * scale
-    normal, matrix = np.array([1.0, 2.0, -1.0]), np.array([[1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 1.0]])
+    normal = np.array([1.0, 2.0, -1.0])
+    matrix = np.array([[1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 1.0]])
     unscaled = scale[:, None] * matrix / scale
-    level, far_level = float(normal @ centre), float(normal @ (centre + origin))
+    level = float(normal @ centre)
+    far_level = float(normal @ (centre + origin))
     pairs = [
         (plain, other),
         (plain, Polytope.from_constraints(*other.constraints())),
-        (plain, Polytope.from_constraints(other.normals, other.offsets, other.across, other.levels)),
+        (
+            plain,
+            Polytope.from_constraints(other.normals, other.offsets, other.across, other.levels),
+        ),
         (plain, other & other),
         (plain & cube.translate(centre), other & box.translate(around)),
         (plain + cube, other + box),
@@ -244,50 +291,85 @@ def test_flat_sets_in_mixed_units_and_far_from_the_origin(name: str) -> None:
         rest = np.delete(np.arange(3), axes)
         section = other.slice(axes, around[axes])
         assert section.dimension == plain.slice(axes, centre[axes]).dimension
-        ends = (np.array(section.bounding_box()) / scale[rest] - origin[rest]) if not section.is_empty else 0.0
-        wanted_ends = np.array(plain.slice(axes, centre[axes]).bounding_box()) if not section.is_empty else 0.0
+        ends = (
+            (np.array(section.bounding_box()) / scale[rest] - origin[rest])
+            if not section.is_empty
+            else 0.0
+        )
+        wanted_ends = (
+            np.array(plain.slice(axes, centre[axes]).bounding_box())
+            if not section.is_empty
+            else 0.0
+        )
         assert ends == pytest.approx(wanted_ends, abs=1e-9 + 1e-13 * far)
     edges = np.array(other.vertices[1 : plain.dimension + 1] - other.vertices[0])
     if len(plain.vertices) == plain.dimension + 1:  # a simplex
-        volume = np.sqrt(max(np.linalg.det(edges @ edges.T), 0.0)) / [1.0, 1.0, 2.0, 6.0][plain.dimension]
+        volume = (
+            np.sqrt(max(np.linalg.det(edges @ edges.T), 0.0))
+            / [1.0, 1.0, 2.0, 6.0][plain.dimension]
+        )
         assert other.volume() == pytest.approx(volume, rel=1e-7)
     middle, radius = other.chebyshev_centre()
     assert other.contains(middle, 1e-9 * float(scale.max()))
     assert (radius > 0.0) == (plain.dimension > 0)
-    assert float((other.offsets - other.normals @ middle).min(initial=np.inf)) >= radius * (1.0 - 1e-6) - 1e-9 * far
+    assert (
+        float((other.offsets - other.normals @ middle).min(initial=np.inf))
+        >= radius * (1.0 - 1e-6) - 1e-9 * far
+    )
 
 
 @pytest.mark.parametrize("seed", range(10))
 def test_coordinates_that_are_equal_at_all_points_stay_exact(seed: int) -> None:
-    """Formerly they had the rounding errors of the other coordinates, which can have larger units."""
+    """Formerly they had the rounding errors of the other coordinates, which can have larger
+    units.
+    """
     points = 1e9 * np.random.default_rng(seed).normal(size=(9, 5))
     points[:, [1, 3]] = 5e-9, 0.0
     steps = points - points[0]
-    for flat in (Polytope.from_vertices(points), Polytope.from_zonotope(Zonotope(points[0], steps))):
+    for flat in (
+        Polytope.from_vertices(points),
+        Polytope.from_zonotope(Zonotope(points[0], steps)),
+    ):
         assert flat.dimension == 3
-        np.testing.assert_array_equal(flat.vertices[:, [1, 3]], np.tile([5e-9, 0.0], (len(flat.vertices), 1)))
+        np.testing.assert_array_equal(
+            flat.vertices[:, [1, 3]], np.tile([5e-9, 0.0], (len(flat.vertices), 1))
+        )
         assert not flat.normals[:, [1, 3]].any()
-        np.testing.assert_array_equal(flat.across.T @ flat.across, np.diag([0.0, 1.0, 0.0, 1.0, 0.0]))
+        np.testing.assert_array_equal(
+            flat.across.T @ flat.across, np.diag([0.0, 1.0, 0.0, 1.0, 0.0])
+        )
         np.testing.assert_array_equal(flat.across.T @ flat.levels, [0.0, 5e-9, 0.0, 0.0, 0.0])
 
 
 def test_a_row_of_another_length_does_not_hide_a_thin_set() -> None:
     """Formerly a point: the rounding of the offsets was not divided by the lengths of the rows."""
-    rows = [[-1.0, 0.0], [8388609.0, -8388608.0], [-8388599.0, 8388608.0], [25165827.0, -25165824.0]]
+    rows = [
+        [-1.0, 0.0],
+        [8388609.0, -8388608.0],
+        [-8388599.0, 8388608.0],
+        [25165827.0, -25165824.0],
+    ]
     assert len(Polytope.from_constraints(rows, [0.0, 32.0, 48.0, 251658399.0]).vertices) == 3
 
 
 def test_equations_in_mixed_units() -> None:
     point = Polytope.from_box([1.0, 2.0], [1.0, 2.0]).preimage(np.diag([1e-6, 1e6]))
     np.testing.assert_allclose(point.vertices, [[1e6, 2e-6]], rtol=1e-9)
-    rows, levels = [[0.0, 1e-7, 0.0], [0.0, 0.0, 1e6]], [1e-7, 1e6]
-    segment = Polytope.from_constraints([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]], [1.0, 1.0], rows, levels)
-    np.testing.assert_allclose(np.sort(segment.vertices, axis=0), [[-1.0, 1.0, 1.0], [1.0, 1.0, 1.0]], rtol=1e-9)
+    rows = [[0.0, 1e-7, 0.0], [0.0, 0.0, 1e6]]
+    levels = [1e-7, 1e6]
+    segment = Polytope.from_constraints(
+        [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]], [1.0, 1.0], rows, levels
+    )
+    np.testing.assert_allclose(
+        np.sort(segment.vertices, axis=0), [[-1.0, 1.0, 1.0], [1.0, 1.0, 1.0]], rtol=1e-9
+    )
 
 
 def test_empty_sets_are_refused_where_one_with_points_is_needed() -> None:
     with pytest.raises(EmptyPolytopeError):
-        Polytope.from_constraints([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [-0.5, 0.0, 1.0, 1.0]).needed()
+        Polytope.from_constraints(
+            [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [-0.5, 0.0, 1.0, 1.0]
+        ).needed()
     with pytest.raises(EmptyPolytopeError):
         Polytope.from_constraints(
             [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [-1.0, 1, 1, 1, 1]

@@ -17,13 +17,17 @@ import pytest
 from infoset.geometry.polytope import Polytope
 from tests.rationals import Fraction
 
-CASES: list[dict[str, Any]] = json.loads((Path(__file__).parent / "published_polytopes.json").read_text())["cases"]
+CASES: list[dict[str, Any]] = json.loads(
+    (Path(__file__).parent / "published_polytopes.json").read_text()
+)["cases"]
 MAX_SUBSETS = 3000
 Row = tuple[Fraction, ...]
 
 
 def solution(rows: list[Row]) -> Row | None:
-    """Return the only x with b + a x = 0 for rows (b, a), by elimination; None if there is no such point."""
+    """Return the only x with b + a x = 0 for rows (b, a), by elimination; None if there is no such
+    point.
+    """
     table = [[*row[1:], -row[0]] for row in rows]
     size = len(table[0]) - 1
     for k in range(size):
@@ -76,13 +80,19 @@ def test_constraints(case: dict[str, Any]) -> None:
     wanted = exact_vertices(rows, equations)
     assert len(polytope.vertices) == len(wanted)
     if wanted:
-        gaps = np.abs(polytope.vertices[:, None] - np.array(sorted(wanted), dtype=float)).max(axis=-1)
+        gaps = np.abs(polytope.vertices[:, None] - np.array(sorted(wanted), dtype=float)).max(
+            axis=-1
+        )
         assert float(gaps.min(axis=1).max()) <= 1e-12 * size
 
 
-@pytest.mark.parametrize("case", [case for case in CASES if case["form"] == "vertices"], ids=lambda case: case["case"])
+@pytest.mark.parametrize(
+    "case", [case for case in CASES if case["form"] == "vertices"], ids=lambda case: case["case"]
+)
 def test_vertices(case: dict[str, Any]) -> None:
-    """All points are inside, and each facet contains points that span it: the facets are those of the hull."""
+    """All points are inside, and each facet contains points that span it: the facets are those of
+    the hull.
+    """
     points = np.array(case["rows"], dtype=float)[:, 1:]
     polytope = Polytope.from_vertices(points)
     assert len(polytope.normals) == case.get("facets", len(polytope.normals))

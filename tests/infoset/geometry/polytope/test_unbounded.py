@@ -1,4 +1,6 @@
-"""Unbounded polytopes: half-spaces, cones, cylinders, R^n, against known answers and exact arithmetic (PPL)."""
+"""Unbounded polytopes: half-spaces, cones, cylinders, R^n, against known answers and exact
+arithmetic (PPL).
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ from infoset.geometry.polytope import EmptyPolytopeError, Polytope, UnboundedPol
 from infoset.geometry.polytope.polyhedron import Polyhedron
 from tests.infoset.geometry.polytope.exact_sets import polyhedron
 
-needs_ppl = pytest.mark.skipif(find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'")
+needs_ppl = pytest.mark.skipif(
+    find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'"
+)
 
 
 # Functions and not constants: kernels are compiled when tests run, not when they are collected.
@@ -40,13 +44,20 @@ def box() -> Polytope:
 
 @cache
 def wedge() -> Polytope:
-    return Polytope.from_rays([[0.0, 0.0, 1.0], [2.0, 0.0, 1.0]], [[0.0, 1.0, 0.0], [0.0, 1.0, 1.0]])
+    return Polytope.from_rays(
+        [[0.0, 0.0, 1.0], [2.0, 0.0, 1.0]], [[0.0, 1.0, 0.0], [0.0, 1.0, 1.0]]
+    )
 
 
 def test_half_space_has_a_line_and_a_direction() -> None:
     half = Polytope.halfspace([3.0, 4.0], 10.0)
 
-    assert (half.dimension, len(half.vertices), len(half.lines), len(half.directions)) == (2, 1, 1, 1)
+    assert (half.dimension, len(half.vertices), len(half.lines), len(half.directions)) == (
+        2,
+        1,
+        1,
+        1,
+    )
     np.testing.assert_allclose(half.normals, [[0.6, 0.8]], rtol=1e-15)
     np.testing.assert_allclose(half.offsets, [2.0], rtol=1e-15)
     assert half.contains([[2.0, 1.0], [2.1, 1.0], [-1e9, 1e8]]).tolist() == [True, False, True]
@@ -69,7 +80,9 @@ def test_the_whole_space_has_no_facet(space: int) -> None:
 
 
 def test_rays_inside_the_cone_of_others_are_left_out() -> None:
-    cone = Polytope.from_rays([[0.0, 0.0], [1.0, 1.0]], [[1.0, 0.0], [0.0, 1.0], [2.0, 3.0], [0.0, 0.0]])
+    cone = Polytope.from_rays(
+        [[0.0, 0.0], [1.0, 1.0]], [[1.0, 0.0], [0.0, 1.0], [2.0, 3.0], [0.0, 0.0]]
+    )
 
     assert cone.equals(quadrant())
     assert cone.vertices.tolist() == [[0.0, 0.0]]
@@ -149,7 +162,9 @@ def test_preimage_of_a_singular_matrix_contains_its_null_space() -> None:
     found = box().preimage([[1.0, 1.0, 0.0], [0.0, 0.0, 2.0]], [0.5, 0.0])
 
     np.testing.assert_allclose(found.lines @ [[1.0], [1.0], [0.0]], 0.0, atol=1e-15)
-    np.testing.assert_allclose(found.support_function([[1.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), [0.5, 0.5], rtol=1e-14)
+    np.testing.assert_allclose(
+        found.support_function([[1.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), [0.5, 0.5], rtol=1e-14
+    )
     assert box().preimage([[0.0, 0.0], [0.0, 0.0]]).equals(Polytope.space_of(2))
     assert box().preimage([[0.0, 0.0], [0.0, 0.0]], [2.0, 0.0]).is_empty
 
@@ -171,7 +186,9 @@ def test_distances() -> None:
     assert quadrant().distance([-3.0, -4.0]) == 5.0
     assert quadrant().closest_point([-3.0, 7.0]).tolist() == [0.0, 7.0]
     assert quadrant().distance((-quadrant()).translate([-3.0, -4.0])) == 5.0
-    assert Polytope.halfspace([0.6, 0.8], 1.0).distance(Polytope.halfspace([-0.6, -0.8], -3.0)) == pytest.approx(2.0)
+    assert Polytope.halfspace([0.6, 0.8], 1.0).distance(
+        Polytope.halfspace([-0.6, -0.8], -3.0)
+    ) == pytest.approx(2.0)
     assert strip().distance(strip()) == 0.0
 
 
@@ -221,7 +238,11 @@ def test_what_only_bounded_sets_have_is_refused(ask: Callable[[Polytope], object
 
 
 def test_measures_are_infinite() -> None:
-    assert (quadrant().volume(), quadrant().area(), quadrant().diameter()) == (np.inf, np.inf, np.inf)
+    assert (quadrant().volume(), quadrant().area(), quadrant().diameter()) == (
+        np.inf,
+        np.inf,
+        np.inf,
+    )
     assert Polytope.from_rays([[0.0, 0.0]], [[1.0, 2.0]]).area() == 0.0
 
 
@@ -238,7 +259,12 @@ def test_plot_shows_the_part_within_the_limits_of_the_axes() -> None:
 
     (patch,) = quadrant().plot(axes)
 
-    assert sorted(map(tuple, patch.get_xy()[:-1].tolist())) == [(0.0, 0.0), (0.0, 4.0), (3.0, 0.0), (3.0, 4.0)]
+    assert sorted(map(tuple, patch.get_xy()[:-1].tolist())) == [
+        (0.0, 0.0),
+        (0.0, 4.0),
+        (3.0, 0.0),
+        (3.0, 4.0),
+    ]
     assert (axes.get_xlim(), axes.get_ylim()) == ((-2.0, 3.0), (4.0, -1.0))
 
 
@@ -249,11 +275,14 @@ def test_unbounded_set_survives_pickling_and_says_what_it_is() -> None:
     assert repr(again) == "<unbounded polytope of dimension 2 in R^2: 1 vertices, 2 facets>"
 
 
-# Against exact arithmetic ------------------------------------------------------------------------------------------
+# Against exact arithmetic
+# --------------------------------------------------------------------------------------------------
 
 
 def random_set(random: np.random.Generator, space: int) -> tuple[Polytope, Any]:
-    """Return a random set, often unbounded, flat or touching others, and the polyhedron of PPL with the same data."""
+    """Return a random set, often unbounded, flat or touching others, and the polyhedron of PPL with
+    the same data.
+    """
     import ppl
 
     largest = 2 if random.random() < 0.7 else 1000
@@ -283,11 +312,16 @@ def linear(entries: Any) -> Any:
     """Return the sum of entries times variables, in the space of all of them."""
     import ppl
 
-    return sum((int(entry) * ppl.Variable(i) for i, entry in enumerate(entries)), start=ppl.Linear_Expression(0))
+    return sum(
+        (int(entry) * ppl.Variable(i) for i, entry in enumerate(entries)),
+        start=ppl.Linear_Expression(0),
+    )
 
 
 def need_equal(found: Polytope, expected: Any, label: str) -> None:
-    """Compare a set with a polyhedron: exactly if it is unbounded, else its vertices to rounding."""
+    """Compare a set with a polyhedron: exactly if it is unbounded, else its vertices to
+    rounding.
+    """
     import ppl
 
     assert found.is_empty == expected.is_empty(), label
@@ -297,7 +331,10 @@ def need_equal(found: Polytope, expected: Any, label: str) -> None:
     assert found.dimension == expected.affine_dimension(), label
     if found.exact is None:
         points = [g for g in expected.minimized_generators() if g.is_point()]
-        exact = [[int(g.coefficient(ppl.Variable(i))) / int(g.divisor()) for i in range(found.space)] for g in points]
+        exact = [
+            [int(g.coefficient(ppl.Variable(i))) / int(g.divisor()) for i in range(found.space)]
+            for g in points
+        ]
         near = Polytope.from_vertices(exact)
         size = max(1.0, float(np.abs(exact).max()))
         assert len(found.vertices) == len(exact), label
@@ -309,7 +346,9 @@ def need_equal(found: Polytope, expected: Any, label: str) -> None:
 
 
 def both_representations(one: Polyhedron) -> list[Any]:
-    """Return the polyhedra of PPL of the half-spaces of a set, and of its points, directions and lines."""
+    """Return the polyhedra of PPL of the half-spaces of a set, and of its points, directions and
+    lines.
+    """
     import ppl
 
     sides = ppl.C_Polyhedron(one.space, "universe")
@@ -329,12 +368,16 @@ def both_representations(one: Polyhedron) -> list[Any]:
 
 
 def is_exact(one: Polytope, expected: Any) -> bool:
-    """Whether a set is stored without rounding; vertices or facets of a bounded one may not be floats."""
+    """Whether a set is stored without rounding; vertices or facets of a bounded one may not be
+    floats.
+    """
     return one.is_empty or both_representations(one._polyhedron) == [expected, expected]
 
 
 def mapped(given: Any, matrix: Floats, offset: Floats) -> Any:
-    """Return the image of a polyhedron: {y: y = matrix x + offset for an x of it}, by projection."""
+    """Return the image of a polyhedron: {y: y = matrix x + offset for an x of it}, by
+    projection.
+    """
     import ppl
 
     m = len(matrix)
@@ -378,12 +421,14 @@ def difference(one: Any, other: Any) -> Any:
     for row in one.minimized_constraints():
         normal = [int(row.coefficient(ppl.Variable(i))) for i in range(space)]
         for sign in (1, -1) if row.is_equality() else (1,):
-            # sign (normal . x + b) >= 0 must hold at x + y: the least value of sign normal . y counts.
+            # sign (normal . x + b) >= 0 must hold at x + y: the least value of sign normal . y
+            # counts.
             terms = linear([sign * entry for entry in normal])
             least = other.minimize(terms)
             if not least["bounded"]:
                 return ppl.C_Polyhedron(space, "empty")
-            low, divisor = int(least["inf_n"]), int(least["inf_d"])
+            low = int(least["inf_n"])
+            divisor = int(least["inf_d"])
             limit = sign * int(row.inhomogeneous_term())
             result.add_constraint(divisor * terms + divisor * limit + low >= 0)
     return result
@@ -392,7 +437,9 @@ def difference(one: Any, other: Any) -> Any:
 @needs_ppl
 @pytest.mark.parametrize("count", [30, pytest.param(1000, marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("space", [2, 3])
-def test_operations_on_pairs_with_directions_and_lines_equal_exact_ones(space: int, count: int) -> None:
+def test_operations_on_pairs_with_directions_and_lines_equal_exact_ones(
+    space: int, count: int
+) -> None:
     import ppl
 
     unbounded = compared = seed = 0
@@ -414,7 +461,9 @@ def test_operations_on_pairs_with_directions_and_lines_equal_exact_ones(space: i
         common = ppl.C_Polyhedron(first)
         common.intersection_assign(second)
         need_equal(one & two, common, f"intersection {seed}")
-        need_equal(one.preimage(back, back_offset), source_of(first, back, back_offset), f"preimage {seed}")
+        need_equal(
+            one.preimage(back, back_offset), source_of(first, back, back_offset), f"preimage {seed}"
+        )
         if one.is_empty or two.is_empty:
             continue
         hull = ppl.C_Polyhedron(first)
