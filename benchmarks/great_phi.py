@@ -27,7 +27,7 @@ from infoset.engine.section_law import section_laws
 from infoset.experiments.interception.scenario_file import load_scenario
 from infoset.guidance import make_strategy
 from infoset.sim import Results, Scenario
-from infoset.sim.adversary import Objective, _Search
+from infoset.sim.adversary import Objective, _AdversarySearch
 from infoset.sim.engagement import Engagements, Step
 from infoset.sim.gravity import on_board_model
 from infoset.sim.scenario import of_model
@@ -37,7 +37,7 @@ LABELS = 200
 SHOWN = 6
 
 
-class PhiSearch(_Search):
+class PhiSearch(_AdversarySearch):
     """The search of `infoset adversary` with Phi in place of the miss."""
 
     guarantee = True

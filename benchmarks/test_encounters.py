@@ -18,9 +18,9 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from infoset.experiments.common.input_file import load_problem
 from infoset.rendezvous.multipoint import (
     Nodes,
-    Target,
     TimeLimits,
     Tour,
+    TourTarget,
     best_order,
     best_times,
     solve_segments,
@@ -145,7 +145,7 @@ def test_order_and_times_of_many(count: int, most_s: float, under: Check) -> Non
     random = np.random.default_rng(1)
     states = random.normal(size=(count, 6)) * np.array([300.0, 3000.0, 300.0, 0.3, 0.3, 0.3])
     states[:, 4] = -2.0 * rate_rad_s * states[:, 0]
-    targets = tuple(Target(str(number)) for number in range(count))
+    targets = tuple(TourTarget(str(number)) for number in range(count))
     tour = Tour(ClohessyWiltshire(rate_rad_s), targets, states, np.zeros(6))
     two_revolutions = TimeLimits(4.0 * np.pi / rate_rad_s)
     best_order(tour, TimeLimits(1.0 / rate_rad_s))

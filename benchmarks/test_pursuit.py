@@ -18,7 +18,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 from infoset.experiments.common.input_file import load_problem
-from infoset.rendezvous.pursuit_evasion import Game, Solution, solve
+from infoset.rendezvous.pursuit_evasion import CaptureSolution, Game, solve
 from infoset.rendezvous.pursuit_evasion.game import scaled_craft, units_of
 
 Floats = NDArray[np.float64]
@@ -35,7 +35,7 @@ def game() -> Game:
 
 
 @pytest.fixture(scope="module")
-def solved(game: Game) -> Solution:
+def solved(game: Game) -> CaptureSolution:
     return solve(game)
 
 
@@ -77,7 +77,7 @@ def rates(t: float, y: Floats, thrust: float, mass: float, flow: float) -> Float
     return out
 
 
-def test_compared_with_scipy(game: Game, solved: Solution, at_least: Check) -> None:
+def test_compared_with_scipy(game: Game, solved: CaptureSolution, at_least: Check) -> None:
     """Compare with `solve_ivp` (DOP853) and `fsolve` on 13 unknowns, from a guess with a relative
     error of 1e-4.
 

@@ -28,7 +28,7 @@ from infoset.rendezvous.reachability import (
     motion_of,
     solve,
 )
-from infoset.rendezvous.reachability.problem import Block
+from infoset.rendezvous.reachability.problem import StateBlock
 from infoset.rendezvous.relative_motion import EllipticOrbit
 from tests.rendezvous.reachability.rationals import rational_sets
 
@@ -93,12 +93,12 @@ def test_both_routes_end_in_time(under: Check, periods: int) -> None:
     under(f"T = {periods}: {solution.route.value} ({solution.reason[:60]})", taken, 7.0, "s")
 
 
-def own_step(block: Block, vertices: Floats, period: int) -> Floats:
+def own_step(block: StateBlock, vertices: Floats, period: int) -> Floats:
     hull = Polytope.from_vertices(_moved(block, vertices, period))
     return hull.cut(block.normals, upper=block.offsets[period + 1]).vertices
 
 
-def cdd_step(block: Block, vertices: Floats, period: int) -> Floats:
+def cdd_step(block: StateBlock, vertices: Floats, period: int) -> Floats:
     """Compute a forward set with the package `cdd`: generators, half-spaces, then generators of the
     intersection.
     """
@@ -115,7 +115,7 @@ def cdd_step(block: Block, vertices: Floats, period: int) -> Floats:
     return np.asarray(cut_generators[cut_generators[:, 0] == 1.0, 1:])
 
 
-def polytope_step(block: Block, vertices: Floats, period: int) -> Floats:
+def polytope_step(block: StateBlock, vertices: Floats, period: int) -> Floats:
     """Compute a forward set with the package `polytope`: its quickhull and its vertex
     enumeration.
     """
@@ -128,7 +128,7 @@ def polytope_step(block: Block, vertices: Floats, period: int) -> Floats:
     return np.asarray(extreme)
 
 
-def _moved(block: Block, vertices: Floats, period: int) -> Floats:
+def _moved(block: StateBlock, vertices: Floats, period: int) -> Floats:
     corners = Polytope.from_box(
         -np.ones(len(block.controls)), np.ones(len(block.controls))
     ).vertices
@@ -158,7 +158,7 @@ def essential(vertices: Floats) -> int:
     return len(kept)
 
 
-STEPS: dict[str, tuple[str, Callable[[Block, Floats, int], Floats]]] = {
+STEPS: dict[str, tuple[str, Callable[[StateBlock, Floats, int], Floats]]] = {
     "infoset": ("rendezvous", own_step),
     "pycddlib-standalone, floats": ("cdd", cdd_step),
     "polytope": ("polytope", polytope_step),

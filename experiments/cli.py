@@ -14,7 +14,7 @@ from typing import Annotated, Any, get_type_hints
 
 import typer
 
-from infoset.experiments.campaigns.command import Campaign, Report, Sweep
+from infoset.experiments.campaigns.command import CampaignOptions, ReportOptions, Sweep
 from infoset.experiments.common.errors import InputError, on_a_screen
 from infoset.experiments.file_commands import problems, scenarios
 from infoset.experiments.interception.command import (
@@ -119,7 +119,10 @@ _add(
     example="flight-random.npz flight-game.npz --html flights.html",
 )
 _add(
-    "campaign", Campaign, "campaigns.run_campaign", example="--noise mixed --runs 100000 --out runs"
+    "campaign",
+    CampaignOptions,
+    "campaigns.run_campaign",
+    example="--noise mixed --runs 100000 --out runs",
 )
 _add(
     "sweep",
@@ -130,7 +133,7 @@ _add(
         "--runs 100 --until decided --out sensors"
     ),
 )
-_add("report", Report, "campaigns.run_report", example="runs --out figures")
+_add("report", ReportOptions, "campaigns.run_report", example="runs --out figures")
 _add(
     "pursuit",
     Pursuit,

@@ -14,11 +14,11 @@ from rich.text import Text
 
 from infoset.experiments.common.output import output_of, to_json
 from infoset.experiments.common.printed_numbers import (
-    Comparison,
+    NumberComparison,
+    NumberVerdict,
     Paper,
     PrintedNumber,
     Progress,
-    Verdict,
     read_paper,
 )
 from infoset.experiments.common.screen import Part, progress_bar, show
@@ -36,7 +36,7 @@ DISAGREED = 1
 """Exit code if a number that should agree does not."""
 
 
-def reproduce_paper(paper: Paper, progress: Progress) -> tuple[Comparison, ...]:
+def reproduce_paper(paper: Paper, progress: Progress) -> tuple[NumberComparison, ...]:
     """Compute and compare the numbers of a paper; `progress` receives the fraction done."""
     if paper.name not in COMMANDS:
         ours = import_module(f"infoset.experiments.{paper.name}.published").compute(progress)
@@ -69,7 +69,9 @@ def run(options: Reproduce) -> None:
         ]
         written.deliver("--json", to_json({"versions": versions(), "papers": summary}))
     show(_lines(papers, compared), options.quiet or written.stdout_taken)
-    wrong = [each for numbers in compared for each in numbers if each.verdict is Verdict.DISAGREED]
+    wrong = [
+        each for numbers in compared for each in numbers if each.verdict is NumberVerdict.DISAGREED
+    ]
     for each in wrong:
         number = each.number
         typer.echo(
@@ -80,11 +82,13 @@ def run(options: Reproduce) -> None:
         raise typer.Exit(DISAGREED)
 
 
-def _count(numbers: Sequence[Comparison]) -> dict[str, int]:
-    return {verdict.value: sum(each.verdict is verdict for each in numbers) for verdict in Verdict}
+def _count(numbers: Sequence[NumberComparison]) -> dict[str, int]:
+    return {
+        verdict.value: sum(each.verdict is verdict for each in numbers) for verdict in NumberVerdict
+    }
 
 
-def _summary(paper: Paper, numbers: Sequence[Comparison]) -> dict[str, object]:
+def _summary(paper: Paper, numbers: Sequence[NumberComparison]) -> dict[str, object]:
     return {
         "paper": paper.name,
         "title": paper.title,
@@ -107,7 +111,9 @@ def _summary(paper: Paper, numbers: Sequence[Comparison]) -> dict[str, object]:
     }
 
 
-def _lines(papers: Sequence[Paper], compared: Sequence[Sequence[Comparison]]) -> Iterator[Part]:
+def _lines(
+    papers: Sequence[Paper], compared: Sequence[Sequence[NumberComparison]]
+) -> Iterator[Part]:
     """Yield the numbers of each paper, with its notes and remarks, and the numbers of verdicts."""
     for paper, numbers in zip(papers, compared, strict=True):
         notes = list(dict.fromkeys(each.number.note for each in numbers if each.number.note))
@@ -123,7 +129,7 @@ def _lines(papers: Sequence[Paper], compared: Sequence[Sequence[Comparison]]) ->
         yield f"{paper.name}: {len(numbers)} numbers: {counts}"
 
 
-def _rows(numbers: Sequence[Comparison], notes: Sequence[str]) -> Iterator[str]:
+def _rows(numbers: Sequence[NumberComparison], notes: Sequence[str]) -> Iterator[str]:
     """Yield a line for each number, below its source."""
     rows = [_row(each, notes) for each in numbers]
     titles = ("", "published", "ours", "other model" if any(row[3] for row in rows) else "")
@@ -140,7 +146,7 @@ def _rows(numbers: Sequence[Comparison], notes: Sequence[str]) -> Iterator[str]:
         yield "  ".join(["", f"{row[0]:<{len(name)}}", *cells, row[4]])
 
 
-def _row(each: Comparison, notes: Sequence[str]) -> tuple[str, ...]:
+def _row(each: NumberComparison, notes: Sequence[str]) -> tuple[str, ...]:
     number = each.number
     ours = each.ours
     verdict = each.verdict.value

@@ -210,7 +210,9 @@ def find_worst(
     COUNT.need("budget", budget)
     COUNT.need("threads", threads)
     WHOLE.need("seed", seed)
-    search = _Search(*with_strategy(scenario, strategy), Objective(objective), seed, keep_set)
+    search = _AdversarySearch(
+        *with_strategy(scenario, strategy), Objective(objective), seed, keep_set
+    )
     with ThreadPoolExecutor(threads) as pool:
         try:
             search.run(budget, pool, progress)
@@ -220,7 +222,7 @@ def find_worst(
     return search.worst()
 
 
-class _Search:
+class _AdversarySearch:
     """A search in progress."""
 
     guarantee = False

@@ -20,7 +20,7 @@ from infoset.sim.stopping_rule import DIGITS, QUANTITIES, QuantileName
 
 CONFIDENCE = 0.95
 MAX_RUNS_NEEDED = 1_000_000
-"""Maximum number of runs that `Verdict.runs_needed` names."""
+"""Maximum number of runs that `RequirementVerdict.runs_needed` names."""
 _TAIL = 0.5 * (1.0 - CONFIDENCE)
 _CAUSES = "|".join(cause.value for cause in MissCause)
 _FORM = re.compile(
@@ -157,7 +157,7 @@ def parse_requirement(text: str) -> AnyRequirement:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class RequirementVerdict:
     """The decision of a sample about a requirement, with the estimate and its interval.
 
     Parameters
@@ -186,7 +186,7 @@ class Verdict:
     known: int
 
 
-def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Verdict:
+def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> RequirementVerdict:
     """Return whether a sample meets a requirement, with 95 % confidence.
 
     Parameters
@@ -255,7 +255,7 @@ def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Verd
     decided = np.flatnonzero(met | missed)
     if not decided.size:
         needed = runs_needed(int(holding[-1]), size, share)
-        return Verdict(Decision.UNDECIDED, size, value, lower, upper, needed, known)
+        return RequirementVerdict(Decision.UNDECIDED, size, value, lower, upper, needed, known)
     decision = Decision.MET if met[decided[0]] else Decision.NOT_MET
     # A decision at an earlier run stays valid, although the last interval may contain the bound
     # again.
@@ -263,7 +263,7 @@ def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Verd
         upper = requirement.bound if upper is None else min(upper, requirement.bound)
     else:
         lower = requirement.bound if lower is None else max(lower, requirement.bound)
-    return Verdict(decision, size, value, lower, upper, size, known)
+    return RequirementVerdict(decision, size, value, lower, upper, size, known)
 
 
 def _finite(value: float) -> float | None:
@@ -329,7 +329,7 @@ def p_values(runs: ArrayLike, count: ArrayLike, share: ArrayLike) -> tuple[Float
 
 def runs_needed(count: int, runs: int, share: float) -> int | None:
     """Return the approximate number of runs that decide a requirement with `watched=True`; see
-    `Verdict`.
+    `RequirementVerdict`.
 
     None is more than `MAX_RUNS_NEEDED`. If all runs satisfy the bound so far, it is the minimum
     number that can decide.

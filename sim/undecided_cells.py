@@ -22,7 +22,7 @@ would cost O(N^2).
 """
 
 
-class Sample:
+class CellSample:
     """Runs of one noise of a cell, by which a rule is decided.
 
     A quantile is checked after certain numbers of chunks, which depend neither on the workers nor
@@ -58,7 +58,7 @@ class _Cell:
     """
 
     chunks: list[range]
-    samples: dict[str, Sample]
+    samples: dict[str, CellSample]
     judged: int = 0
     waiting: dict[Sequence[int], Results] = field(default_factory=dict)
 
@@ -84,7 +84,7 @@ class UndecidedCells:
             chunks[cell].append(runs)
         noises = [kind.value for kind in folder.manifest.noise.kinds]
         self._cells = [
-            _Cell(each, {noise: Sample(rule, len(each)) for noise in noises}) for each in chunks
+            _Cell(each, {noise: CellSample(rule, len(each)) for noise in noises}) for each in chunks
         ]
         for cell in range(len(self._cells)):
             self._advance(cell)

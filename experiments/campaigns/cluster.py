@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from urllib.parse import urlsplit
 
-from infoset.experiments.campaigns.command import Flight
+from infoset.experiments.campaigns.command import FlightOptions
 from infoset.experiments.common.errors import InputError
 from infoset.sim.parallel import worker_processes
 
@@ -24,7 +24,7 @@ RUNS_OF_A_PROCESS = 1500
 
 @contextlib.contextmanager
 def workers_of(
-    options: Flight, runs: int, note: Callable[[str], None]
+    options: FlightOptions, runs: int, note: Callable[[str], None]
 ) -> Iterator[tuple[Executor | None, int | None]]:
     """Start the workers that the options choose for a number of runs; yield the arguments of
     `Campaign.run`.

@@ -44,7 +44,7 @@ Required = Annotated[
 
 
 @dataclass(frozen=True, kw_only=True)
-class Flight:
+class FlightOptions:
     """Options of a campaign and of a sweep."""
 
     scenario: ScenarioName = "asteroid-1997"
@@ -103,7 +103,7 @@ class Flight:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Campaign(Flight):
+class CampaignOptions(FlightOptions):
     """Simulate a campaign: thousands of runs, stored in a folder.
 
     The runs are stored in DIR in shards (files of many runs). A shard is written as soon as its
@@ -137,7 +137,7 @@ class Campaign(Flight):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sweep(Flight):
+class Sweep(FlightOptions):
     """Find the values of a scenario's keys that meet a requirement.
 
     For example, to find which sensor and which engine hit a body of a given size. Each combination
@@ -197,7 +197,7 @@ class Sweep(Flight):
 
 
 @dataclass(frozen=True)
-class Report(FileOptions):
+class ReportOptions(FileOptions):
     """Report on a stored campaign or sweep.
 
     The campaign or sweep may be incomplete. For a campaign: quantiles with 95 % confidence

@@ -9,7 +9,7 @@ from concurrent.futures import BrokenExecutor, CancelledError
 from functools import partial
 
 from infoset.experiments.campaigns.cluster import workers_of
-from infoset.experiments.campaigns.command import Flight
+from infoset.experiments.campaigns.command import FlightOptions
 from infoset.experiments.common.errors import InputError
 from infoset.experiments.common.output import need_writable
 from infoset.experiments.common.screen import NOT_FINITE, progress_bar, say, say_warnings
@@ -30,7 +30,7 @@ MAX_WARNINGS = 5
 """Maximum number of warnings shown for a sweep, whose cells have similar warnings."""
 
 
-def scenario_of(options: Flight) -> tuple[Scenario, list[str]]:
+def scenario_of(options: FlightOptions) -> tuple[Scenario, list[str]]:
     """Return the scenario that the options describe, with the campaign's noise, and lines about it
     for the screen.
     """
@@ -42,7 +42,7 @@ def scenario_of(options: Flight) -> tuple[Scenario, list[str]]:
     return (noise.applied_to(scenario) if isinstance(noise, CampaignNoise) else scenario), notes
 
 
-def noise_of(options: Flight) -> CampaignNoise | OwnNoise | None:
+def noise_of(options: FlightOptions) -> CampaignNoise | OwnNoise | None:
     """Return the noise of the options; None is that of the scenario."""
     if options.noise is None:
         return None
@@ -52,7 +52,7 @@ def noise_of(options: Flight) -> CampaignNoise | OwnNoise | None:
 
 
 def fly(
-    campaign: Campaign, options: Flight, notes: Sequence[str]
+    campaign: Campaign, options: FlightOptions, notes: Sequence[str]
 ) -> tuple[CampaignFolder, list[str], float]:
     """Simulate the engagements that the folder of a campaign does not contain yet, with messages on
     stderr.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from infoset.experiments.campaigns.command import Campaign as Options
+from infoset.experiments.campaigns.command import CampaignOptions
 from infoset.experiments.campaigns.flight import (
     RESUME_HINT,
     SCENARIO_FILE,
@@ -24,7 +24,7 @@ from infoset.sim import Campaign, StoppingRule
 SUMMARY = "summary.json"
 
 
-def run(options: Options) -> None:
+def run(options: CampaignOptions) -> None:
     """Simulate the campaign, write its summary and print the tables."""
     with campaign_errors(RESUME_HINT), output_of(options) as written:
         scenario, model_notes = scenario_of(options)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from infoset.experiments.campaigns.command import Report
+from infoset.experiments.campaigns.command import ReportOptions
 from infoset.experiments.campaigns.flight import SCENARIO_FILE, campaign_errors
 from infoset.experiments.campaigns.run_tables import (
     correlations,
@@ -43,7 +43,7 @@ from infoset.sim.results import ending
 from infoset.sim.storage import CampaignFolder
 
 
-def run(options: Report) -> None:
+def run(options: ReportOptions) -> None:
     """Read the folder, write the files and print the tables."""
     with campaign_errors():
         folder = _read(options)
@@ -64,7 +64,7 @@ def _figures(folder: CampaignFolder) -> Sequence[str]:
     return names if folder.manifest.scenario.is_spatial else names[:-1]
 
 
-def _read(options: Report) -> CampaignFolder:
+def _read(options: ReportOptions) -> CampaignFolder:
     path = options.folder
     if not path.is_dir():
         raise InputError(
@@ -82,7 +82,9 @@ def _read(options: Report) -> CampaignFolder:
     return folder
 
 
-def _report_sweep(folder: CampaignFolder, options: Report, written: Output) -> Iterator[Part]:
+def _report_sweep(
+    folder: CampaignFolder, options: ReportOptions, written: Output
+) -> Iterator[Part]:
     scenario = folder.manifest.scenario
     sized = bool(folder.runs(["hit"])["hit"].count())
     required = read_requirement(options.require or folder.manifest.require, has_size=sized)
@@ -102,7 +104,9 @@ def _report_sweep(folder: CampaignFolder, options: Report, written: Output) -> I
     return report.parts()
 
 
-def _report_campaign(folder: CampaignFolder, options: Report, written: Output) -> Iterator[Part]:
+def _report_campaign(
+    folder: CampaignFolder, options: ReportOptions, written: Output
+) -> Iterator[Part]:
     if options.require is not None:
         raise InputError(
             f"--require: is only for a sweep, and {folder.path} is a campaign; omit it"

@@ -70,7 +70,7 @@ class View:
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class PageCurve:
     """Values at the times of the page, SI; the other fields are those of a `Track`."""
 
     name: str
@@ -90,7 +90,7 @@ class Graph:
     caption: str
     title: str
     unit: Unit
-    curves: Sequence[Curve]
+    curves: Sequence[PageCurve]
     levels: Sequence[float] = ()
     band: Floats | None = None
     stairs: bool = False

@@ -21,7 +21,7 @@ from typing import Any
 Progress = Callable[[float], None]
 
 
-class Verdict(Enum):
+class NumberVerdict(Enum):
     """Result of the comparison of a printed number with ours."""
 
     AGREED = "agreed"
@@ -108,7 +108,7 @@ class Ours:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class NumberComparison:
     """A printed number and ours."""
 
     number: PrintedNumber
@@ -124,23 +124,27 @@ class Comparison:
         )
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> NumberVerdict:
         """Return the result of the comparison."""
         number = self.number
         ours = self.ours
         if not math.isfinite(ours.value):
-            return Verdict.DISAGREED
+            return NumberVerdict.DISAGREED
         if number.corrected is not None:
             value = ours.value if ours.other is None else ours.other
             is_right = _within(value, interval(number.corrected, number.tolerance, ours.beyond))
-            return Verdict.MISPRINT if is_right else Verdict.DISAGREED
+            return NumberVerdict.MISPRINT if is_right else NumberVerdict.DISAGREED
         low, high = self.band
         if _within(ours.value if ours.spread is None else number.value, self.band):
-            return Verdict.AGREED if ours.spread is None or high < 2.0 * low else Verdict.POSSIBLE
+            return (
+                NumberVerdict.AGREED
+                if ours.spread is None or high < 2.0 * low
+                else NumberVerdict.POSSIBLE
+            )
         if ours.other is not None and _within(ours.other, self.band):
-            return Verdict.EXPLAINED
+            return NumberVerdict.EXPLAINED
         known = _within(ours.value, interval(number.printed, number.unexplained))
-        return Verdict.NOT_EXPLAINED if known else Verdict.DISAGREED
+        return NumberVerdict.NOT_EXPLAINED if known else NumberVerdict.DISAGREED
 
 
 @dataclass(frozen=True)
@@ -155,10 +159,10 @@ class Paper:
     tables: Mapping[str, tuple[PrintedNumber, ...]]
     options: Mapping[str, Mapping[str, Any]]
 
-    def compare(self, ours: Mapping[str, Sequence[Ours | float]]) -> tuple[Comparison, ...]:
+    def compare(self, ours: Mapping[str, Sequence[Ours | float]]) -> tuple[NumberComparison, ...]:
         """Compare every number of the paper; ours are by source too, in the same order."""
         return tuple(
-            Comparison(number, value if isinstance(value, Ours) else Ours(float(value)))
+            NumberComparison(number, value if isinstance(value, Ours) else Ours(float(value)))
             for source, numbers in self.tables.items()
             for number, value in zip(numbers, ours[source], strict=True)
         )

@@ -45,7 +45,7 @@ REMEDY = "make a record with `infoset engage --record FILE.npz`"
 Arrays = dict[str, NDArray[Any]]
 
 
-class Member(NamedTuple):
+class ArrayMember(NamedTuple):
     """Declaration of an array: its shape and type, and whether values may be unknown."""
 
     shape: tuple[str | int, ...]
@@ -55,13 +55,13 @@ class Member(NamedTuple):
 
 _MEASURED = {f"measured_{kind.quantity}": kind for kind in SENSORS}
 _OF_STEPS = {
-    "time_s": Member(("steps",)),
-    "true_range_m": Member(("steps",)),
-    "truth_margin_m": Member(("steps",), nullable=True),
+    "time_s": ArrayMember(("steps",)),
+    "true_range_m": ArrayMember(("steps",)),
+    "truth_margin_m": ArrayMember(("steps",), nullable=True),
     **dict.fromkeys(
-        ("true_angle_rad", "true_rate_rad_s", "impulse_m_s"), Member(("steps", "axes"))
+        ("true_angle_rad", "true_rate_rad_s", "impulse_m_s"), ArrayMember(("steps", "axes"))
     ),
-    "predicted_miss_m": Member(("steps", "axes", 2), nullable=True),
+    "predicted_miss_m": ArrayMember(("steps", "axes", 2), nullable=True),
 }
 """Arrays of a record that are members as they are."""
 _RESULT = {
@@ -73,14 +73,14 @@ _RESULT = {
 _BY_AXIS = {"position_m": ("axes + 1",), "velocity_m_s": ("axes + 1",), "lateral_miss_m": ("axes",)}
 _OF_HEADER = ("scenario", "versions", "seed", "run", "strategy", "noise", "inconsistency")
 MEMBERS = {
-    "header": Member(("bytes",), "|u1"),
+    "header": ArrayMember(("bytes",), "|u1"),
     **_OF_STEPS,
     **{
-        name: Member(("steps", "axes") if kind.is_lateral else ("steps",), nullable=True)
+        name: ArrayMember(("steps", "axes") if kind.is_lateral else ("steps",), nullable=True)
         for name, kind in _MEASURED.items()
     },
     **{
-        name: Member((1, *_BY_AXIS.get(column.field, ())), nullable=column.nullable)
+        name: ArrayMember((1, *_BY_AXIS.get(column.field, ())), nullable=column.nullable)
         for name, column in _RESULT.items()
     },
 }

@@ -28,7 +28,7 @@ from infoset.experiments.common.figure_style import (
     subplots,
 )
 from infoset.experiments.common.units import length_unit
-from infoset.experiments.multipoint.report import Report
+from infoset.experiments.multipoint.report import MultipointReport
 
 _TRACK_POINTS = 241
 _MAX_NAMED = 12
@@ -49,14 +49,14 @@ _NODE: dict[str, Any] = {
 }
 
 
-def draw_all(report: Report) -> Iterator[Figure]:
+def draw_all(report: MultipointReport) -> Iterator[Figure]:
     """Draw the figures of a report, one after the other."""
     yield draw_path(report)
     yield draw_control(report)
 
 
 @style()
-def draw_path(report: Report) -> Figure:
+def draw_path(report: MultipointReport) -> Figure:
     """Draw the path and the motion of the targets, in two planes."""
     states = report.path.state(report.times)[:, :3]
     unit, per_m = length_unit(float(np.abs(states).max()))
@@ -98,12 +98,12 @@ def draw_path(report: Report) -> Figure:
     return figure
 
 
-def _centre(report: Report) -> str:
+def _centre(report: MultipointReport) -> str:
     parameter = getattr(report.problem.tour, "gravitational_parameter_m3_s2", 0.0)
     return "Sun" if abs(parameter / _SUN_M3_S2 - 1.0) < 0.01 else "centre of gravity"
 
 
-def _mark_visits(panel: Axes, report: Report, visits: Floats) -> None:
+def _mark_visits(panel: Axes, report: MultipointReport, visits: Floats) -> None:
     """Mark the visits, shape (n, 2), with their names."""
     for name, visit, rendezvous in zip(
         report.names, visits, report.path.nodes.rendezvous, strict=True
@@ -124,7 +124,7 @@ def _mark_visits(panel: Axes, report: Report, visits: Floats) -> None:
 
 
 @style()
-def draw_control(report: Report) -> Figure:
+def draw_control(report: MultipointReport) -> Figure:
     """Draw the components and the magnitude of the control against time, with the bound if there is
     one.
     """
@@ -142,7 +142,7 @@ def draw_control(report: Report) -> Figure:
     return figure
 
 
-def _over_time(report: Report) -> tuple[Figure, list[Axes]]:
+def _over_time(report: MultipointReport) -> tuple[Figure, list[Axes]]:
     """Return a figure of two panels over time, with the visits and the stays marked, and named
     above the first one.
     """
@@ -164,7 +164,7 @@ def _over_time(report: Report) -> tuple[Figure, list[Axes]]:
     return figure, [*grid.flat]
 
 
-def _line(panel: Axes, report: Report, values: Floats, **look: Any) -> None:
+def _line(panel: Axes, report: MultipointReport, values: Floats, **look: Any) -> None:
     """Draw a line with breaks where the chaser arrives at a target or leaves it."""
     _, per_s = report.time_unit
     arrive = report.path.nodes.arrive_s[:-1]

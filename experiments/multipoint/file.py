@@ -12,7 +12,7 @@ from pydantic import Field
 from infoset.arrays import Floats
 from infoset.experiments.common.orbit_checks import check_angle, check_flight, check_rate
 from infoset.limits import NUMBER, Description, Name, NotNegative, Number, Part, Positive
-from infoset.rendezvous.multipoint import KeplerTour, Meet, Target, TimeLimits, Tour
+from infoset.rendezvous.multipoint import KeplerTour, Meet, TimeLimits, Tour, TourTarget
 from infoset.rendezvous.relative_motion import (
     ClohessyWiltshire,
     EllipticOrbit,
@@ -162,7 +162,7 @@ class MultipointProblem:
     def tour(self) -> Tour | KeplerTour:
         """The visits that are solved."""
         mu = self.gravitational_parameter_m3_s2
-        targets = tuple(Target(each.name, each.meet, each.dwell_s) for each in self.target)
+        targets = tuple(TourTarget(each.name, each.meet, each.dwell_s) for each in self.target)
         states = np.array([each.state(mu) for each in self.target])
         start = self.chaser.state(mu)
         if mu is not None:

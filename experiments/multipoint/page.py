@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from infoset.experiments.common.page_motion import Curve, Graph, Mark, Track, View, motion_page
+from infoset.experiments.common.page_motion import Graph, Mark, PageCurve, Track, View, motion_page
 from infoset.experiments.common.units import length_unit
-from infoset.experiments.multipoint.report import Report
+from infoset.experiments.multipoint.report import MultipointReport
 
 MOMENTS = 401
 
 
-def multipoint_page(report: Report) -> str:
+def multipoint_page(report: MultipointReport) -> str:
     """Return the page of a path that visits targets as HTML."""
     path = report.path
     nodes = report.path.nodes
@@ -54,12 +54,16 @@ def multipoint_page(report: Report) -> str:
     magnitude = np.linalg.norm(control, axis=1)
     control_unit = ("mm/s²", 1e3) if magnitude.max() < 1.0 else ("m/s²", 1.0)
     components = [
-        Curve(f"u along {title}", look, control[:, look]) for look, title in enumerate(axes)
+        PageCurve(f"u along {title}", look, control[:, look]) for look, title in enumerate(axes)
     ]
     levels = [] if bound_m_s2 is None else [bound_m_s2]
     graphs = [
         Graph(
-            "Magnitude of the control", "|u|", control_unit, [Curve("|u|", 0, magnitude)], levels
+            "Magnitude of the control",
+            "|u|",
+            control_unit,
+            [PageCurve("|u|", 0, magnitude)],
+            levels,
         ),
         Graph("Components of the control", "u", control_unit, components),
     ]

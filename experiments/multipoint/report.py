@@ -39,7 +39,7 @@ class ImposedBound:
 
 
 @dataclass(frozen=True, eq=False)
-class Report:
+class MultipointReport:
     """Results of one command; `peak_m_s2` is the largest control. Axes are Hill's or inertial.
 
     There is no `imposed` bound if the problem has none, or the minimum-energy control without it
@@ -184,7 +184,7 @@ class Report:
         return rate_rad_s * (time_s - problem.tour.start_s) / (2.0 * np.pi)
 
 
-def report_json(report: Report) -> dict[str, object]:
+def report_json(report: MultipointReport) -> dict[str, object]:
     """Return the results for `infoset.experiments.common.output.to_json`."""
     path = report.path
     return {
@@ -223,14 +223,14 @@ def _imposed_json(imposed: ImposedBound | None) -> dict[str, object] | None:
     }
 
 
-def _order_search_json(report: Report) -> dict[str, object] | None:
+def _order_search_json(report: MultipointReport) -> dict[str, object] | None:
     search = report.best.order_search
     if search is None:
         return None
     return {"grid": _grid_json(report, search.grid), "orders_searched_again": search.orders}
 
 
-def _time_search_json(report: Report) -> dict[str, object] | None:
+def _time_search_json(report: MultipointReport) -> dict[str, object] | None:
     search = report.best.time_search
     if search is None:
         return None
@@ -242,7 +242,7 @@ def _time_search_json(report: Report) -> dict[str, object] | None:
     }
 
 
-def _grid_json(report: Report, grid: Grid) -> dict[str, object]:
+def _grid_json(report: MultipointReport, grid: Grid) -> dict[str, object]:
     return {
         "times": grid.times,
         "until_s": grid.until_s,
@@ -250,7 +250,7 @@ def _grid_json(report: Report, grid: Grid) -> dict[str, object]:
     }
 
 
-def _node_json(report: Report, index: int) -> dict[str, object]:
+def _node_json(report: MultipointReport, index: int) -> dict[str, object]:
     nodes = report.path.nodes
     jump = report.path.jumps[index]
     state = report.path.arrival_states[index]
@@ -267,7 +267,7 @@ def _node_json(report: Report, index: int) -> dict[str, object]:
     }
 
 
-def trajectories(report: Report) -> str:
+def trajectories(report: MultipointReport) -> str:
     """Return the trajectories of the chaser and of the targets, as CSV; only the chaser has a
     control.
     """
@@ -282,7 +282,7 @@ def trajectories(report: Report) -> str:
     return trajectories_csv(["craft"], tracks)
 
 
-def report_lines(report: Report) -> Iterator[Part]:
+def report_lines(report: MultipointReport) -> Iterator[Part]:
     """Yield the cost, the visits and the extent of the search, for the screen."""
     path = report.path
     nodes = report.path.nodes

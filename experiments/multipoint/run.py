@@ -14,7 +14,7 @@ from infoset.experiments.multipoint.file import MultipointProblem
 from infoset.experiments.multipoint.page import multipoint_page
 from infoset.experiments.multipoint.report import (
     ImposedBound,
-    Report,
+    MultipointReport,
     report_json,
     report_lines,
     trajectories,
@@ -34,7 +34,9 @@ from infoset.rendezvous.multipoint.segments import LinearPath
 from infoset.rendezvous.piecewise import max_control
 
 
-def solve(problem: MultipointProblem, options: Multipoint, begin: BeginProgress) -> Report:
+def solve(
+    problem: MultipointProblem, options: Multipoint, begin: BeginProgress
+) -> MultipointReport:
     """Return the path of minimum energy, with the order and the times of the options."""
     times = options.times or ("best" if problem.optimise_times else "given")
     count = len(problem.target)
@@ -62,11 +64,11 @@ def solve(problem: MultipointProblem, options: Multipoint, begin: BeginProgress)
     best = _best(problem, options.order == "best", times == "best", begin("orders and times"))
     peak = max_control(best.path.control, best.path.breaks())
     if bound is None or peak <= bound:
-        return Report(problem, options.order, times, best, peak)
+        return MultipointReport(problem, options.order, times, best, peak)
 
     bounded, least = _within_bound(problem, best, peak, bound, times == "best")
     imposed = ImposedBound(bound, least, best.path.cost, peak)
-    return Report(
+    return MultipointReport(
         problem,
         options.order,
         times,

@@ -23,12 +23,12 @@ from infoset.experiments.common.figure_style import (
     style,
     subplots,
 )
-from infoset.experiments.observer.report import Report, bounds_of, times
+from infoset.experiments.observer.report import ObserverReport, bounds_of, times
 
 _MAX_OUTLINES = 60
 
 
-def draw_all(report: Report) -> Iterator[Figure | None]:
+def draw_all(report: ObserverReport) -> Iterator[Figure | None]:
     """Draw the figures of a report, one after the other; None for the sets of more than two
     states.
     """
@@ -37,7 +37,7 @@ def draw_all(report: Report) -> Iterator[Figure | None]:
 
 
 @style()
-def draw_bounds(report: Report) -> Figure:
+def draw_bounds(report: ObserverReport) -> Figure:
     """Draw the bounds of each state and their distance against time, with the true state of a
     simulation.
     """
@@ -96,7 +96,7 @@ def draw_bounds(report: Report) -> Figure:
 
 
 @style()
-def draw_sets(report: Report) -> Figure:
+def draw_sets(report: ObserverReport) -> Figure:
     """Draw the sets of two states, the first ones light and the last ones dark, at most 60 of
     them.
     """

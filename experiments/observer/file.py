@@ -36,7 +36,7 @@ Rows = tuple[Row, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
-class SystemTable:
+class ObserverTable:
     """[system]: x+ = A x + B u + c + w, y = C x + v, every `step_s`; `states` are names for
     figures.
     """
@@ -140,7 +140,7 @@ class ObserverProblem:
     kind: ClassVar[str] = "observer"
     name: Name = "observer"
     description: Description = ""
-    system: SystemTable
+    system: ObserverTable
     initial: SetTable
     disturbance: SetTable | None = None
     noise: NoiseTable

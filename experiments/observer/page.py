@@ -8,7 +8,7 @@ import numpy as np
 
 from infoset.arrays import Floats
 from infoset.experiments.common.page_document import page
-from infoset.experiments.observer.report import Report, shown_bounds, times
+from infoset.experiments.observer.report import ObserverReport, shown_bounds, times
 from infoset.observer.linear_observer import MAX_POLYTOPE_STATES, Estimate
 
 
@@ -21,7 +21,7 @@ def _centre(estimate: Estimate) -> Floats | None:
     return estimate.chebyshev_centre()
 
 
-def observer_page(report: Report) -> str:
+def observer_page(report: ObserverReport) -> str:
     """Return the page as HTML."""
     time, title = times(report)
     problem = report.problem

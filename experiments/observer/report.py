@@ -22,7 +22,7 @@ _ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Report:
+class ObserverReport:
     """Results of one command; `smoothed` are the sets that use later measurements too, if they are
     wanted.
     """
@@ -55,7 +55,7 @@ def contains(estimate: Estimate, state: Floats) -> bool:
     return bool(shape.contains(state))
 
 
-def report_json(report: Report) -> dict[str, object]:
+def report_json(report: ObserverReport) -> dict[str, object]:
     """Return the results for `infoset.experiments.common.output.to_json`."""
     where = report.inconsistency
     steps: list[dict[str, object]] = [
@@ -92,7 +92,7 @@ def _bounds(estimate: Estimate) -> dict[str, object]:
     }
 
 
-def report_csv(report: Report) -> str:
+def report_csv(report: ObserverReport) -> str:
     """Return the bounds of each step as CSV; those of an empty set are empty cells."""
     states = range(1, len(report.problem.names) + 1)
     sets = {
@@ -119,7 +119,7 @@ def report_csv(report: Report) -> str:
     return csv_text(["k", "empty", *columns], rows)
 
 
-def times(report: Report) -> tuple[Floats, str]:
+def times(report: ObserverReport) -> tuple[Floats, str]:
     """Return the times of the steps, and the title of their axis."""
     steps = np.array([estimate.step for estimate in report.estimates], dtype=float)
     step_s = report.problem.system.step_s
@@ -153,7 +153,7 @@ def _bounds_table(names: Sequence[str], estimates: Sequence[Estimate]) -> Table:
     return table
 
 
-def report_lines(report: Report) -> Iterator[Part]:
+def report_lines(report: ObserverReport) -> Iterator[Part]:
     """Yield the bounds of the last steps and a contradiction, for the screen."""
     problem = report.problem
     count = len(report.estimates)

@@ -9,10 +9,15 @@ from infoset.experiments.observer.command import Observe
 from infoset.experiments.observer.data import data_of, need_size
 from infoset.experiments.observer.file import ObserverProblem
 from infoset.experiments.observer.page import observer_page
-from infoset.experiments.observer.report import Report, report_csv, report_json, report_lines
+from infoset.experiments.observer.report import (
+    ObserverReport,
+    report_csv,
+    report_json,
+    report_lines,
+)
 
 
-def solve(problem: ObserverProblem, options: Observe, begin: BeginProgress) -> Report:
+def solve(problem: ObserverProblem, options: Observe, begin: BeginProgress) -> ObserverReport:
     """Return the set of each step."""
     data = data_of(problem, options)
     progress = begin("sets")
@@ -29,7 +34,7 @@ def solve(problem: ObserverProblem, options: Observe, begin: BeginProgress) -> R
         smoothed = observer.smooth(estimates, data.inputs) if options.smooth else None
     except (ArithmeticError, ValueError) as error:
         raise InputError(f"{problem.name}: step {observer.step}: {error}") from None
-    return Report(problem, data, estimates, smoothed, observer.inconsistency)
+    return ObserverReport(problem, data, estimates, smoothed, observer.inconsistency)
 
 
 COMMAND = ProblemCommand(

@@ -32,7 +32,7 @@ from infoset.experiments.common.figure_style import (
 )
 from infoset.experiments.common.hill_axes import AXIS_TITLES, component_titles
 from infoset.experiments.common.units import length_unit
-from infoset.experiments.pareto.report import CHOICES, Report
+from infoset.experiments.pareto.report import CHOICES, ParetoReport
 from infoset.rendezvous.bounded_control import BoundedFlight
 from infoset.rendezvous.pareto import (
     BoundedEncounter,
@@ -72,7 +72,7 @@ def _names(solution: EncounterSolution) -> list[str]:
     return [cost.craft.name for cost in solution.costs]
 
 
-def draw_all(report: Report) -> Iterator[Figure]:
+def draw_all(report: ParetoReport) -> Iterator[Figure]:
     """Draw the figures of a report, one after the other."""
     bounded = None if report.imposed is None else report.imposed.encounter
     yield draw_trajectories(report.solution, bounded)
@@ -118,7 +118,7 @@ def draw_trajectories(
 
 
 @style()
-def draw_controls(report: Report) -> Figure:
+def draw_controls(report: ParetoReport) -> Figure:
     """Draw the components and the magnitude of the controls against time, with the bound if there
     is one.
     """
@@ -146,7 +146,7 @@ def draw_controls(report: Report) -> Figure:
 
 
 @style()
-def draw_front(report: Report) -> Figure:
+def draw_front(report: ParetoReport) -> Figure:
     """Draw the Pareto set with the chosen meetings, the Pareto front, and costs against the
     duration.
     """
@@ -250,7 +250,7 @@ def _widest_pair(excess: Floats) -> tuple[int, int]:
     return min(pairs, key=lambda pair: float(correlation[pair]))
 
 
-def _draw_sweep(axes: Axes, report: Report) -> None:
+def _draw_sweep(axes: Axes, report: ParetoReport) -> None:
     times_s = [solution.encounter.meeting_s for solution in report.sweep]
     costs = np.array([solution.cost_squared() for solution in report.sweep])
     for index, name in enumerate(_names(report.solution)):

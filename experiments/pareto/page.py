@@ -10,14 +10,14 @@ from infoset.arrays import Floats
 from infoset.experiments.common.hill_axes import AXES, AXIS_TITLES
 from infoset.experiments.common.page_motion import Mark, Track, View, faces_of, motion_page
 from infoset.experiments.common.units import length_unit
-from infoset.experiments.pareto.report import CHOICES, Report, imposed_text
+from infoset.experiments.pareto.report import CHOICES, ParetoReport, imposed_text
 from infoset.rendezvous.pareto import EncounterSolution, pareto_set, simplex_weights
 
 MOMENTS = 121
 _SET_POINTS = 600
 
 
-def pareto_page(report: Report) -> str:
+def pareto_page(report: ParetoReport) -> str:
     """Return the page of an encounter as HTML."""
     solution = report.solution
     encounter = report.solution.encounter

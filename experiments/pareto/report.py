@@ -32,7 +32,7 @@ CHOICES = {
     "minimax_excess": "minimax excess",
     "preferred": "nearest to the preferred meeting",
 }
-"""Names in print of the rules of `Report.selections`."""
+"""Names in print of the rules of `ParetoReport.selections`."""
 _ZERO = 1e-9
 """Components of a meeting smaller than this part of the largest one are printed as zero."""
 
@@ -51,7 +51,7 @@ class ImposedBound:
 
 
 @dataclass(frozen=True, eq=False)
-class Report:
+class ParetoReport:
     """Results of one command.
 
     `solution`, `selections`, `coalitions` and `sweep` do not depend on a bound on the control; the
@@ -113,7 +113,7 @@ class Report:
         return tuple(total_impulse(flight) for flight in self.flights)
 
 
-def report_json(report: Report) -> dict[str, object]:
+def report_json(report: ParetoReport) -> dict[str, object]:
     """Return the results for `infoset.experiments.common.output.to_json`."""
     solution = report.solution
     encounter = report.problem.encounter
@@ -165,7 +165,7 @@ def _named_state(solution: EncounterSolution, point: Floats) -> dict[str, float]
     )
 
 
-def _craft_json(report: Report, index: int) -> dict[str, object]:
+def _craft_json(report: ParetoReport, index: int) -> dict[str, object]:
     solution = report.solution
     cost = solution.costs[index]
     return {
@@ -181,7 +181,7 @@ def _craft_json(report: Report, index: int) -> dict[str, object]:
     }
 
 
-def _imposed_json(report: Report) -> dict[str, object] | None:
+def _imposed_json(report: ParetoReport) -> dict[str, object] | None:
     imposed = report.imposed
     solution = report.solution
     if imposed is None:
@@ -215,7 +215,7 @@ def _coalitions_json(coalitions: Coalitions | None, names: list[str]) -> dict[st
     }
 
 
-def trajectories(report: Report) -> str:
+def trajectories(report: ParetoReport) -> str:
     """Return the trajectories as CSV."""
     tracks = [
         ([cost.craft.name], [times, flight.state(times), flight.control(times)])
@@ -225,7 +225,7 @@ def trajectories(report: Report) -> str:
     return trajectories_csv(["craft"], tracks)
 
 
-def imposed_text(report: Report, imposed: ImposedBound) -> str:
+def imposed_text(report: ParetoReport, imposed: ImposedBound) -> str:
     """Return what the bound changes, and which results do not depend on it."""
     peak = max(imposed.peaks_without_m_s2)
     bound = imposed.encounter.max_m_s2
@@ -237,7 +237,7 @@ def imposed_text(report: Report, imposed: ImposedBound) -> str:
     )
 
 
-def report_lines(report: Report) -> Iterator[Part]:
+def report_lines(report: ParetoReport) -> Iterator[Part]:
     """Yield the meeting, the costs, the choices and the coalitions, for the screen."""
     solution = report.solution
     encounter = report.problem.encounter

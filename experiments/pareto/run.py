@@ -15,7 +15,7 @@ from infoset.experiments.pareto.file import TERMINAL, ParetoProblem
 from infoset.experiments.pareto.page import pareto_page
 from infoset.experiments.pareto.report import (
     ImposedBound,
-    Report,
+    ParetoReport,
     report_json,
     report_lines,
     trajectories,
@@ -41,7 +41,7 @@ number.
 """
 
 
-def solve(problem: ParetoProblem, options: Pareto, begin: BeginProgress) -> Report:
+def solve(problem: ParetoProblem, options: Pareto, begin: BeginProgress) -> ParetoReport:
     """Return the meetings, their costs, the coalitions and the costs of other durations."""
     preferred = None if options.prefer is None else _preferred(options.prefer, problem)
     encounter = problem.encounter
@@ -60,7 +60,7 @@ def solve(problem: ParetoProblem, options: Pareto, begin: BeginProgress) -> Repo
     progress(0.9)
     latest_s = max(craft.start_s for craft in encounter.craft)
     times_s = (latest_s + (encounter.meeting_s - latest_s) * np.linspace(*SWEEP)).tolist()
-    return Report(
+    return ParetoReport(
         problem,
         solution,
         selections,

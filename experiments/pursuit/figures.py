@@ -28,14 +28,14 @@ from infoset.experiments.common.figure_style import (
 )
 from infoset.experiments.common.hill_axes import AXIS_TITLES, INERTIAL_TITLES
 from infoset.experiments.common.units import M_PER_KM, length_unit, time_unit
-from infoset.experiments.pursuit.report import Report, thrust_angles
+from infoset.experiments.pursuit.report import PursuitReport, thrust_angles
 from infoset.rendezvous.pursuit_evasion import (
+    CaptureHistory,
+    CaptureSolution,
+    CertificateVerdict,
     Ended,
-    Flight,
-    History,
     PlayerHistory,
-    Solution,
-    Verdict,
+    PursuitFlight,
     history,
     orbital_axes,
 )
@@ -48,7 +48,7 @@ _STAR: dict[str, Any] = {"marker": "*", "markersize": 9.0, "color": IMPULSE, "li
 _ARROWS, _ARROW_LENGTH, _MIN_HEIGHT = 14, 0.17, 0.15
 
 
-def draw_all(report: Report) -> Iterator[Figure | None]:
+def draw_all(report: PursuitReport) -> Iterator[Figure | None]:
     """Draw the figures of a report, one after the other; None is a figure without results."""
     solution = report.solution
     feedback = report.feedback
@@ -60,7 +60,7 @@ def draw_all(report: Report) -> Iterator[Figure | None]:
 
 
 @style()
-def draw_orbits(sampled: History) -> Figure:
+def draw_orbits(sampled: CaptureHistory) -> Figure:
     """Draw both paths in space with arrows of thrust, and projected along the planet's axis."""
     size_m = float(np.abs(sampled.pursuer.position_m).max())
     unit, per_m = length_unit(size_m)
@@ -98,7 +98,7 @@ def draw_orbits(sampled: History) -> Figure:
 
 
 @style()
-def draw_relative(sampled: History) -> Figure:
+def draw_relative(sampled: CaptureHistory) -> Figure:
     """Draw the path of the pursuer in Hill's axes at the evader, and the distance."""
     evader = sampled.evader
     offset = sampled.pursuer.position_m - evader.position_m
@@ -122,7 +122,7 @@ def draw_relative(sampled: History) -> Figure:
 
 
 @style()
-def draw_control(sampled: History) -> Figure:
+def draw_control(sampled: CaptureHistory) -> Figure:
     """Draw the thrust directions in the orbital frame of each craft, and the switching
     functions.
     """
@@ -150,7 +150,7 @@ def draw_control(sampled: History) -> Figure:
 
 
 @style()
-def draw_distance(solution: Solution) -> Figure:
+def draw_distance(solution: CaptureSolution) -> Figure:
     """Draw the distance that the evader can keep against the duration, and the curvature that
     certifies it.
 
@@ -169,7 +169,7 @@ def draw_distance(solution: Solution) -> Figure:
         axes.plot(time, values, marker="o", markersize=2.2, color=TRUTH)
         axes.set_xlabel(f"duration $T$, {unit}")
     panels[0].axhline(radius, label="capture radius", **BOUND)
-    if solution.verdict is Verdict.CAPTURED:
+    if solution.verdict is CertificateVerdict.CAPTURED:
         panels[0].plot(time[-1], radius, zorder=5, clip_on=False, label="capture", **_STAR)
     panels[0].set_ylabel("distance $l(T)$ at the end, km")
     panels[1].set_ylabel("min. curvature of $h_P - h_E + l$")
@@ -181,7 +181,7 @@ def draw_distance(solution: Solution) -> Figure:
 
 
 @style()
-def draw_feedback(solution: Solution, flights: Sequence[Flight]) -> Figure:
+def draw_feedback(solution: CaptureSolution, flights: Sequence[PursuitFlight]) -> Figure:
     """Draw the capture times that the plans predict, and the distance, or the capture times of
     several simulations.
     """

@@ -25,7 +25,7 @@ class State:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Craft:
+class PursuitCraftTable:
     """A craft that starts on an `orbit` or in a `state`; `mass_kg` includes the propellant."""
 
     mass_kg: Positive
@@ -71,8 +71,8 @@ class PursuitProblem:
     capture_radius_m: NotNegative = 0.0
     longest_s: Positive | None = None
     gravity: Gravity
-    pursuer: Craft
-    evader: Craft
+    pursuer: PursuitCraftTable
+    evader: PursuitCraftTable
 
     def __post_init__(self) -> None:
         with np.errstate(all="ignore"):  # numbers that overflow are no orbit

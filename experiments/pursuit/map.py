@@ -18,7 +18,7 @@ from infoset.experiments.common.screen import BeginProgress
 from infoset.experiments.common.units import M_PER_KM, S_PER_HOUR
 from infoset.experiments.pursuit.command import PursuitMap
 from infoset.experiments.pursuit.file import PursuitProblem
-from infoset.rendezvous.pursuit_evasion import Game, Verdict, solve
+from infoset.rendezvous.pursuit_evasion import CertificateVerdict, Game, solve
 from infoset.rendezvous.two_body import OrbitalElements
 from infoset.sim.columns import csv_text
 
@@ -34,7 +34,7 @@ NO_GAME = "no-game"
 
 
 @dataclass(frozen=True)
-class Axis:
+class MapAxis:
     """A parameter of the map and its values, in the unit of its name."""
 
     parameter: str
@@ -48,8 +48,8 @@ class MapReport:
     """
 
     problem: PursuitProblem
-    x: Axis
-    y: Axis
+    x: MapAxis
+    y: MapAxis
     verdict: NDArray[np.str_]
     capture_s: Masked
     closing_speed_m_s: Masked
@@ -102,7 +102,7 @@ def _solved(
     except (InputError, ValueError):
         return NO_GAME, math.nan, math.nan
     solution = solve(game, change_branch=change_branch)
-    if solution.capture is None or solution.verdict is not Verdict.CAPTURED:
+    if solution.capture is None or solution.verdict is not CertificateVerdict.CAPTURED:
         return solution.verdict.value, math.nan, math.nan
     return solution.verdict.value, solution.capture.time_s, solution.capture.closing_speed_m_s
 
@@ -131,7 +131,7 @@ def _true_longitude_rad(orbit: OrbitalElements) -> float:
     return orbit.raan_rad + orbit.argument_of_perigee_rad + orbit.true_anomaly_rad
 
 
-def read_axis(option: str, text: str) -> Axis:
+def read_axis(option: str, text: str) -> MapAxis:
     """Read KEY=FROM:TO:N; raise `InputError` if it has another form, an unknown parameter, or a
     value out of range.
     """
@@ -156,7 +156,7 @@ def read_axis(option: str, text: str) -> Axis:
             f"{option}: must be KEY=FROM:TO:N with FROM less than TO and at least 2 values, found "
             f"{shown(text)}; for example {option} thrust_ratio=0:0.8:17"
         )
-    return Axis(key, np.linspace(low, high, count))
+    return MapAxis(key, np.linspace(low, high, count))
 
 
 def report_json(report: MapReport) -> dict[str, object]:

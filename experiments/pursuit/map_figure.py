@@ -11,13 +11,13 @@ from matplotlib.figure import Figure
 from infoset.experiments.common.figure_style import HALO, INK, legend_below, style, subplots
 from infoset.experiments.common.units import S_PER_HOUR, split_unit
 from infoset.experiments.pursuit.map import NO_GAME, MapReport
-from infoset.rendezvous.pursuit_evasion import Verdict
+from infoset.rendezvous.pursuit_evasion import CertificateVerdict
 
 _LEVELS = 8
 _COLOURS = {
-    Verdict.BRANCH_NOT_CERTIFIED.value: "#f4c28f",
-    Verdict.ESCAPES.value: "#dedede",
-    Verdict.PROPELLANT_EXHAUSTED.value: "#a8a8a8",
+    CertificateVerdict.BRANCH_NOT_CERTIFIED.value: "#f4c28f",
+    CertificateVerdict.ESCAPES.value: "#dedede",
+    CertificateVerdict.PROPELLANT_EXHAUSTED.value: "#a8a8a8",
     NO_GAME: "#ffffff",
 }
 """Of the points without a capture."""

@@ -6,16 +6,21 @@ import numpy as np
 
 from infoset.experiments.common.errors import InputError
 from infoset.experiments.common.hill_axes import AXES, AXIS_TITLES, INERTIAL_TITLES
-from infoset.experiments.common.page_motion import Curve, Graph, Mark, Track, View, motion_page
+from infoset.experiments.common.page_motion import Graph, Mark, PageCurve, Track, View, motion_page
 from infoset.experiments.common.units import length_unit
-from infoset.experiments.pursuit.report import INERTIAL_AXES, Report, saddle_point, thrust_angles
+from infoset.experiments.pursuit.report import (
+    INERTIAL_AXES,
+    PursuitReport,
+    saddle_point,
+    thrust_angles,
+)
 from infoset.rendezvous.pursuit_evasion import history, orbital_axes
 
 MOMENTS = 301
 _DEGREES = ("deg", 180.0 / np.pi)
 
 
-def pursuit_page(report: Report) -> str:
+def pursuit_page(report: PursuitReport) -> str:
     """Return the page of a game as HTML, with what its certificate claims.
 
     Raise `InputError` if the solution has no capture.
@@ -62,7 +67,7 @@ def pursuit_page(report: Report) -> str:
             plane=(0, 1),
         ),
     ]
-    distance = Curve("distance", 0, np.linalg.norm(offset, axis=1))
+    distance = PageCurve("distance", 0, np.linalg.norm(offset, axis=1))
     radius = solution.game.capture_radius_m
     directions = [
         (player, look, thrust_angles(motion))
@@ -70,10 +75,10 @@ def pursuit_page(report: Report) -> str:
         if motion.thrust_direction.any()
     ]
     in_plane, out_of_plane = (
-        [Curve(player, look, angles[:, component]) for player, look, angles in directions]
+        [PageCurve(player, look, angles[:, component]) for player, look, angles in directions]
         for component in (0, 1)
     )
-    masses = [Curve(player, look, motion.mass_kg) for player, look, motion in players]
+    masses = [PageCurve(player, look, motion.mass_kg) for player, look, motion in players]
     graphs = [
         Graph("Distance between pursuer and evader", "distance", near, [distance], [radius]),
         Graph(

@@ -14,13 +14,13 @@ from infoset.experiments.common.units import M_PER_KM, S_PER_HOUR
 from infoset.experiments.pursuit.file import PursuitProblem
 from infoset.rendezvous.pursuit_evasion import (
     Capture,
+    CaptureSolution,
     Certificate,
+    CertificateVerdict,
     Ended,
-    Flight,
     Observation,
     PlayerHistory,
-    Solution,
-    Verdict,
+    PursuitFlight,
     history,
     orbital_axes,
 )
@@ -36,20 +36,20 @@ class Feedback:
     replan_s: float
     observation: Observation
     seed: int
-    flights: tuple[Flight, ...]
+    flights: tuple[PursuitFlight, ...]
 
 
 @dataclass(frozen=True)
-class Report:
+class PursuitReport:
     """Results of one command; the certificate is None without a capture."""
 
     problem: PursuitProblem
-    solution: Solution
+    solution: CaptureSolution
     certificate: Certificate | None
     feedback: Feedback | None
 
 
-def report_json(report: Report) -> dict[str, object]:
+def report_json(report: PursuitReport) -> dict[str, object]:
     """Return the results for `to_json`; keys are the names of the solution's fields."""
     solution = report.solution
     capture = report.solution.capture
@@ -76,7 +76,7 @@ def report_json(report: Report) -> dict[str, object]:
     }
 
 
-def _flights_json(flights: Sequence[Flight]) -> list[dict[str, object]]:
+def _flights_json(flights: Sequence[PursuitFlight]) -> list[dict[str, object]]:
     return [
         {
             "ended": flight.ended,
@@ -88,7 +88,7 @@ def _flights_json(flights: Sequence[Flight]) -> list[dict[str, object]]:
     ]
 
 
-def trajectories(report: Report) -> str:
+def trajectories(report: PursuitReport) -> str:
     """Return both trajectories as CSV, no line without a capture; without thrust the direction of
     thrust is zero.
     """
@@ -115,7 +115,7 @@ def thrust_angles(player: PlayerHistory) -> Floats:
     )
 
 
-def report_lines(report: Report) -> Iterator[Part]:
+def report_lines(report: PursuitReport) -> Iterator[Part]:
     """Yield the verdict, the players, the certificate and the simulations, for the screen."""
     solution = report.solution
     yield f"{report.problem.name}: {_verdict(solution)}"
@@ -128,7 +128,7 @@ def report_lines(report: Report) -> Iterator[Part]:
         yield from _feedback_lines(report.feedback)
 
 
-def _capture_lines(capture: Capture, solution: Solution) -> Iterator[Part]:
+def _capture_lines(capture: Capture, solution: CaptureSolution) -> Iterator[Part]:
     """Yield vectors as columns of their components, which a narrow screen does not break, and the
     scalars as lines.
     """
@@ -163,23 +163,23 @@ def _capture_lines(capture: Capture, solution: Solution) -> Iterator[Part]:
     yield f"changes to a branch that keeps the evader farther away: {solution.branch_changes}"
 
 
-def _verdict(solution: Solution) -> str:
+def _verdict(solution: CaptureSolution) -> str:
     until = (
         f"{solution.looked_at_s:.1f} s"
         if solution.looked_at_s >= 1.0
         else f"{solution.looked_at_s:.3g} s"
     )
-    if solution.capture is not None and solution.verdict is Verdict.CAPTURED:
+    if solution.capture is not None and solution.verdict is CertificateVerdict.CAPTURED:
         return (
             f"captured at {solution.capture.time_s:.6f} s "
             f"({solution.capture.time_s / S_PER_HOUR:.4f} h)"
         )
-    if solution.verdict is Verdict.PROPELLANT_EXHAUSTED:
+    if solution.verdict is CertificateVerdict.PROPELLANT_EXHAUSTED:
         return (
             f"propellant-exhausted: the {solution.exhausted} has no propellant after {until}; no "
             "capture before"
         )
-    if solution.verdict is Verdict.ESCAPES:
+    if solution.verdict is CertificateVerdict.ESCAPES:
         why = (
             f"the {solution.exhausted} has no propellant"
             if solution.exhausted

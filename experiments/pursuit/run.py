@@ -13,16 +13,16 @@ from infoset.experiments.pursuit.file import PursuitProblem
 from infoset.experiments.pursuit.page import pursuit_page
 from infoset.experiments.pursuit.report import (
     Feedback,
-    Report,
+    PursuitReport,
     report_json,
     report_lines,
     trajectories,
 )
 from infoset.rendezvous.pursuit_evasion import (
+    CaptureSolution,
     Observation,
     Policy,
     RandomSteering,
-    Solution,
     Steering,
     certify,
     fly,
@@ -36,7 +36,7 @@ REPLAN_S, MIN_PLANS, MAX_PLANS = 600.0, 50, 2000
 """Default time between plans, and the smallest and largest number of plans in a game by default."""
 
 
-def solve_pursuit(problem: PursuitProblem, options: Pursuit, begin: BeginProgress) -> Report:
+def solve_pursuit(problem: PursuitProblem, options: Pursuit, begin: BeginProgress) -> PursuitReport:
     """Return the solution of the game with its certificate, and the simulations with feedback."""
     changed = (options.delay_s, options.position_noise_m, options.velocity_noise_m_s)
     if options.feedback is None and (
@@ -60,11 +60,11 @@ def solve_pursuit(problem: PursuitProblem, options: Pursuit, begin: BeginProgres
     feedback = (
         None if options.feedback is None else _fly(solution, options, options.feedback, begin)
     )
-    return Report(problem, solution, certificate, feedback)
+    return PursuitReport(problem, solution, certificate, feedback)
 
 
 def _fly(
-    solution: Solution, options: Pursuit, policy: str, begin: BeginProgress
+    solution: CaptureSolution, options: Pursuit, policy: str, begin: BeginProgress
 ) -> Feedback | None:
     if solution.capture is None:
         say("no feedback: there is no capture, and so no plan to start from", options.quiet)

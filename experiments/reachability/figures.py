@@ -30,7 +30,7 @@ from infoset.experiments.common.figure_style import (
     subplots,
 )
 from infoset.experiments.common.hill_axes import AXIS_TITLES, component_titles
-from infoset.experiments.reachability.report import Member, Report
+from infoset.experiments.reachability.report import ChosenControl, ReachabilityReport
 from infoset.rendezvous.reachability import SetKind
 
 _TOLERANCE, _TOLERANCE_IN_SPACE = 2e-3, 1e-2
@@ -59,13 +59,13 @@ _AXES = (*AXIS_TITLES, *component_titles("v"))
 _PLANES = ((1, 0), (1, 2), (4, 3), (4, 5))
 
 
-def _shown(report: Report) -> list[tuple[dict[str, Any], Member, Floats]]:
+def _shown(report: ReachabilityReport) -> list[tuple[dict[str, Any], ChosenControl, Floats]]:
     """Return the line style, the member and the trajectory of each member drawn."""
     looks = [{**look, "linewidth": 1.0} for look in LINE_LOOKS]
     return [(look, *pair) for look, pair in zip(looks, report.shown, strict=False)]
 
 
-def _legend(figure: Figure, report: Report) -> None:
+def _legend(figure: Figure, report: ReachabilityReport) -> None:
     """Draw the legend, with the names of the members that are not drawn."""
     drawn = [member.name for _, member, _ in _shown(report)]
     hidden = [
@@ -95,7 +95,7 @@ def shown_times(periods: int, most: int = _MAX_TIMES) -> list[int]:
     return sorted({round(t) for t in np.linspace(1, periods - 1, most)})
 
 
-def draw_all(report: Report) -> Iterator[Figure]:
+def draw_all(report: ReachabilityReport) -> Iterator[Figure]:
     """Draw the figures of a report, one after the other."""
     for draw in (
         partial(draw_space, first=0),
@@ -107,7 +107,7 @@ def draw_all(report: Report) -> Iterator[Figure]:
 
 
 @style()
-def draw_space(report: Report, first: int) -> Figure:
+def draw_space(report: ReachabilityReport, first: int) -> Figure:
     """Draw three of the six states in space: positions (0) or velocities (3)."""
     figure = new_figure(145.0)
     axes: Any = figure.add_subplot(projection="3d", computed_zorder=False)
@@ -121,7 +121,7 @@ def draw_space(report: Report, first: int) -> Figure:
 
 
 @style()
-def draw_planes(report: Report) -> Figure:
+def draw_planes(report: ReachabilityReport) -> Figure:
     """Draw positions and velocities in two planes each."""
     figure, grid = subplots(175.0, 2, 2)
     for axes, plane in zip(grid.flat, _PLANES, strict=True):
@@ -132,7 +132,7 @@ def draw_planes(report: Report) -> Figure:
 
 
 def _draw_motion(
-    axes: Axes, report: Report, states: list[int], max_times: int, tolerance: float
+    axes: Axes, report: ReachabilityReport, states: list[int], max_times: int, tolerance: float
 ) -> None:
     """Draw two or three states of the six: the tube, light at first and dark at last, and the
     members.
@@ -193,7 +193,7 @@ def _draw_set(axes: Any, points: Floats, colour: Any, label: str) -> None:
 
 
 @style()
-def draw_controls(report: Report) -> Figure:
+def draw_controls(report: ReachabilityReport) -> Figure:
     """Draw the components of the controls over the periods, and the ranges of all optimal
     controls.
     """

@@ -7,16 +7,16 @@ import numpy as np
 from infoset.arrays import Floats
 from infoset.experiments.common.hill_axes import AXES, AXIS_TITLES
 from infoset.experiments.common.page_motion import (
-    Curve,
     Graph,
     Mark,
+    PageCurve,
     Sets,
     Track,
     View,
     faces_of,
     motion_page,
 )
-from infoset.experiments.reachability.report import POINTS, Report
+from infoset.experiments.reachability.report import POINTS, ReachabilityReport
 from infoset.rendezvous.reachability import SetKind
 
 _TOLERANCE = 1e-2
@@ -33,7 +33,7 @@ _VIEWS = (
 _VELOCITY_TITLES = ("vx (radial)", "vy (along-track)", "vz (normal)")
 
 
-def reachability_page(report: Report) -> str:
+def reachability_page(report: ReachabilityReport) -> str:
     """Return the page of a rendezvous as HTML."""
     rendezvous = report.rendezvous
     periods = rendezvous.problem.periods
@@ -54,7 +54,7 @@ def reachability_page(report: Report) -> str:
             f"u{axis}",
             ("m/s²", rendezvous.acceleration_m_s2),
             [
-                Curve(member.name, look, controls[look][:, j], look)
+                PageCurve(member.name, look, controls[look][:, j], look)
                 for look, member in enumerate(members)
             ],
             band=report.ranges[period_of, j],
@@ -76,7 +76,11 @@ def reachability_page(report: Report) -> str:
 
 
 def _view(
-    report: Report, time_s: Floats, caption: str, first: int, plane: tuple[int, int] | None
+    report: ReachabilityReport,
+    time_s: Floats,
+    caption: str,
+    first: int,
+    plane: tuple[int, int] | None,
 ) -> View:
     """Return a view of the three states from ``first`` on: positions (0) or velocities (3)."""
     periods = report.rendezvous.problem.periods

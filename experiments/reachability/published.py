@@ -18,7 +18,7 @@ from infoset.experiments.common.hill_axes import from_paper, to_paper
 from infoset.experiments.common.input_file import read_file
 from infoset.experiments.common.printed_numbers import Ours, PrintedNumber, Progress, read_paper
 from infoset.experiments.reachability.file import Rendezvous
-from infoset.experiments.reachability.report import Member
+from infoset.experiments.reachability.report import ChosenControl
 from infoset.experiments.reachability.run import fly_members
 from infoset.rendezvous.reachability import (
     NonlinearMotion,
@@ -107,7 +107,7 @@ def compute(progress: Progress) -> dict[str, Sequence[Ours]]:
     }
 
 
-def _numbers(member: Member, controls: Floats) -> list[float]:
+def _numbers(member: ChosenControl, controls: Floats) -> list[float]:
     """Return controls and the states of a member in the order of a table."""
     parts = (controls, member.linear[1:], member.nonlinear[1:])
     return [

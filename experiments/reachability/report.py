@@ -16,8 +16,8 @@ from infoset.experiments.common.screen import Part, number, number_table
 from infoset.experiments.common.units import Unit, length_unit
 from infoset.experiments.reachability.file import Rendezvous
 from infoset.rendezvous.reachability import (
+    ClosedLoopFlight,
     FeedbackPlan,
-    Flight,
     SetKind,
     Solution,
     ThrustShape,
@@ -32,7 +32,7 @@ _MAX_SHOWN, _ALIKE = 5, 1e-4
 
 
 @dataclass(frozen=True, eq=False)
-class Member:
+class ChosenControl:
     """An optimal control, and the states, shape (T + 1, 6), of the linear and of the nonlinear
     model.
 
@@ -68,7 +68,7 @@ class Robustness:
 
 
 @dataclass(frozen=True, eq=False)
-class Report:
+class ReachabilityReport:
     """Results of one command.
 
     `min_periods` is the minimum number of periods, up to `searched_periods`, in which the terminal
@@ -84,9 +84,9 @@ class Report:
     forward: Floats
     tube: Floats
     ranges: Floats
-    members: tuple[Member, ...]
-    flight: Flight | None
-    noisy: tuple[Flight, ...]
+    members: tuple[ChosenControl, ...]
+    flight: ClosedLoopFlight | None
+    noisy: tuple[ClosedLoopFlight, ...]
     robustness: Robustness | None
 
     @property
@@ -95,17 +95,17 @@ class Report:
         return length_unit(float(np.abs(self.tube[:, :3]).max()))
 
     @cached_property
-    def shown(self) -> tuple[tuple[Member, Floats], ...]:
+    def shown(self) -> tuple[tuple[ChosenControl, Floats], ...]:
         """Return the first few different members, each with its nonlinear trajectory, shape
         (points, 6).
         """
-        chosen: list[Member] = []
+        chosen: list[ChosenControl] = []
         for member in self.members:
             if all(np.abs(member.controls - other.controls).max() > _ALIKE for other in chosen):
                 chosen.append(member)
         return tuple((member, self._trajectory(member)) for member in chosen[:_MAX_SHOWN])
 
-    def _trajectory(self, member: Member) -> Floats:
+    def _trajectory(self, member: ChosenControl) -> Floats:
         rendezvous = self.rendezvous
         push = rendezvous.acceleration_m_s2 * member.controls[None]
         return np.asarray(
@@ -126,7 +126,7 @@ def delta_v(rendezvous: Rendezvous, controls: Floats) -> dict[str, float]:
     return {"sum": float(total), **dict(zip("xyz", axes.tolist(), strict=True))}
 
 
-def trajectories(report: Report) -> str:
+def trajectories(report: ReachabilityReport) -> str:
     """Return the trajectories of the selected controls on both models, as CSV; a control is held
     over its period.
     """
@@ -142,7 +142,7 @@ def trajectories(report: Report) -> str:
     return trajectories_csv(["control", "model"], tracks)
 
 
-def report_json(report: Report) -> dict[str, object]:
+def report_json(report: ReachabilityReport) -> dict[str, object]:
     """Return the results for `infoset.experiments.common.output.to_json`; key ``units`` has the
     units of the states.
     """
@@ -198,7 +198,7 @@ def solution_json(
     }
 
 
-def _member_json(rendezvous: Rendezvous, member: Member) -> dict[str, object]:
+def _member_json(rendezvous: Rendezvous, member: ChosenControl) -> dict[str, object]:
     return {
         **vars(member),
         "nonlinear_miss": member.nonlinear_miss,
@@ -207,7 +207,7 @@ def _member_json(rendezvous: Rendezvous, member: Member) -> dict[str, object]:
     }
 
 
-def _flight_json(rendezvous: Rendezvous, flight: Flight) -> dict[str, object]:
+def _flight_json(rendezvous: Rendezvous, flight: ClosedLoopFlight) -> dict[str, object]:
     return {
         **vars(flight),
         "miss": flight.miss,
@@ -223,7 +223,7 @@ def _robust_json(robustness: Robustness) -> dict[str, object]:
     return {**vars(robustness), "plan": shown}
 
 
-def report_lines(report: Report) -> Iterator[Part]:
+def report_lines(report: ReachabilityReport) -> Iterator[Part]:
     """Yield the minimum norm, the tube, the selected controls and the simulations in closed loop,
     for the screen.
     """
@@ -286,7 +286,7 @@ def solution_lines(solution: Solution) -> Iterator[str]:
     yield f"optimal controls: {f'a set of dimension {dimension}' if dimension else 'one'}"
 
 
-def _members_table(report: Report) -> Table:
+def _members_table(report: ReachabilityReport) -> Table:
     table = number_table(
         "control",
         "energy\nu^2",

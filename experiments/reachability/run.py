@@ -18,8 +18,8 @@ from infoset.experiments.reachability.command import Reach
 from infoset.experiments.reachability.file import Rendezvous
 from infoset.experiments.reachability.page import reachability_page
 from infoset.experiments.reachability.report import (
-    Member,
-    Report,
+    ChosenControl,
+    ReachabilityReport,
     Robustness,
     report_json,
     report_lines,
@@ -29,8 +29,8 @@ from infoset.experiments.reachability.selection import select_controls, selectio
 from infoset.experiments.reachability.system import COMMAND as SYSTEM_COMMAND
 from infoset.experiments.reachability.system_file import ReachableSystem
 from infoset.rendezvous.reachability import (
+    ClosedLoopFlight,
     EmptyTubeError,
-    Flight,
     NonlinearMotion,
     NoRobustPlanError,
     SetKind,
@@ -46,7 +46,9 @@ NOISY_FLIGHTS = 10
 """Number of simulations in closed loop with navigation errors."""
 
 
-def solve_rendezvous(rendezvous: Rendezvous, options: Reach, begin: BeginProgress) -> Report:
+def solve_rendezvous(
+    rendezvous: Rendezvous, options: Reach, begin: BeginProgress
+) -> ReachabilityReport:
     """Return the sets, the selected optimal controls with their trajectories, and the simulations
     in closed loop.
     """
@@ -74,7 +76,7 @@ def solve_rendezvous(rendezvous: Rendezvous, options: Reach, begin: BeginProgres
     effect = rendezvous.disturbance_effect
     robustness = None if effect is None else _robustness(rendezvous, effect)
     progress(1.0)
-    return Report(
+    return ReachabilityReport(
         rendezvous,
         solution,
         minimum,
@@ -94,7 +96,7 @@ def fly_members(
     names: Sequence[str],
     controls: Floats,
     truth: NonlinearMotion | None = None,
-) -> tuple[Member, ...]:
+) -> tuple[ChosenControl, ...]:
     """Simulate controls, shape (k, T, 3), on the linear and on the nonlinear model; `truth`
     replaces the latter.
     """
@@ -104,10 +106,10 @@ def fly_members(
     nonlinear = (truth or rendezvous.truth).fly(problem.initial, pushes, rendezvous.period_s)
     between = replace(problem, between=rendezvous.instants).excess(controls)
     rows = zip(names, controls, linear, nonlinear, between.tolist(), strict=True)
-    return tuple(Member(*row) for row in rows)
+    return tuple(ChosenControl(*row) for row in rows)
 
 
-def _fly(rendezvous: Rendezvous, generator: np.random.Generator | None) -> Flight:
+def _fly(rendezvous: Rendezvous, generator: np.random.Generator | None) -> ClosedLoopFlight:
     """Simulate in closed loop, with navigation errors if there is a generator."""
 
     def truth(period: int, state: Floats, control: Floats) -> Floats:

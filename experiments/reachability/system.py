@@ -23,7 +23,7 @@ _ZERO = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
-class Report:
+class SystemReport:
     """Results of one command: sets, shape (T + 1, n, 2), controls, (T, m), and their states, (T +
     1, n), by name.
     """
@@ -38,7 +38,7 @@ class Report:
     states: dict[str, Floats]
 
 
-def solve_system(system: ReachableSystem, options: Reach, begin: BeginProgress) -> Report:
+def solve_system(system: ReachableSystem, options: Reach, begin: BeginProgress) -> SystemReport:
     """Return the sets and the selected optimal controls with their motions."""
     if options.replan or options.html is not None:
         raise InputError(
@@ -58,12 +58,12 @@ def solve_system(system: ReachableSystem, options: Reach, begin: BeginProgress) 
     still = not np.ptp(path, axis=0).any()  # otherwise another number of periods has another target
     least = min_periods(problem) if still else None
     progress(1.0)
-    return Report(
+    return SystemReport(
         system, solution, least, forward, tube, solution.optimal.ranges(), controls, states
     )
 
 
-def report_json(report: Report) -> dict[str, object]:
+def report_json(report: SystemReport) -> dict[str, object]:
     """Return the results for `infoset.experiments.common.output.to_json`."""
     return {
         "states": report.system.names,
@@ -77,7 +77,7 @@ def report_json(report: Report) -> dict[str, object]:
     }
 
 
-def motions_csv(report: Report) -> str:
+def motions_csv(report: SystemReport) -> str:
     """Return the motions under the selected controls as CSV; a control acts after its row."""
     n = len(report.system.names)
     m = len(report.system.bounds.controls)
@@ -96,7 +96,7 @@ def motions_csv(report: Report) -> str:
     return csv_text(columns, rows)
 
 
-def report_lines(report: Report) -> Iterator[Part]:
+def report_lines(report: SystemReport) -> Iterator[Part]:
     """Yield the minimum norm, the tube and the selected controls, for the screen."""
     solution = report.solution
     minimum = report.min_periods

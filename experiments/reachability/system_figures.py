@@ -19,17 +19,17 @@ from infoset.experiments.common.figure_style import (
     style,
     subplots,
 )
-from infoset.experiments.reachability.system import Report
+from infoset.experiments.reachability.system import SystemReport
 
 
-def draw_all(report: Report) -> Iterator[Figure]:
+def draw_all(report: SystemReport) -> Iterator[Figure]:
     """Draw the figures of a report, one after the other."""
     yield draw_states(report)
     yield draw_controls(report)
 
 
 @style()
-def draw_states(report: Report) -> Figure:
+def draw_states(report: SystemReport) -> Figure:
     """Draw the reachable states, the tube of all optimal motions, and some of these."""
     names = report.system.names
     figure, grid = subplots(30.0 + 40.0 * len(names), len(names), 1, sharex=True)
@@ -50,7 +50,7 @@ def draw_states(report: Report) -> Figure:
 
 
 @style()
-def draw_controls(report: Report) -> Figure:
+def draw_controls(report: SystemReport) -> Figure:
     """Draw the range of each control over all optimal ones, and some of these."""
     count = report.ranges.shape[1]
     periods = len(report.ranges)
@@ -76,7 +76,7 @@ def draw_controls(report: Report) -> Figure:
     return figure
 
 
-def _finish(figure: Figure, grid: Any, report: Report) -> None:
+def _finish(figure: Figure, grid: Any, report: SystemReport) -> None:
     """Add the legend, and a title if there are more selected controls than kinds of lines."""
     if len(report.controls) > len(LINE_LOOKS):
         grid[0, 0].set_title(

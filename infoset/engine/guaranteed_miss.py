@@ -119,7 +119,7 @@ class Outlines(NamedTuple):
     supports: Floats
 
 
-class Replayed(NamedTuple):
+class WindowLabels(NamedTuple):
     """Number of the labels replayed for a window, and how many of them are below and above its
     living ones.
     """
@@ -214,7 +214,7 @@ def miss_at(outlines: Outlines, i: int, past: Past) -> float:
 
 
 @allocation_free
-def max_exact_miss(replayed: Replayed, reached: float, past: Past, outlines: Outlines) -> float:
+def max_exact_miss(replayed: WindowLabels, reached: float, past: Past, outlines: Outlines) -> float:
     """Return the maximum miss of the exact sections of replayed labels, m; with rates, that of one
     of them.
 
@@ -281,7 +281,7 @@ def living_part(known: float, past: Past) -> Living:
 
 
 @allocation_free
-def replay_labels(living: Living, past: Past, outlines: Outlines) -> Replayed:
+def replay_labels(living: Living, past: Past, outlines: Outlines) -> WindowLabels:
     """Write the sections of equally spaced living labels, and of one more on each side without
     rates.
 
@@ -294,7 +294,7 @@ def replay_labels(living: Living, past: Past, outlines: Outlines) -> Replayed:
     number = inner = outer = ZERO
     if spacing <= LABEL_RESOLUTION * living.upper:
         write_outline(outlines, ZERO, living.lower, LOWER, past)
-        return Replayed(ZERO + 1, inner, outer)
+        return WindowLabels(ZERO + 1, inner, outer)
     for k in range(-1, LABELS + 1):
         label = living.lower + k * spacing
         row = PROBE
@@ -320,12 +320,17 @@ def replay_labels(living: Living, past: Past, outlines: Outlines) -> Replayed:
             continue
         write_outline(outlines, number, label, row, past)
         number += 1
-    return Replayed(number, inner, outer)
+    return WindowLabels(number, inner, outer)
 
 
 @allocation_free
 def bound_pieces(
-    living: Living, replayed: Replayed, past: Past, outlines: Outlines, pieces: Records, count: int
+    living: Living,
+    replayed: WindowLabels,
+    past: Past,
+    outlines: Outlines,
+    pieces: Records,
+    count: int,
 ) -> int:
     """Add the pieces between replayed labels, with their bounds, to `count` pieces; return the new
     count.

@@ -192,7 +192,7 @@ class Polygons(Batch):
 
 
 @dataclass(frozen=True, eq=False)
-class Member:
+class RunPolytope:
     """The set of one run as a polytope, of at most `max_facets` facets; None is no bound.
 
     `reduced` is whether the set, or one that it was computed from, was replaced by a larger one
@@ -208,7 +208,7 @@ class Member:
         """Maximum coordinates, shape (n,)."""
         return np.asarray(np.abs(self.polytope.vertices).max(axis=0, initial=0.0))
 
-    def solid(self, sizes: Floats) -> Member:
+    def solid(self, sizes: Floats) -> RunPolytope:
         """Return the set; a flat one is enlarged to a layer that is thicker than rounding.
 
         `sizes`, shape (n,), are maximum terms of the coordinates of a flat set.
@@ -219,7 +219,7 @@ class Member:
         sizes = np.maximum(self.sizes, sizes)
         return replace(self, polytope=one.enlarged(REDUCED * np.where(sizes > 0.0, sizes, 1.0)))
 
-    def limited(self) -> Member:
+    def limited(self) -> RunPolytope:
         """Return a set that contains this one, with at most as many facets and vertices as allowed.
 
         Raises
@@ -238,7 +238,9 @@ class Member:
         smaller = self.polytope.reduce_outward(self.max_facets, _MAX_VERTICES)
         return self if smaller is self.polytope else replace(self, polytope=smaller, reduced=True)
 
-    def predicted(self, matrix: Floats, shift: Floats, terms: Floats, disturbance: Set) -> Member:
+    def predicted(
+        self, matrix: Floats, shift: Floats, terms: Floats, disturbance: Set
+    ) -> RunPolytope:
         """Return the set of matrix x + shift + w; `terms` are the sums of the sizes of the terms of
         shift + w.
 
@@ -264,7 +266,7 @@ class Member:
         slack = POLYTOPE_SLACK if was_solid and moved.solid(terms) is moved else REDUCED
         return replace(moved, polytope=moved.polytope.enlarged(SUM_SLACK * terms + slack * widths))
 
-    def cut(self, strips: Strips, run: int = 0) -> tuple[Member, Floats]:
+    def cut(self, strips: Strips, run: int = 0) -> tuple[RunPolytope, Floats]:
         """Return the part within strips, and the distances of strips from the set, shape (r,), if
         the part is empty.
         """
@@ -312,12 +314,12 @@ class Member:
 class Polytopes:
     """Sets of any number of states."""
 
-    members: tuple[Member, ...]
+    members: tuple[RunPolytope, ...]
 
     @classmethod
     def of(cls, start: Set, runs: int, max_facets: int | None, sizes: Floats) -> Polytopes:
         """Return the same set for all runs; `sizes`, shape (n,), are those of disturbances."""
-        member = Member(polytope_of(start), max_facets).solid(sizes)
+        member = RunPolytope(polytope_of(start), max_facets).solid(sizes)
         return cls(
             (
                 replace(

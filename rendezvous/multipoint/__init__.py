@@ -22,7 +22,7 @@ from infoset.rendezvous.multipoint.times import (
     TimeSearch,
     optimise_times,
 )
-from infoset.rendezvous.multipoint.tour import Meet, Target, Tour, Visits
+from infoset.rendezvous.multipoint.tour import Meet, Tour, TourTarget, Visits
 
 __all__ = [
     "MAX_TARGETS",
@@ -38,10 +38,10 @@ __all__ = [
     "NotSettledError",
     "OrderSearch",
     "Path",
-    "Target",
     "TimeLimits",
     "TimeSearch",
     "Tour",
+    "TourTarget",
     "Visits",
     "best_order",
     "best_order_of_slots",

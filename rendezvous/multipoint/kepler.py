@@ -10,7 +10,7 @@ import numpy as np
 from infoset.rendezvous._arrays import Floats, Integers
 from infoset.rendezvous.multipoint._shooting import ShotPath, blocks_of, shoot
 from infoset.rendezvous.multipoint.segments import NotSettledError, Path, check_times
-from infoset.rendezvous.multipoint.tour import Target, Visits
+from infoset.rendezvous.multipoint.tour import TourTarget, Visits
 from infoset.rendezvous.two_body import coast
 
 MAX_KNOWN = 64
@@ -37,7 +37,7 @@ class KeplerTour(Visits):
     not converge far from the coasting orbit.
     """
 
-    targets: tuple[Target, ...]
+    targets: tuple[TourTarget, ...]
     initial: Floats
     epoch_s: Floats
     gravitational_parameter_m3_s2: float

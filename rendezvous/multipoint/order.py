@@ -141,7 +141,7 @@ def best_order(
         return times.objective, times.path
 
     # A local minimum of a partial order is no bound; divided by the ruggedness, it is used as one.
-    search = _Search(
+    search = _OrderSearch(
         solve, count, progress, tour.start_s, horizon, tour.ruggedness, looks_twice=True
     )
     best = search.run()
@@ -185,7 +185,7 @@ def best_order_of_slots(
         return path.cost, path
 
     slack = tour.ruggedness if tour.ruggedness > SMOOTH else 1.0
-    search = _Search(
+    search = _OrderSearch(
         solve, count, progress, tour.start_s, None, slack, looks_twice=False, fits=fits
     )
     path = search.run()
@@ -320,7 +320,7 @@ def _bounded(
 
 
 @dataclass
-class _Search:
+class _OrderSearch:
     """A depth-first search through partial orders."""
 
     solve: Callable[[tuple[int, ...], Sequence[Floats], bool], tuple[float, Path]]

@@ -28,7 +28,7 @@ class Meet(Enum):
 
 
 @dataclass(frozen=True)
-class Target:
+class TourTarget:
     """A target; `dwell_s` is the duration of the stay with it, coasting, for a rendezvous only.
 
     Raises
@@ -56,7 +56,7 @@ class Visits(ABC):
         If two targets have the same name.
     """
 
-    targets: tuple[Target, ...]
+    targets: tuple[TourTarget, ...]
     start_state: Floats
     start_s: float = 0.0
     ruggedness: ClassVar[float]
@@ -118,7 +118,7 @@ class Tour(Visits):
     """
 
     motion: LinearMotion
-    targets: tuple[Target, ...]
+    targets: tuple[TourTarget, ...]
     initial: Floats
     start_state: Floats
     start_s: float = 0.0

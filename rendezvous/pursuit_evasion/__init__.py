@@ -6,10 +6,10 @@ method of solution and the certificate are not from these sources.
 """
 
 from infoset.rendezvous.pursuit_evasion.certificate import Certificate, Deviation, certify
-from infoset.rendezvous.pursuit_evasion.feedback import Ended, Flight, Observation, fly
+from infoset.rendezvous.pursuit_evasion.feedback import Ended, Observation, PursuitFlight, fly
 from infoset.rendezvous.pursuit_evasion.game import Game, Gravity, Player, Units
 from infoset.rendezvous.pursuit_evasion.paths import (
-    History,
+    CaptureHistory,
     PathError,
     PlayerHistory,
     history,
@@ -17,35 +17,35 @@ from infoset.rendezvous.pursuit_evasion.paths import (
 )
 from infoset.rendezvous.pursuit_evasion.solution import (
     Capture,
+    CaptureSolution,
+    CertificateVerdict,
     DistanceCurve,
     PlayerEnd,
-    Solution,
-    Verdict,
 )
 from infoset.rendezvous.pursuit_evasion.solver import solve
 from infoset.rendezvous.pursuit_evasion.steering import Policy, RandomSteering, Steering
 
 __all__ = [
     "Capture",
+    "CaptureHistory",
+    "CaptureSolution",
     "Certificate",
+    "CertificateVerdict",
     "Deviation",
     "DistanceCurve",
     "Ended",
-    "Flight",
     "Game",
     "Gravity",
-    "History",
     "Observation",
     "PathError",
     "Player",
     "PlayerEnd",
     "PlayerHistory",
     "Policy",
+    "PursuitFlight",
     "RandomSteering",
-    "Solution",
     "Steering",
     "Units",
-    "Verdict",
     "certify",
     "fly",
     "history",

@@ -42,7 +42,7 @@ _FARTHEST, _NEAR, _FRACTION, _NEAR_ENOUGH = 0.7, 1e-2, 0.2, 1e-3
 
 
 @dataclass(frozen=True)
-class Craft:
+class ExtremalCraft:
     """One side of a game, which chooses its direction of thrust; all nondimensional, `start` of
     shape (6,).
     """
@@ -123,7 +123,7 @@ class KnownPath:
         return self.state_at(duration)[0]
 
 
-Side = Craft | KnownPath
+Side = ExtremalCraft | KnownPath
 
 
 @dataclass(frozen=True)

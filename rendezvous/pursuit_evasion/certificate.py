@@ -17,7 +17,7 @@ from infoset.rendezvous._arrays import Floats
 from infoset.rendezvous.pursuit_evasion._branch import MAX_WORK, Ending, follow
 from infoset.rendezvous.pursuit_evasion._pair import (
     MAX_RESIDUAL,
-    Craft,
+    ExtremalCraft,
     KnownPath,
     Node,
     Pair,
@@ -31,7 +31,7 @@ from infoset.rendezvous.pursuit_evasion.paths import (
     extremal_paths,
     steered_path,
 )
-from infoset.rendezvous.pursuit_evasion.solution import Solution
+from infoset.rendezvous.pursuit_evasion.solution import CaptureSolution
 from infoset.rendezvous.pursuit_evasion.steering import Policy
 
 MAX_HAMILTONIAN_DRIFT = 1e-8
@@ -177,7 +177,7 @@ class Certificate:
         return not self.failures and not self.is_mostly_undecided
 
 
-def certify(solution: Solution, *, all_directions: bool = False) -> Certificate:
+def certify(solution: CaptureSolution, *, all_directions: bool = False) -> Certificate:
     """Check the capture of a `solution`; `all_directions` also scans all directions at the capture
     time.
 
@@ -310,7 +310,7 @@ def _along(paths: tuple[ExtremalPath, ExtremalPath], node: Node) -> tuple[float,
     return drift, minimum
 
 
-def _integrator_gap(pursuer: Craft, evader: Craft, node: Node) -> float:
+def _integrator_gap(pursuer: ExtremalCraft, evader: ExtremalCraft, node: Node) -> float:
     """Integrate both forward from their start states and costates by a multistep method, and
     compare the ends.
     """
@@ -331,7 +331,7 @@ def _integrator_gap(pursuer: Craft, evader: Craft, node: Node) -> float:
     return max(gaps)
 
 
-def _forward_rates(time: float, y: Floats, craft: Craft) -> Floats:
+def _forward_rates(time: float, y: Floats, craft: ExtremalCraft) -> Floats:
     """State and costate in time; gravity's gradient along p_v by a complex step, not by its
     formula.
     """
@@ -347,7 +347,7 @@ def _forward_rates(time: float, y: Floats, craft: Craft) -> Floats:
     return out
 
 
-def _gravity(r: Any, craft: Craft) -> Any:
+def _gravity(r: Any, craft: ExtremalCraft) -> Any:
     """Return the acceleration of gravity in its usual form, for a real or complex position."""
     q = (r * r).sum()
     cube = q * np.sqrt(q)

@@ -11,10 +11,10 @@ from scipy.optimize import brentq, minimize_scalar
 
 from infoset.rendezvous._arrays import Floats
 from infoset.rendezvous.pursuit_evasion._branch import MAX_WORK, Ending, follow
-from infoset.rendezvous.pursuit_evasion._pair import FINE, Craft, Node, Pair
+from infoset.rendezvous.pursuit_evasion._pair import FINE, ExtremalCraft, Node, Pair
 from infoset.rendezvous.pursuit_evasion.game import Game, Units, scaled_game
 from infoset.rendezvous.pursuit_evasion.paths import ExtremalPath, extremal_paths, steered_path
-from infoset.rendezvous.pursuit_evasion.solution import Solution
+from infoset.rendezvous.pursuit_evasion.solution import CaptureSolution
 from infoset.rendezvous.pursuit_evasion.solver import solve
 from infoset.rendezvous.pursuit_evasion.steering import Steering
 
@@ -60,7 +60,7 @@ class Ended(Enum):
 
 
 @dataclass(frozen=True)
-class Flight:
+class PursuitFlight:
     """A pursuit with feedback.
 
     It ends at `time_s`, at the capture, at the closest approach or for another reason, at
@@ -83,8 +83,8 @@ def fly(
     replan_s: float = 600.0,
     observation: Observation | None = None,
     seed: int | np.random.SeedSequence = 0,
-    solution: Solution | None = None,
-) -> Flight:
+    solution: CaptureSolution | None = None,
+) -> PursuitFlight:
     """Simulate a pursuer that computes a new plan at regular times, `replan_s` apart, and follows
     each until the next.
 
@@ -149,7 +149,7 @@ class _Pursuit:
         self._past: list[tuple[float, PathNow]] = []
         self._log: list[tuple[float, float, Floats]] = []
 
-    def run(self, plan: Node, leg: float) -> Flight:
+    def run(self, plan: Node, leg: float) -> PursuitFlight:
         own = plan
         while len(self._log) < _MAX_PLANS:
             apart = self._evader.start[:3] - self._pursuer.start[:3]
@@ -179,7 +179,7 @@ class _Pursuit:
                 own = self._plan(own, spell, self._evader) or known
         return self._end(Ended.NO_PLAN)
 
-    def _plan(self, before: Node, spell: float, evader: Craft) -> Node | None:
+    def _plan(self, before: Node, spell: float, evader: ExtremalCraft) -> Node | None:
         """Solve the game from the current states, from the previous plan or from scratch."""
         if _lasts(evader, self._dry[1]) < spell:
             evader = replace(evader, thrust=0.0, flow=0.0)
@@ -236,7 +236,7 @@ class _Pursuit:
             steered.solution(spell)[6]
         )
 
-    def _seen(self, plan: Node) -> Craft:
+    def _seen(self, plan: Node) -> ExtremalCraft:
         """Return the evader as the pursuer observes it."""
         seen = self._observation
         if seen.is_exact:
@@ -266,7 +266,7 @@ class _Pursuit:
 
     def _look(
         self, pursuer: ExtremalPath, evader: PathNow, spell: float, last: bool
-    ) -> Flight | None:
+    ) -> PursuitFlight | None:
         """Return the flight if it ends in the leg: by a capture, or in the last leg at the closest
         approach.
         """
@@ -303,14 +303,14 @@ class _Pursuit:
         ended = Ended.CAPTURED if distance(at) <= self._hit else Ended.MISSED
         return self._flight(ended, self._time + at, distance(at))
 
-    def _end(self, ended: Ended) -> Flight:
+    def _end(self, ended: Ended) -> PursuitFlight:
         apart = float(np.linalg.norm(self._pursuer.start[:3] - self._evader.start[:3]))
         return self._flight(ended, self._time, apart)
 
-    def _flight(self, ended: Ended, time: float, distance: float) -> Flight:
+    def _flight(self, ended: Ended, time: float, distance: float) -> PursuitFlight:
         units = self._units
         planned, predicted, apart = (np.array(column) for column in zip(*self._log, strict=True))
-        return Flight(
+        return PursuitFlight(
             ended=ended,
             time_s=time * units.time_s,
             distance_m=distance * units.length_m,
@@ -320,7 +320,7 @@ class _Pursuit:
         )
 
 
-def _lasts(craft: Craft, dry: float) -> float:
+def _lasts(craft: ExtremalCraft, dry: float) -> float:
     """Return how long the propellant lasts; a little less for a craft without dry mass, whose
     acceleration diverges.
     """

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from infoset.rendezvous.pursuit_evasion._pair import Craft, Pair
+from infoset.rendezvous.pursuit_evasion._pair import ExtremalCraft, Pair
 from infoset.rendezvous.two_body import orbit_fault, semi_major_axis_m
 
 Vector = tuple[float, float, float]
@@ -162,8 +162,8 @@ class ScaledGame:
     """A nondimensional game; `latest` is its longest duration."""
 
     units: Units
-    pursuer: Craft
-    evader: Craft
+    pursuer: ExtremalCraft
+    evader: ExtremalCraft
     radius: float
     latest: float
 
@@ -182,10 +182,10 @@ def units_of(game: Game) -> Units:
     return Units(length, float(np.sqrt(length**3 / mu)), game.pursuer.mass_kg)
 
 
-def scaled_craft(player: Player, gravity: Gravity, units: Units) -> Craft:
+def scaled_craft(player: Player, gravity: Gravity, units: Units) -> ExtremalCraft:
     """Return a player as a nondimensional craft."""
     force = units.mass_kg * units.length_m / units.time_s**2
-    return Craft(
+    return ExtremalCraft(
         start=np.array([*player.position_m, *player.velocity_m_s])
         / np.repeat([units.length_m, units.speed_m_s], 3),
         thrust=player.thrust_n / force,

@@ -18,9 +18,9 @@ from infoset.rendezvous.pursuit_evasion._extremal import (
     flow_back,
     rate,
 )
-from infoset.rendezvous.pursuit_evasion._pair import FINE, Craft, Node
+from infoset.rendezvous.pursuit_evasion._pair import FINE, ExtremalCraft, Node
 from infoset.rendezvous.pursuit_evasion.game import Units, scaled_game
-from infoset.rendezvous.pursuit_evasion.solution import Solution
+from infoset.rendezvous.pursuit_evasion.solution import CaptureSolution
 
 Direction = Callable[[float, Floats], Floats]
 """Direction of thrust, shape (3,), of a time and a state: any length, zero to coast."""
@@ -40,7 +40,7 @@ class ExtremalPath:
     It ends in `end_state`, shape (6,), along `nu`, shape (3,), after `duration`.
     """
 
-    craft: Craft
+    craft: ExtremalCraft
     end_state: Floats
     nu: Floats
     duration: float
@@ -77,7 +77,9 @@ class ExtremalPath:
             raise PathError("an extremal of the solution cannot be propagated")
 
 
-def extremal_paths(pursuer: Craft, evader: Craft, node: Node) -> tuple[ExtremalPath, ExtremalPath]:
+def extremal_paths(
+    pursuer: ExtremalCraft, evader: ExtremalCraft, node: Node
+) -> tuple[ExtremalPath, ExtremalPath]:
     """Return the paths of both sides of an extremal."""
     return (
         ExtremalPath(pursuer, node.pursuer, node.nu, node.duration),
@@ -91,7 +93,7 @@ class SteeredPath:
     time.
     """
 
-    craft: Craft
+    craft: ExtremalCraft
     direction: Direction
     solution: Callable[[float], Floats]
 
@@ -101,7 +103,7 @@ class SteeredPath:
         return state[:6], _rates(time, state, self.craft, self.direction)[3:6]
 
 
-def steered_path(craft: Craft, direction: Direction, duration: float) -> SteeredPath:
+def steered_path(craft: ExtremalCraft, direction: Direction, duration: float) -> SteeredPath:
     """Return the path of a craft that steers by a rule: full thrust along the direction, or none
     where that is zero.
 
@@ -131,7 +133,7 @@ def steered_path(craft: Craft, direction: Direction, duration: float) -> Steered
     return SteeredPath(craft, direction, path.sol)
 
 
-def _rates(time: float, state: Floats, craft: Craft, direction: Direction) -> Floats:
+def _rates(time: float, state: Floats, craft: ExtremalCraft, direction: Direction) -> Floats:
     y = np.zeros(STATES)
     y[:6], y[9:] = state[:6], direction(time, state[:6])
     out = np.zeros(7)
@@ -157,7 +159,7 @@ class PlayerHistory:
 
 
 @dataclass(frozen=True)
-class History:
+class CaptureHistory:
     """Both players at times from the start, shape (n,)."""
 
     time_s: Floats
@@ -165,7 +167,7 @@ class History:
     evader: PlayerHistory
 
 
-def history(solution: Solution, count: int = 400) -> History:
+def history(solution: CaptureSolution, count: int = 400) -> CaptureHistory:
     """Sample the capture of a `solution` at `count` equally spaced times, from the start to the
     end.
 
@@ -183,7 +185,7 @@ def history(solution: Solution, count: int = 400) -> History:
     scaled = scaled_game(solution.game, units)
     paths = extremal_paths(scaled.pursuer, scaled.evader, node)
     pursuer, evader = (_sampled(path, times, units) for path in paths)
-    return History(times * units.time_s, pursuer, evader)
+    return CaptureHistory(times * units.time_s, pursuer, evader)
 
 
 def orbital_axes(position_m: Floats, velocity_m_s: Floats) -> Floats:

@@ -10,7 +10,7 @@ from infoset.rendezvous.pursuit_evasion._pair import Node
 from infoset.rendezvous.pursuit_evasion.game import Game, Units
 
 
-class Verdict(Enum):
+class CertificateVerdict(Enum):
     """End of the game."""
 
     CAPTURED = "captured"
@@ -95,7 +95,7 @@ class Capture:
 
 
 @dataclass(frozen=True)
-class Solution:
+class CaptureSolution:
     """A game with its verdict; `units` are those of nondimensional values.
 
     There is a `capture` if the verdict is `captured`. The continuation changed `branch_changes`
@@ -106,7 +106,7 @@ class Solution:
 
     game: Game
     units: Units
-    verdict: Verdict
+    verdict: CertificateVerdict
     capture: Capture | None
     branch_changes: int
     curve: DistanceCurve

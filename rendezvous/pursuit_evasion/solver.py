@@ -11,16 +11,18 @@ from infoset.rendezvous.pursuit_evasion._scan import greater
 from infoset.rendezvous.pursuit_evasion.game import Game, Player, Units, horizon_s, scaled_game
 from infoset.rendezvous.pursuit_evasion.solution import (
     Capture,
+    CaptureSolution,
+    CertificateVerdict,
     DistanceCurve,
     PlayerEnd,
-    Solution,
-    Verdict,
 )
 
 _MAX_BRANCHES = 6
 
 
-def solve(game: Game, *, change_branch: bool = True, all_directions: bool = False) -> Solution:
+def solve(
+    game: Game, *, change_branch: bool = True, all_directions: bool = False
+) -> CaptureSolution:
     """Solve a game without a guess.
 
     `change_branch` searches for another branch at a fold; each search takes seconds.
@@ -42,7 +44,9 @@ def solve(game: Game, *, change_branch: bool = True, all_directions: bool = Fals
     first = pair.begin(latest, radius)
     if first is None:
         empty = DistanceCurve(np.zeros(0), np.zeros(0), np.zeros(0))
-        return Solution(game, units, Verdict.BRANCH_NOT_CERTIFIED, None, 0, empty, 0.0)
+        return CaptureSolution(
+            game, units, CertificateVerdict.BRANCH_NOT_CERTIFIED, None, 0, empty, 0.0
+        )
     nodes: list[Node] = []
     branch = follow(pair, first, radius, latest)
     changes = 0
@@ -66,12 +70,18 @@ def solve(game: Game, *, change_branch: bool = True, all_directions: bool = Fals
     looked_at_s = branch.last.duration * units.time_s
     if branch.ending is Ending.CAPTURE:
         capture = _capture(game, units, branch.last)
-        verdict = Verdict.CAPTURED if capture.is_local_saddle else Verdict.BRANCH_NOT_CERTIFIED
-        return Solution(game, units, verdict, capture, changes, curve, looked_at_s)
+        verdict = (
+            CertificateVerdict.CAPTURED
+            if capture.is_local_saddle
+            else CertificateVerdict.BRANCH_NOT_CERTIFIED
+        )
+        return CaptureSolution(game, units, verdict, capture, changes, curve, looked_at_s)
     if branch.ending is Ending.TIME:
         verdict, exhausted = _uncaptured(game)
-        return Solution(game, units, verdict, None, changes, curve, looked_at_s, exhausted)
-    return Solution(game, units, Verdict.BRANCH_NOT_CERTIFIED, None, changes, curve, looked_at_s)
+        return CaptureSolution(game, units, verdict, None, changes, curve, looked_at_s, exhausted)
+    return CaptureSolution(
+        game, units, CertificateVerdict.BRANCH_NOT_CERTIFIED, None, changes, curve, looked_at_s
+    )
 
 
 def _capture(game: Game, units: Units, node: Node) -> Capture:
@@ -98,14 +108,18 @@ def _capture(game: Game, units: Units, node: Node) -> Capture:
     )
 
 
-def _uncaptured(game: Game) -> tuple[Verdict, str | None]:
+def _uncaptured(game: Game) -> tuple[CertificateVerdict, str | None]:
     """Return the verdict if there is no capture within the examined time."""
     pursuer = game.pursuer
     evader = game.evader
     end_s = horizon_s(game)
     slack = 1.0 - 2e-3
     if evader.burn_time_s * slack <= end_s and evader.burn_time_s < pursuer.burn_time_s:
-        return Verdict.PROPELLANT_EXHAUSTED, "evader"
+        return CertificateVerdict.PROPELLANT_EXHAUSTED, "evader"
     spent = "pursuer" if pursuer.burn_time_s * slack <= end_s else None
     stronger = pursuer.acceleration_m_s2 > evader.acceleration_m_s2
-    return (Verdict.PROPELLANT_EXHAUSTED if spent and stronger else Verdict.ESCAPES), spent
+    return (
+        CertificateVerdict.PROPELLANT_EXHAUSTED
+        if spent and stronger
+        else CertificateVerdict.ESCAPES
+    ), spent

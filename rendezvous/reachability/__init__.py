@@ -5,7 +5,7 @@ A problem is built from a motion. Its solution contains the sets of states and t
 controls. Controls are selected from this set and simulated.
 """
 
-from infoset.rendezvous.reachability.closed_loop import Flight, replan
+from infoset.rendezvous.reachability.closed_loop import ClosedLoopFlight, replan
 from infoset.rendezvous.reachability.motion import (
     MotionModel,
     NonlinearMotion,
@@ -27,7 +27,7 @@ from infoset.rendezvous.reachability.robust import (
     tightened,
 )
 from infoset.rendezvous.reachability.selection import (
-    Effort,
+    ControlEffort,
     analytic_centre,
     chebyshev_centre,
     effort,
@@ -41,10 +41,10 @@ from infoset.rendezvous.reachability.selection import (
 )
 from infoset.rendezvous.reachability.sets import (
     ReachableSets,
-    SetCounts,
     SetKind,
     ThinSetError,
     TooManyVerticesError,
+    VertexCounts,
 )
 from infoset.rendezvous.reachability.solve import (
     OptimalControls,
@@ -57,10 +57,10 @@ from infoset.rendezvous.reachability.solve import (
 
 __all__ = [
     "MAX_PERIODS",
-    "Effort",
+    "ClosedLoopFlight",
+    "ControlEffort",
     "EmptyTubeError",
     "FeedbackPlan",
-    "Flight",
     "InadmissibleStartError",
     "MotionModel",
     "NoRobustPlanError",
@@ -69,12 +69,12 @@ __all__ = [
     "ReachabilityProblem",
     "ReachableSets",
     "Route",
-    "SetCounts",
     "SetKind",
     "Solution",
     "ThinSetError",
     "ThrustShape",
     "TooManyVerticesError",
+    "VertexCounts",
     "analytic_centre",
     "between_periods",
     "chebyshev_centre",

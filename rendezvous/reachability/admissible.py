@@ -11,7 +11,7 @@ from scipy.linalg import block_diag
 
 from infoset.rendezvous._arrays import Floats, Places
 from infoset.rendezvous.reachability.conic import MAX_GAP, ConeProgram, NoSolutionError, Optimum
-from infoset.rendezvous.reachability.problem import Block
+from infoset.rendezvous.reachability.problem import StateBlock
 
 Constraints = tuple[Floats, Floats, Places, Places]
 
@@ -92,7 +92,7 @@ class Lifted:
         )
 
 
-def lift(block: Block) -> Lifted:
+def lift(block: StateBlock) -> Lifted:
     """Return the admissible controls of a block, v = all its controls; O(T^2 n^2 m), dense."""
     periods = block.periods
     n = block.size
@@ -110,7 +110,7 @@ def lift(block: Block) -> Lifted:
     return _lifted(block, free, response, constraints, np.zeros((0, width)), np.zeros(0))
 
 
-def lift_with_states(block: Block) -> Lifted:
+def lift_with_states(block: StateBlock) -> Lifted:
     """Return the set of `lift` with v = all controls, then all states x(1)..x(T), which T n
     equations determine.
 
@@ -140,7 +140,7 @@ def lift_with_states(block: Block) -> Lifted:
 
 
 def _state_constraints(
-    block: Block, free: Floats, response: Floats
+    block: StateBlock, free: Floats, response: Floats
 ) -> tuple[list[Constraints], list[list[Constraints]]]:
     """Constraints on the states at the end of each period, and at the instants within each."""
     periods = block.periods
@@ -165,7 +165,7 @@ def _state_constraints(
 
 
 def _lifted(
-    block: Block,
+    block: StateBlock,
     free: Floats,
     response: Floats,
     constraints: list[Constraints],

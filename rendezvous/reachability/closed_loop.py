@@ -26,7 +26,7 @@ _MAX_RELAXATION = 1e3
 
 
 @dataclass(frozen=True, eq=False)
-class Flight:
+class ClosedLoopFlight:
     """Simulation in closed loop: true states, shape (T + 1, n), and the controls applied, shape (T,
     m).
 
@@ -52,7 +52,7 @@ def replan(
     observe: Observer | None = None,
     *,
     relative: bool = False,
-) -> Flight:
+) -> ClosedLoopFlight:
     """Simulate a problem in closed loop: in every period apply the first control of the optimal
     plan of minimum energy.
 
@@ -75,7 +75,7 @@ def replan(
     states, controls, misses, relaxations = (
         np.array(column) for column in zip(*steps, strict=True)
     )
-    return Flight(np.vstack([problem.initial, states]), controls, misses, relaxations)
+    return ClosedLoopFlight(np.vstack([problem.initial, states]), controls, misses, relaxations)
 
 
 def relaxed(problem: ReachabilityProblem, fraction: float) -> ReachabilityProblem:

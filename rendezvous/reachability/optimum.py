@@ -17,7 +17,7 @@ from infoset.rendezvous.reachability.conic import (
     NoSolutionError,
     SolverSettings,
 )
-from infoset.rendezvous.reachability.problem import Block
+from infoset.rendezvous.reachability.problem import StateBlock
 from infoset.rendezvous.reachability.relative_interior import null_space_basis, relative_interior
 
 _REACHED = 1e-9
@@ -63,7 +63,7 @@ class BlockOptimum:
     its boundary, in its coordinates.
     """
 
-    block: Block
+    block: StateBlock
     terminal: Floats
     reached: bool
     optimal: Lifted
@@ -75,7 +75,7 @@ class BlockOptimum:
         return float(np.linalg.norm(self.terminal * self.block.scale))
 
 
-def block_optimum(block: Block, *, relative: bool = False) -> BlockOptimum:
+def block_optimum(block: StateBlock, *, relative: bool = False) -> BlockOptimum:
     """Return the minimum terminal norm of a block, and all controls that reach it.
 
     If `relative`, the norm is of states divided by their bounds; otherwise in the units of the
@@ -119,7 +119,7 @@ def block_optimum(block: Block, *, relative: bool = False) -> BlockOptimum:
     return BlockOptimum(block, terminal, minimum.reached, optimal, hull.centre)
 
 
-def block_reaches_zero(block: Block) -> bool:
+def block_reaches_zero(block: StateBlock) -> bool:
     """Return whether admissible controls lead a block to zero.
 
     `NoSolutionError` is raised if neither such a control nor a positive lower bound was found.
@@ -127,12 +127,12 @@ def block_reaches_zero(block: Block) -> bool:
     relaxation = min_relaxation(lift(block))[0]
     if relaxation > _REACHED:
         return False
-    search = _Search(lift(_relaxed(block, relaxation)), np.ones(block.size))
+    search = _OptimumSearch(lift(_relaxed(block, relaxation)), np.ones(block.size))
     search.solve()
     return not search.above_zero and search.result().reached
 
 
-def admissible(block: Block) -> Block:
+def admissible(block: StateBlock) -> StateBlock:
     """Return a block whose constraints can be satisfied: the block itself, or one relaxed by
     rounding.
 
@@ -159,7 +159,7 @@ def admissible(block: Block) -> Block:
     raise EmptyTubeError(first, relaxation, tuple(names)[:4])
 
 
-def _relaxed(block: Block, relaxation: float) -> Block:
+def _relaxed(block: StateBlock, relaxation: float) -> StateBlock:
     margin = relaxation + _REACHED
     return replace(block, offsets=block.offsets + margin) if margin > 0.0 else block
 
@@ -198,12 +198,12 @@ def min_norm(lifted: Lifted, weights: Floats) -> MinimumNorm:
     and l are optimal. They are first moved to where R' d + rows' l vanishes for each control that
     is not at its bound, so that the error of the bound is of the order of the square of theirs.
     """
-    search = _Search(lifted, weights)
+    search = _OptimumSearch(lifted, weights)
     search.solve()
     return search.result()
 
 
-class _Search:
+class _OptimumSearch:
     """Search for a point of minimum norm, with the best point and the best lower bound so far."""
 
     def __init__(self, lifted: Lifted, weights: Floats) -> None:

@@ -145,7 +145,7 @@ class ReachabilityProblem:
         return self.normals, self.offsets
 
     @cached_property
-    def blocks(self) -> tuple[Block, ...]:
+    def blocks(self) -> tuple[StateBlock, ...]:
         """The smallest independent parts of the problem, in the order of their first states.
 
         Together they contain all states, and all controls that affect a state.
@@ -244,7 +244,7 @@ class ReachabilityProblem:
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class StateBlock:
     """An independent part of a problem, with states and controls divided by their bounds.
 
     `states` and `controls` are indices in the problem, and `scale`, shape (n,), the bounds on the
@@ -275,7 +275,7 @@ class Block:
         """Number of states n."""
         return len(self.states)
 
-    def first(self, periods: int) -> Block:
+    def first(self, periods: int) -> StateBlock:
         """Return the block that ends after the first periods."""
         return replace(
             self,
@@ -286,7 +286,7 @@ class Block:
         )
 
 
-def _block(problem: ReachabilityProblem, members: Places) -> Block:
+def _block(problem: ReachabilityProblem, members: Places) -> StateBlock:
     n = problem.states
     states = members[members < n]
     controls = members[members >= n] - n
@@ -309,7 +309,7 @@ def _block(problem: ReachabilityProblem, members: Places) -> Block:
     if problem.between is not None:
         inner = problem.between[:, :, states][:, :, :, members]
         between = inner / scale[:, None] * np.concatenate([scale, reach])
-    return Block(
+    return StateBlock(
         states,
         controls,
         scale,

@@ -31,7 +31,7 @@ _INSIDE = 1.0 - 1e-12
 
 
 @dataclass(frozen=True)
-class Effort:
+class ControlEffort:
     """Costs of a control, dimensionless.
 
     `energy` is the sum of squares of all components, `l1` that of their absolute values, `norms`
@@ -44,9 +44,9 @@ class Effort:
     peak: float
 
 
-def effort(controls: Floats) -> Effort:
+def effort(controls: Floats) -> ControlEffort:
     """Return the costs of `controls`, shape (T, m)."""
-    return Effort(
+    return ControlEffort(
         float((controls**2).sum()),
         float(np.abs(controls).sum()),
         float(np.linalg.norm(controls, axis=1).sum()),

@@ -46,7 +46,7 @@ class ThinSetError(ArithmeticError):
 
 
 @dataclass(frozen=True)
-class SetCounts:
+class VertexCounts:
     """Size and dimension of a polytope; `facets` are those of all blocks."""
 
     vertices: int
@@ -72,7 +72,7 @@ class ReachableSets:
             result[:, block.states] = part.bounds(kind) * block.scale[:, None]
         return result
 
-    def counts(self, kind: SetKind, time: int) -> SetCounts | None:
+    def counts(self, kind: SetKind, time: int) -> VertexCounts | None:
         """Return the counts of the set of a `kind` at a `time`; None if its vertices are not
         known.
         """
@@ -81,7 +81,7 @@ class ReachableSets:
         ]
         if len(sets) < len(self.parts):
             return None
-        return SetCounts(
+        return VertexCounts(
             int(np.prod([len(polytope.vertices) for polytope in sets])),
             sum(len(polytope.normals) for polytope in sets),
             sum(polytope.dimension for polytope in sets),

@@ -11,7 +11,7 @@ from operator import attrgetter
 import numpy as np
 
 from infoset.arrays import Floats
-from infoset.sim.bound.pair_of_motions import UNLIMITED, Approach, TruthPair
+from infoset.sim.bound.pair_of_motions import UNLIMITED, PairApproach, TruthPair
 from infoset.sim.scenario import Scenario, need_scenario
 
 LABELS_A_PERIOD, PERIODS_LOOKED_AT = 8, 7
@@ -125,7 +125,7 @@ def lower_bound(
                 side = 1.0 if (index - len(grid)) % 2 else -1.0
                 label_m = max(tried, key=_BOUND).label_m + side * width
                 labels.append(min(max(label_m, model.bounds.x_m[0]), model.bounds.x_m[1]))
-            approach = Approach(scenario, labels[index], speed)
+            approach = PairApproach(scenario, labels[index], speed)
             tried.append(max(approach.best_pair(), approach.single(), key=UNLIMITED))
             by_label[speed, labels[index]] = tried[-1]
             done += 1
@@ -166,7 +166,7 @@ def pair_at(
     `last_common_step` is the last step of a pair with the same measurements; None searches for the
     best one and considers single motions.
     """
-    approach = Approach(scenario, label_m, vx_m_s)
+    approach = PairApproach(scenario, label_m, vx_m_s)
     if last_common_step is not None:
         return approach.pair(last_common_step)
     return max(approach.best_pair(), approach.single(), key=UNLIMITED)

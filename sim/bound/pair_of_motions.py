@@ -100,7 +100,7 @@ class TruthPair:
         return np.zeros_like(self.track_m) if self.is_single else 2.0 * self.track_m
 
 
-class Approach:
+class PairApproach:
     """Data of one label and velocity that all its motions use.
 
     `motion` is in the middle of the box of starts, without impulses.

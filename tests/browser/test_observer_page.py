@@ -9,7 +9,7 @@ import pytest
 
 from infoset.experiments.observer.command import Errors, Observe
 from infoset.experiments.observer.page import observer_page
-from infoset.experiments.observer.report import Report
+from infoset.experiments.observer.report import ObserverReport
 from infoset.experiments.observer.run import COMMAND
 from tests.browser.conftest import Opened
 
@@ -17,7 +17,7 @@ Open = Callable[..., Opened]
 HOSTILE = "<img src=x onerror=alert(1)>"
 
 
-def observed(name: str, *settings: str) -> Report:
+def observed(name: str, *settings: str) -> ObserverReport:
     return COMMAND.report(
         Observe(problem=name, settings=[*settings], errors=Errors.UNIFORM, smooth=True)
     )

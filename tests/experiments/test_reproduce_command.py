@@ -12,12 +12,12 @@ import pytest
 
 from infoset.experiments.common.input_file import load_problem
 from infoset.experiments.common.printed_numbers import (
-    Comparison,
+    NumberComparison,
+    NumberVerdict,
     Ours,
     Paper,
     PrintedNumber,
     Progress,
-    Verdict,
     interval,
     last_digit,
     read_paper,
@@ -34,7 +34,7 @@ def silent(_done: float) -> None:
     """Progress that nobody looks at."""
 
 
-def only(*numbers: Comparison) -> Callable[[Paper, Progress], tuple[Comparison, ...]]:
+def only(*numbers: NumberComparison) -> Callable[[Paper, Progress], tuple[NumberComparison, ...]]:
     """In place of the numbers of a paper: these."""
     return lambda _paper, _progress: numbers
 
@@ -50,37 +50,37 @@ def test_the_last_digit_of_what_is_printed(text: str, unit: float) -> None:
 @pytest.mark.parametrize(
     ("ours", "known", "verdict"),
     [
-        (Ours(1.254), {}, Verdict.AGREED),
-        (Ours(1.2551), {}, Verdict.DISAGREED),
-        (Ours(1.2551), {"unexplained": math.inf}, Verdict.NOT_EXPLAINED),
-        (Ours(1.269), {"unexplained": 2.0}, Verdict.NOT_EXPLAINED),
-        (Ours(1.271), {"unexplained": 2.0}, Verdict.DISAGREED),
-        (Ours(1.254), {"unexplained": math.inf}, Verdict.AGREED),
-        (Ours(1.9, other=1.254), {}, Verdict.EXPLAINED),
-        (Ours(1.254, other=1.251), {}, Verdict.AGREED),
-        (Ours(1.9, other=1.8), {}, Verdict.DISAGREED),
-        (Ours(1.9, other=1.8), {"unexplained": math.inf}, Verdict.NOT_EXPLAINED),
-        (Ours(1.9, other=-1.251), {"corrected": "-1.25"}, Verdict.MISPRINT),
-        (Ours(-1.251, other=1.9), {"corrected": "-1.25"}, Verdict.DISAGREED),
-        (Ours(math.nan, other=1.251), {}, Verdict.DISAGREED),
-        (Ours(1.2551, beyond=0.01), {}, Verdict.AGREED),
-        (Ours(-1.251), {"corrected": "-1.25"}, Verdict.MISPRINT),
-        (Ours(1.251), {"corrected": "-1.25"}, Verdict.DISAGREED),
-        (Ours(1.4), {"agrees": (1.0, 1.4)}, Verdict.AGREED),
-        (Ours(1.41), {"agrees": (1.0, 1.4)}, Verdict.DISAGREED),
-        (Ours(math.nan), {"unexplained": math.inf}, Verdict.DISAGREED),
-        (Ours(math.inf), {"unexplained": math.inf}, Verdict.DISAGREED),
-        (Ours(1.256), {"tolerance": 1.0}, Verdict.AGREED),
-        (Ours(1.256), {"tolerance": 0.5}, Verdict.DISAGREED),
+        (Ours(1.254), {}, NumberVerdict.AGREED),
+        (Ours(1.2551), {}, NumberVerdict.DISAGREED),
+        (Ours(1.2551), {"unexplained": math.inf}, NumberVerdict.NOT_EXPLAINED),
+        (Ours(1.269), {"unexplained": 2.0}, NumberVerdict.NOT_EXPLAINED),
+        (Ours(1.271), {"unexplained": 2.0}, NumberVerdict.DISAGREED),
+        (Ours(1.254), {"unexplained": math.inf}, NumberVerdict.AGREED),
+        (Ours(1.9, other=1.254), {}, NumberVerdict.EXPLAINED),
+        (Ours(1.254, other=1.251), {}, NumberVerdict.AGREED),
+        (Ours(1.9, other=1.8), {}, NumberVerdict.DISAGREED),
+        (Ours(1.9, other=1.8), {"unexplained": math.inf}, NumberVerdict.NOT_EXPLAINED),
+        (Ours(1.9, other=-1.251), {"corrected": "-1.25"}, NumberVerdict.MISPRINT),
+        (Ours(-1.251, other=1.9), {"corrected": "-1.25"}, NumberVerdict.DISAGREED),
+        (Ours(math.nan, other=1.251), {}, NumberVerdict.DISAGREED),
+        (Ours(1.2551, beyond=0.01), {}, NumberVerdict.AGREED),
+        (Ours(-1.251), {"corrected": "-1.25"}, NumberVerdict.MISPRINT),
+        (Ours(1.251), {"corrected": "-1.25"}, NumberVerdict.DISAGREED),
+        (Ours(1.4), {"agrees": (1.0, 1.4)}, NumberVerdict.AGREED),
+        (Ours(1.41), {"agrees": (1.0, 1.4)}, NumberVerdict.DISAGREED),
+        (Ours(math.nan), {"unexplained": math.inf}, NumberVerdict.DISAGREED),
+        (Ours(math.inf), {"unexplained": math.inf}, NumberVerdict.DISAGREED),
+        (Ours(1.256), {"tolerance": 1.0}, NumberVerdict.AGREED),
+        (Ours(1.256), {"tolerance": 0.5}, NumberVerdict.DISAGREED),
         # One printed run must lie among ours.
-        (Ours(1.5, spread=(0.1, 5.8)), {"printed": "5.7"}, Verdict.POSSIBLE),
-        (Ours(11.0, spread=(8.3, 12.1)), {"printed": "9.5"}, Verdict.AGREED),
-        (Ours(11.0, spread=(8.3, 12.1)), {"printed": "19.0"}, Verdict.DISAGREED),
-        (Ours(1.5, spread=(0.1, 5.8)), {"printed": "5.9"}, Verdict.DISAGREED),
+        (Ours(1.5, spread=(0.1, 5.8)), {"printed": "5.7"}, NumberVerdict.POSSIBLE),
+        (Ours(11.0, spread=(8.3, 12.1)), {"printed": "9.5"}, NumberVerdict.AGREED),
+        (Ours(11.0, spread=(8.3, 12.1)), {"printed": "19.0"}, NumberVerdict.DISAGREED),
+        (Ours(1.5, spread=(0.1, 5.8)), {"printed": "5.9"}, NumberVerdict.DISAGREED),
     ],
 )
-def test_verdicts(ours: Ours, known: dict[str, Any], verdict: Verdict) -> None:
-    assert Comparison(replace(X, **known), ours).verdict is verdict
+def test_verdicts(ours: Ours, known: dict[str, Any], verdict: NumberVerdict) -> None:
+    assert NumberComparison(replace(X, **known), ours).verdict is verdict
 
 
 @pytest.mark.parametrize("name", PAPERS)
@@ -185,9 +185,9 @@ def test_a_number_that_should_agree_and_does_not(
     ours: float, infoset: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     numbers = (
-        Comparison(X, Ours(1.25)),
-        Comparison(replace(X, name="y (m)"), Ours(ours)),
-        Comparison(replace(X, name="z (m)", note="a circle"), Ours(1.9, other=1.2512)),
+        NumberComparison(X, Ours(1.25)),
+        NumberComparison(replace(X, name="y (m)"), Ours(ours)),
+        NumberComparison(replace(X, name="z (m)", note="a circle"), Ours(1.9, other=1.2512)),
     )
     monkeypatch.setattr("infoset.experiments.reproduced_numbers.reproduce_paper", only(*numbers))
     run = partial(infoset, "reproduce", "--paper", "reachability")
@@ -210,7 +210,7 @@ def test_reachability_tables_stand_as_the_theory_says() -> None:
     found = reproduce_paper(read_paper("reachability"), silent)
     assert len(found) == 3 * (12 + 24 + 24 + 1)
     verdicts = [each.verdict for each in found]
-    assert [verdicts.count(verdict) for verdict in Verdict] == [95, 0, 16, 69, 3, 0]
+    assert [verdicts.count(verdict) for verdict in NumberVerdict] == [95, 0, 16, 69, 3, 0]
     by_name = {(each.number.source, each.number.name): each for each in found}
     for source, name in (
         ("table 1", "linear x5(3) (m/s)"),
@@ -223,14 +223,14 @@ def test_reachability_tables_stand_as_the_theory_says() -> None:
         ("table 3", "nonlinear x6(4) (m/s)"),
         ("table 3", "linear x3(2) (m)"),
     ):
-        assert by_name[source, name].verdict is Verdict.MISPRINT, name
+        assert by_name[source, name].verdict is NumberVerdict.MISPRINT, name
     controls = [
         each for each in found if each.number.source == "table 1" and each.number.name[0] == "u"
     ]
-    assert [each.verdict for each in controls] == [Verdict.AGREED] * 12
+    assert [each.verdict for each in controls] == [NumberVerdict.AGREED] * 12
     for table in (1, 2, 3):
         miss = by_name[f"table {table}", "nonlinear, norm of x(4)"]
-        assert miss.verdict is Verdict.NOT_EXPLAINED
+        assert miss.verdict is NumberVerdict.NOT_EXPLAINED
         assert miss.ours.value < 3.0
     assert by_name["table 2", "linear x2(2) (m)"].band[1] > -1343.0
     assert by_name["table 1", "linear x1(2) (m)"].band == interval("937.24", 0.5)
@@ -243,12 +243,12 @@ def test_reachability_tables_stand_as_the_theory_says() -> None:
 def test_results_of_commands_agree(name: str, tables: int) -> None:
     paper = read_paper(name)
     found = reproduce_paper(replace(paper, tables=dict([*paper.tables.items()][:tables])), silent)
-    assert {each.verdict for each in found} == {Verdict.AGREED}
+    assert {each.verdict for each in found} == {NumberVerdict.AGREED}
 
 
 @pytest.mark.thorough
 def test_the_interception_agrees_but_for_its_impulses() -> None:
     found = reproduce_paper(read_paper("interception"), silent)
     assert len(found) == 16
-    open_ = [each.number.printed for each in found if each.verdict is not Verdict.AGREED]
+    open_ = [each.number.printed for each in found if each.verdict is not NumberVerdict.AGREED]
     assert open_ == ["4.3", "244.7", "521.7"]

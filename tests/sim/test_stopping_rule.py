@@ -13,7 +13,7 @@ from infoset.limits import MAXIMUM, MINIMUM
 from infoset.sim import QuantileName, Requirement, StoppingRule, estimate_quantiles
 from infoset.sim.requirement import HitRequirement, parse_requirement
 from infoset.sim.statistics import level_name
-from infoset.sim.undecided_cells import Sample
+from infoset.sim.undecided_cells import CellSample
 
 RULE = StoppingRule(QuantileName("miss_m", 0.5), 0.5)
 
@@ -81,7 +81,7 @@ def samples(chunks: int, size: int) -> list[Floats]:
 
 def decided_after(rule: StoppingRule, chunks: Sequence[Floats]) -> int | None:
     """Return the number of chunks after which the rule is met."""
-    sample = Sample(rule, len(chunks))
+    sample = CellSample(rule, len(chunks))
     for number, values in enumerate(chunks, start=1):
         sample.add(values)
         if sample.decided:

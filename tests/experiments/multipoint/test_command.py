@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from infoset.experiments.common.input_file import load_problem
-from infoset.rendezvous.multipoint import KeplerTour, Meet, Target
+from infoset.rendezvous.multipoint import KeplerTour, Meet, TourTarget
 from tests.built_in import problem_text
 from tests.experiments.command_line import Command
 
@@ -252,7 +252,7 @@ def test_a_chaser_on_a_hyperbola(infoset: Command, mine: Callable[[str], Path]) 
     unit_m2_s3 = (CIRCLE_KM_S * 1e3) ** 2 / (1e7 / (CIRCLE_KM_S * 1e3))
     start = np.array([1.2, 0.2, 0.0, -0.1, 1.3, 0.0])
     station = np.array([[1.0, 0.0, 0.0, 0.0, 1.0, 0.0]])
-    tour = KeplerTour((Target("station", Meet.RENDEZVOUS),), station, np.zeros(1), 1.0, start)
+    tour = KeplerTour((TourTarget("station", Meet.RENDEZVOUS),), station, np.zeros(1), 1.0, start)
 
     found_cost = found(infoset, mine(published(hyperbola)))["cost_m2_s3"]
 

@@ -7,13 +7,13 @@ import pytest
 
 from infoset.experiments.common.input_file import load_problem
 from infoset.experiments.pursuit.map import game_at
-from infoset.rendezvous.pursuit_evasion import Solution, solve
+from infoset.rendezvous.pursuit_evasion import CaptureSolution, solve
 from infoset.rendezvous.pursuit_evasion._branch import Ending, follow
 from infoset.rendezvous.pursuit_evasion._pair import COARSE, ROUGH, Node
 from infoset.rendezvous.pursuit_evasion.game import ScaledGame, scaled_game
 
 
-def solved(phase_deg: float, thrust_ratio: float) -> Solution:
+def solved(phase_deg: float, thrust_ratio: float) -> CaptureSolution:
     values = {"phase_deg": phase_deg, "thrust_ratio": thrust_ratio}
     return solve(game_at(load_problem("geo-pursuit"), values), change_branch=False)
 

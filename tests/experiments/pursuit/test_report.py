@@ -7,19 +7,24 @@ from dataclasses import replace
 import pytest
 
 from infoset.experiments.common.input_file import load_problem
-from infoset.experiments.pursuit.report import Report, report_json, report_lines, saddle_point
-from infoset.rendezvous.pursuit_evasion import Certificate, Solution, certify, solve
+from infoset.experiments.pursuit.report import (
+    PursuitReport,
+    report_json,
+    report_lines,
+    saddle_point,
+)
+from infoset.rendezvous.pursuit_evasion import CaptureSolution, Certificate, certify, solve
 
 PROBLEM = load_problem("leo-pursuit")
 
 
 @pytest.fixture(scope="module")
-def solved() -> Solution:
+def solved() -> CaptureSolution:
     return solve(PROBLEM.game)
 
 
 @pytest.fixture(scope="module")
-def certificate(solved: Solution) -> Certificate:
+def certificate(solved: CaptureSolution) -> Certificate:
     return certify(solved)
 
 
@@ -39,10 +44,10 @@ def certificate(solved: Solution) -> Certificate:
     ],
 )
 def test_screen_and_json_agree_on_the_claim(
-    found: int, said: str, is_claimed: bool, solved: Solution, certificate: Certificate
+    found: int, said: str, is_claimed: bool, solved: CaptureSolution, certificate: Certificate
 ) -> None:
     scanned = replace(certificate, directions_tried=120, directions_found=found)
-    report = Report(PROBLEM, solved, scanned, None)
+    report = PursuitReport(PROBLEM, solved, scanned, None)
 
     assert saddle_point(scanned).startswith(said)
     assert any(said in str(part) for part in report_lines(report))

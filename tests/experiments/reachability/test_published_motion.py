@@ -17,7 +17,7 @@ from benchmarks import published_radius
 from infoset.arrays import Floats
 from infoset.experiments.common.hill_axes import from_paper, to_paper
 from infoset.experiments.common.input_file import load_problem
-from infoset.experiments.common.printed_numbers import Comparison, Verdict, read_paper
+from infoset.experiments.common.printed_numbers import NumberComparison, NumberVerdict, read_paper
 from infoset.experiments.reachability.published import PROBLEM, printed_tables, published_motion
 from infoset.experiments.reproduced_numbers import reproduce_paper
 from infoset.rendezvous.reachability import minimum_energy, solve
@@ -79,7 +79,7 @@ def states(number: int) -> tuple[Floats, Floats]:
 
 
 @pytest.fixture(scope="module")
-def numbers() -> dict[tuple[int, str], Comparison]:
+def numbers() -> dict[tuple[int, str], NumberComparison]:
     """Verdicts by table and name without unit."""
     found = reproduce_paper(read_paper("reachability"), lambda _done: None)
     return {
@@ -98,7 +98,7 @@ def test_the_motion_as_published_is_equation_1_with_a_radius_of_90_km() -> None:
 
 @pytest.mark.parametrize(("number", "misprints"), [(1, [(2, 1), (3, 1)]), (3, [(4, 6)])])
 def test_a_control_gives_the_nonlinear_column(
-    number: int, misprints: list[tuple[int, int]], numbers: dict[tuple[int, str], Comparison]
+    number: int, misprints: list[tuple[int, int]], numbers: dict[tuple[int, str], NumberComparison]
 ) -> None:
     """Table 1: the control of minimum energy; table 3: the printed controls, with the effect of
     their rounding.
@@ -112,12 +112,12 @@ def test_a_control_gives_the_nonlinear_column(
     off = np.abs(computed - TABLES[number - 1].nonlinear) > rounding
     assert [(t + 1, component + 1) for t, component in np.argwhere(off)] == misprints
     for t, component in np.ndindex(4, 6):
-        expected = Verdict.MISPRINT if off[t, component] else Verdict.EXPLAINED
+        expected = NumberVerdict.MISPRINT if off[t, component] else NumberVerdict.EXPLAINED
         assert numbers[number, f"nonlinear x{component + 1}({t + 1})"].verdict is expected
 
 
 def test_nonlinear_less_linear_of_table_2_is_that_of_the_model(
-    numbers: dict[tuple[int, str], Comparison],
+    numbers: dict[tuple[int, str], NumberComparison],
 ) -> None:
     """The difference hardly depends on the control, of which four printed numbers are misprints."""
     computed, _ = states(2)
@@ -132,14 +132,18 @@ def test_nonlinear_less_linear_of_table_2_is_that_of_the_model(
         numbers[2, f"nonlinear x{component + 1}({t + 1})"].verdict
         for t, component in np.ndindex(4, 6)
     ]
-    assert found == [Verdict.EXPLAINED] * 24
+    assert found == [NumberVerdict.EXPLAINED] * 24
 
 
 @pytest.mark.parametrize(
     ("number", "column", "t", "component"), [(1, 1, 2, 1), (1, 1, 3, 1), (3, 0, 2, 3), (3, 1, 4, 6)]
 )
 def test_misprints_follow_from_the_other_numbers(
-    number: int, column: int, t: int, component: int, numbers: dict[tuple[int, str], Comparison]
+    number: int,
+    column: int,
+    t: int,
+    component: int,
+    numbers: dict[tuple[int, str], NumberComparison],
 ) -> None:
     """Minimum and maximum value over all controls that round to the printed ones and lead to the
     other positions.
@@ -164,7 +168,7 @@ def test_misprints_follow_from_the_other_numbers(
         assert answer.success
         ends.append(middle[column, t - 1, component - 1] + sign * answer.fun)
     found = numbers[number, f"{('linear', 'nonlinear')[column]} x{component}({t})"]
-    assert found.verdict is Verdict.MISPRINT
+    assert found.verdict is NumberVerdict.MISPRINT
     assert found.number.corrected is not None
     decimals = len(found.number.corrected.partition(".")[2])
     assert {f"{end:.{decimals}f}" for end in ends} == {found.number.corrected}

@@ -680,10 +680,10 @@ SQUARE = Zonotope([0, 0], [[1, 0], [0, 1]])
         (lambda: Zonotope([0, np.nan], []), ValueError, "centre must be finite"),
         (lambda: SQUARE + Zonotope([0], []), ValueError, r"other must be a set in R\^2"),
         (
-            lambda: SQUARE.intersection("x"),
+            lambda: SQUARE.intersection("x"),  # type: ignore[arg-type]
             TypeError,
             r"other must be a set \(ConvexPolygons, Polytope or Zonotope\)",
-        ),  # type: ignore[arg-type]
+        ),
         (lambda: SQUARE & rotated_boxes(1), ValueError, r"other must be a set in R\^2"),
         (lambda: SQUARE + np.ones(3), ValueError, r"offset must have the shape \(2,\)"),
         (lambda: np.eye(3) @ SQUARE, ValueError, "matrix must have the shape"),
@@ -694,10 +694,10 @@ SQUARE = Zonotope([0, 0], [[1, 0], [0, 1]])
         (lambda: SQUARE.cut([1, 2, 3], 0, 1), ValueError, "normals must have the shape"),
         (lambda: SQUARE.cut([1, 0], np.nan, 1), ValueError, "lower must be a number"),
         (
-            lambda: Polytope.from_zonotope([0, 0]),
+            lambda: Polytope.from_zonotope([0, 0]),  # type: ignore[arg-type]
             TypeError,
             "zonotope must be of the type Zonotope",
-        ),  # type: ignore[arg-type]
+        ),
         (
             lambda: ConvexPolygons.from_zonotope(rotated_boxes(1)),
             ValueError,

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from infoset.rendezvous.multipoint import Meet, Target, Tour
+from infoset.rendezvous.multipoint import Meet, Tour, TourTarget
 from infoset.rendezvous.relative_motion import ClohessyWiltshire
 
 Make = Callable[..., Tour]
@@ -29,7 +29,7 @@ def tours() -> Make:
 
     def make(count: int, meets: Sequence[Meet] = (), dwell_s: Sequence[float] = ()) -> Tour:
         visits = zip(meets or [Meet.FLYBY] * count, dwell_s or [0.0] * count, strict=True)
-        targets = tuple(Target(f"T{number}", *visit) for number, visit in enumerate(visits, 1))
+        targets = tuple(TourTarget(f"T{number}", *visit) for number, visit in enumerate(visits, 1))
         return Tour(ClohessyWiltshire(RATE), targets, TARGETS[:count], np.zeros(6))
 
     return make

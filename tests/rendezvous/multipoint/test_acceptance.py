@@ -12,9 +12,9 @@ import pytest
 from infoset.rendezvous.multipoint import (
     Meet,
     Nodes,
-    Target,
     TimeLimits,
     Tour,
+    TourTarget,
     best_order,
     best_order_of_slots,
     best_times,
@@ -146,7 +146,7 @@ def test_free_space_is_a_cubic_spline() -> None:
 def test_out_and_back() -> None:
     # Out to 1 and back to 0 within T = 1: best t1 = 2 - sqrt 2, I = 1.5 (1 + sqrt 2)^4.
     motion, nodes = double_integrator([1.0, 0.0], [0.5, 1.0])
-    tour = Tour(motion, (Target("out"), Target("back")), nodes.arrive, np.zeros(6))
+    tour = Tour(motion, (TourTarget("out"), TourTarget("back")), nodes.arrive, np.zeros(6))
     found = best_times(tour, (0, 1), TimeLimits(latest_s=1.0))
     assert found.time_s[0] == pytest.approx(2.0 - np.sqrt(2.0), rel=1e-9)
     assert found.path.cost == pytest.approx(1.5 * (1.0 + np.sqrt(2.0)) ** 4, rel=1e-11)

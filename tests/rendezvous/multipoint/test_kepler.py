@@ -18,7 +18,7 @@ from infoset.rendezvous.multipoint import (
     Meet,
     NotSettledError,
     Path,
-    Target,
+    TourTarget,
 )
 from infoset.rendezvous.multipoint._shooting import propagate
 from infoset.rendezvous.two_body import coast
@@ -46,7 +46,7 @@ def tour(
         ]
     )
     described = tuple(
-        Target(name, meet, dwell if meet is Meet.RENDEZVOUS else 0.0)
+        TourTarget(name, meet, dwell if meet is Meet.RENDEZVOUS else 0.0)
         for name, meet in zip("ab", meets, strict=True)
     )
     return KeplerTour(described, states, np.zeros(2), 1.0, START)
@@ -135,7 +135,7 @@ to the largest.
 def test_flybys_shortly_one_after_another_are_met() -> None:
     # More than 100 times the gravity: steps of the coasting orbit missed by 1e-8 of the distance.
     states = np.array([circular(1.1, 0.1, 0.0), circular(0.9, 0.1, 0.05)])
-    case = KeplerTour((Target("a"), Target("b")), states, np.zeros(2), 1.0, START)
+    case = KeplerTour((TourTarget("a"), TourTarget("b")), states, np.zeros(2), 1.0, START)
 
     path = case.fly((0, 1), [0.05, 0.1])
 
@@ -160,7 +160,7 @@ def random_visits(seed: int) -> tuple[KeplerTour, Floats]:
         ]
     )
     targets = tuple(
-        Target(str(at), Meet.FLYBY if random.random() < 0.6 else Meet.RENDEZVOUS)
+        TourTarget(str(at), Meet.FLYBY if random.random() < 0.6 else Meet.RENDEZVOUS)
         for at in range(count)
     )
     times = random.uniform(0.02, 0.3) + gap * np.arange(count)
@@ -224,7 +224,7 @@ def relative_to_a_circle(x: float, y: float, x_rate: float, y_rate: float) -> Fl
 )
 def test_a_chaser_may_start_on_any_conic(start: Floats) -> None:
     target = np.array([[1.0, 0.0, 0.0, 0.0, 1.0, 0.0]])
-    case = KeplerTour((Target("station", Meet.RENDEZVOUS),), target, np.zeros(1), 1.0, start)
+    case = KeplerTour((TourTarget("station", Meet.RENDEZVOUS),), target, np.zeros(1), 1.0, start)
 
     path = case.fly((0,), [1.0])
 
@@ -241,7 +241,9 @@ def with_energy(time: float, values: Floats) -> Floats:
 def test_targets_may_be_on_any_conic() -> None:
     # An escaping target, whose state is known at an epoch after the visit.
     state = np.array([0.9, -1.3, 0.1, 1.5, 0.4, -0.2])
-    case = KeplerTour((Target("comet"),), coast(state, 3.0, 1.0)[None], np.array([3.5]), 1.0, START)
+    case = KeplerTour(
+        (TourTarget("comet"),), coast(state, 3.0, 1.0)[None], np.array([3.5]), 1.0, START
+    )
 
     path = case.fly((0,), [0.5])
 
@@ -251,12 +253,12 @@ def test_targets_may_be_on_any_conic() -> None:
 
 def test_a_start_at_the_centre_is_refused() -> None:
     with pytest.raises(ValueError, match="at the attracting point"):
-        KeplerTour((Target("a"),), START[None], np.zeros(1), 1.0, np.zeros(6))
+        KeplerTour((TourTarget("a"),), START[None], np.zeros(1), 1.0, np.zeros(6))
 
 
 def test_what_cannot_be_reached_is_told() -> None:
     # Straight across, through the centre.
-    across = (Target("a"),), np.array([circular(1.0, np.pi, 0.0)]), np.zeros(1), 1.0
+    across = (TourTarget("a"),), np.array([circular(1.0, np.pi, 0.0)]), np.zeros(1), 1.0
     with pytest.raises(NotSettledError, match="give visits more time"):
         KeplerTour(*across, START).fly((0,), [0.02])
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from infoset.arrays import Floats
-from infoset.rendezvous.multipoint import Meet, Target, Tour, solve_segments
+from infoset.rendezvous.multipoint import Meet, Tour, TourTarget, solve_segments
 from infoset.rendezvous.relative_motion import (
     ClohessyWiltshire,
     EllipticOrbit,
@@ -44,7 +44,7 @@ def some_tour(
         for _ in range(count)
     ]
     targets = tuple(
-        Target(
+        TourTarget(
             str(index),
             meet,
             float(random.uniform(50.0, 300.0)) if dwell and meet is Meet.RENDEZVOUS else 0.0,

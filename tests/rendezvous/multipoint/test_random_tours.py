@@ -12,9 +12,9 @@ from scipy.optimize import minimize
 from infoset.arrays import Floats
 from infoset.rendezvous.multipoint import (
     Meet,
-    Target,
     TimeLimits,
     Tour,
+    TourTarget,
     best_order,
     best_times,
 )
@@ -66,7 +66,7 @@ def some_tour(
         ]
     )
     targets = tuple(
-        Target(str(at), meet, float(stay))
+        TourTarget(str(at), meet, float(stay))
         for at, (meet, stay) in enumerate(zip(meets, stays, strict=True))
     )
     scale = np.array([1.0 / rate] * 3 + [1.0] * 3) * 10.0 ** random.uniform(-2.0, 1.0)

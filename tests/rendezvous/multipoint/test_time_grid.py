@@ -9,9 +9,9 @@ from infoset.arrays import Floats
 from infoset.rendezvous.multipoint import (
     Effort,
     Meet,
-    Target,
     TimeLimits,
     Tour,
+    TourTarget,
     best_order,
     best_times,
     optimise_times,
@@ -37,7 +37,7 @@ def random_tour(
     states = random.normal(size=(len(meets), 6)) * np.array([0.3, 1.0, 0.3, 0.3, 0.3, 0.3])
     states[:, 4] = -2.0 * states[:, 0]
     targets = tuple(
-        Target(str(number), meet, dwell_s if meet is RENDEZVOUS else 0.0)
+        TourTarget(str(number), meet, dwell_s if meet is RENDEZVOUS else 0.0)
         for number, meet in enumerate(meets)
     )
     start = np.append(0.2 * random.normal(size=2), np.zeros(4))
@@ -46,7 +46,7 @@ def random_tour(
 
 TWO_FLYBYS = Tour(
     ClohessyWiltshire(0.0001981097250033099),
-    (Target("A"), Target("B")),
+    (TourTarget("A"), TourTarget("B")),
     np.array(
         [
             [-319.12593, 56.976535, -138.41578, 0.023090731, 0.1264439, -0.0145156],

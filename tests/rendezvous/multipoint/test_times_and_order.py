@@ -8,9 +8,9 @@ import pytest
 from infoset.rendezvous.multipoint import (
     Meet,
     NotSettledError,
-    Target,
     TimeLimits,
     Tour,
+    TourTarget,
     best_order,
     best_order_of_slots,
     best_times,
@@ -30,7 +30,7 @@ def random_tour(seed: int, count: int, share: float) -> Tour:
     random = np.random.default_rng(seed)
     motion = ClohessyWiltshire(1.1e-3)
     targets = tuple(
-        Target(str(index), Meet.RENDEZVOUS if random.random() < share else Meet.FLYBY)
+        TourTarget(str(index), Meet.RENDEZVOUS if random.random() < share else Meet.FLYBY)
         for index in range(count)
     )
     states = random.normal(size=(count, 6)) * np.array([300.0, 3000.0, 150.0, 0.1, 0.3, 0.1])
@@ -79,7 +79,7 @@ def with_a_stay(meet_all: Meet) -> Tour:
     meets = [meet_all, meet_all, Meet.RENDEZVOUS, meet_all, Meet.RENDEZVOUS]
     stays = [0.0, 0.0, 2000.0, 0.0, 0.0]
     targets = tuple(
-        Target(name, meet, stay)
+        TourTarget(name, meet, stay)
         for name, meet, stay in zip(
             ["alpha", "charlie", "bravo", "delta", "echo"], meets, stays, strict=True
         )
@@ -111,7 +111,9 @@ def test_visits_that_just_fit_are_not_refused_for_rounding(seed: int) -> None:
     stays = random.uniform(10.0, 900.0, size=3)
     gap = float(random.uniform(10.0, 900.0))
     start_s = float(random.uniform(-1e5, 0.0))
-    targets = tuple(Target(str(at), Meet.RENDEZVOUS, float(stay)) for at, stay in enumerate(stays))
+    targets = tuple(
+        TourTarget(str(at), Meet.RENDEZVOUS, float(stay)) for at, stay in enumerate(stays)
+    )
     tour = Tour(motion, targets, random.normal(size=(3, 6)), random.normal(size=6), start_s)
     order = tuple(
         int(each) for each in np.argsort(stays)
@@ -131,7 +133,7 @@ def test_a_price_counts_from_the_start() -> None:
     motion = ClohessyWiltshire(1e-3)
     start_s = -5000.0
     state = np.array([[100.0, 0.0, 0.0, 0.0, 0.0, 0.0]])
-    tour = Tour(motion, (Target("T"),), state, np.zeros(6), start_s)
+    tour = Tour(motion, (TourTarget("T"),), state, np.zeros(6), start_s)
     limits = TimeLimits(0.0, price_per_s=1e-8)
     found = best_times(tour, (0,), limits)
     times = np.linspace(start_s + 10.0, 0.0, 2000)
@@ -144,7 +146,7 @@ def test_times_are_best_where_gaps_differ_by_orders_of_magnitude() -> None:
     # One scale for all gaps stopped short: 7.64e15 m^2/s^3 for 5.05e15.
     motion = ClohessyWiltshire(0.0001160954816406749)
     stays = (0.0, 0.0, 1668.0, 2202.0)
-    targets = tuple(Target(str(at), Meet.RENDEZVOUS, stay) for at, stay in enumerate(stays))
+    targets = tuple(TourTarget(str(at), Meet.RENDEZVOUS, stay) for at, stay in enumerate(stays))
     states = np.array(
         [
             [-8445.0, 1719.0, -67260.0, 0.9361, 3.103, 2.776],

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import pytest
 
-from infoset.rendezvous.pursuit_evasion import Game, Gravity, Player, Solution, solve
+from infoset.rendezvous.pursuit_evasion import CaptureSolution, Game, Gravity, Player, solve
 from infoset.rendezvous.two_body import OrbitalElements
 
 MU_M3_S2 = 398600.4418e9
@@ -89,6 +89,6 @@ def low() -> MakeGame:
 
 
 @pytest.fixture(scope="session")
-def solved(slides: MakeGame) -> Solution:
+def solved(slides: MakeGame) -> CaptureSolution:
     """The slides' case, 20 against 10 N."""
     return solve(slides())

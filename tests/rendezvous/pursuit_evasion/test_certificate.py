@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from infoset.rendezvous.pursuit_evasion import PathError, Policy, Solution, certify, solve
+from infoset.rendezvous.pursuit_evasion import CaptureSolution, PathError, Policy, certify, solve
 from infoset.rendezvous.pursuit_evasion.game import scaled_craft
 from infoset.rendezvous.pursuit_evasion.paths import steered_path
 
@@ -41,7 +41,9 @@ def test_oblateness_passes_the_second_integrator(low: MakeGame) -> None:
     assert 1.0 < abs(solution.capture.time_s - round_planet.capture.time_s) < 60.0
 
 
-def test_an_evader_that_coasts_instead_is_captured_as_one_without_thrust(solved: Solution) -> None:
+def test_an_evader_that_coasts_instead_is_captured_as_one_without_thrust(
+    solved: CaptureSolution,
+) -> None:
     coast = next(each for each in certify(solved).evader_deviations if each.name == "coast")
     assert solved.capture is not None
     assert coast.capture_s is not None
@@ -52,7 +54,7 @@ def test_an_evader_that_coasts_instead_is_captured_as_one_without_thrust(solved:
     assert 34e3 < prograde.capture_s < 35e3
 
 
-def test_all_directions_are_looked_in(solved: Solution) -> None:
+def test_all_directions_are_looked_in(solved: CaptureSolution) -> None:
     certificate = certify(solved, all_directions=True)
     assert certificate.claims_saddle_point
     assert certificate.directions_tried == 120
@@ -65,7 +67,7 @@ def test_all_directions_are_looked_in(solved: Solution) -> None:
     ("found", "is_claimed"), [(120, True), (73, True), (60, True), (59, False), (1, False)]
 )
 def test_saddle_point_is_not_claimed_if_more_than_half_of_the_directions_are_undecided(
-    found: int, is_claimed: bool, solved: Solution
+    found: int, is_claimed: bool, solved: CaptureSolution
 ) -> None:
     certificate = replace(certify(solved), directions_tried=120, directions_found=found)
     assert certificate.failures == ()
@@ -82,7 +84,7 @@ def test_a_pursuer_that_does_better_alone_is_told(slides: MakeGame) -> None:
     assert any("the pursuer alone captures" in each for each in certificate.failures)
 
 
-def test_a_capture_that_is_off_is_told(solved: Solution) -> None:
+def test_a_capture_that_is_off_is_told(solved: CaptureSolution) -> None:
     assert solved.capture is not None
     node = solved.capture.extremal
     off = replace(node, pursuer=node.pursuer + 1e-5, duration=node.duration * 1.001)
@@ -93,7 +95,7 @@ def test_a_capture_that_is_off_is_told(solved: Solution) -> None:
 
 
 def test_a_path_that_turns_too_fast_is_told(
-    solved: Solution, monkeypatch: pytest.MonkeyPatch
+    solved: CaptureSolution, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("infoset.rendezvous.pursuit_evasion.paths._MAX_RATES", 100)
     evader = scaled_craft(solved.game.evader, solved.game.gravity, solved.units)

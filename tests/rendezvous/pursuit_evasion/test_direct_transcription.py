@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import minimize
 
 from infoset.arrays import Floats
-from infoset.rendezvous.pursuit_evasion import Solution
+from infoset.rendezvous.pursuit_evasion import CaptureSolution
 from infoset.rendezvous.pursuit_evasion.game import scaled_craft
 from infoset.rendezvous.pursuit_evasion.paths import extremal_paths
 
@@ -49,7 +49,7 @@ def fly_batch(
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("seed", [0, 1])
-def test_no_steering_captures_the_fixed_path_earlier(seed: int, solved: Solution) -> None:
+def test_no_steering_captures_the_fixed_path_earlier(seed: int, solved: CaptureSolution) -> None:
     assert solved.capture is not None
     game = solved.game
     units = solved.units

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from infoset.rendezvous.pursuit_evasion import (
+    CaptureSolution,
     Ended,
     Observation,
     Policy,
-    Solution,
     Steering,
     fly,
     solve,
@@ -28,7 +28,7 @@ PUBLISHED: list[tuple[str, Steering | None, float]] = [
     ("name", "steering", "capture_s"), PUBLISHED, ids=[each[0] for each in PUBLISHED]
 )
 def test_receding_horizon(
-    name: str, steering: Steering | None, capture_s: float, solved: Solution
+    name: str, steering: Steering | None, capture_s: float, solved: CaptureSolution
 ) -> None:
     flight = fly(solved.game, steering, solution=solved)
     assert flight.ended is Ended.CAPTURED
@@ -41,7 +41,7 @@ def test_receding_horizon(
 
 @pytest.mark.parametrize("policy", [Policy.NORMAL, Policy.RETROGRADE])
 def test_what_a_held_plan_loses_vanishes_with_the_time_it_is_held(
-    policy: Policy, solved: Solution
+    policy: Policy, solved: CaptureSolution
 ) -> None:
     # Within a leg the pursuer does not answer: its loss is of high order in the leg.
     losses = [

@@ -12,11 +12,11 @@ from scipy.optimize import fsolve
 from infoset.arrays import Floats
 from infoset.rendezvous.pursuit_evasion import (
     Capture,
+    CaptureSolution,
+    CertificateVerdict,
     Game,
     Gravity,
     Player,
-    Solution,
-    Verdict,
     solve,
 )
 from infoset.rendezvous.pursuit_evasion._branch import Ending, follow
@@ -32,8 +32,8 @@ OFFSET_M = np.array([100e3, 1500e3, 200e3])
 DRIFT_M_S = np.array([10.0, -20.0, 15.0])
 
 
-def captured(solution: Solution) -> Capture:
-    assert solution.verdict is Verdict.CAPTURED
+def captured(solution: CaptureSolution) -> Capture:
+    assert solution.verdict is CertificateVerdict.CAPTURED
     assert solution.capture is not None
     return solution.capture
 
@@ -98,14 +98,20 @@ def test_an_evader_that_is_not_weaker_is_not_said_to_be_captured(
     assert solution.capture is None
     assert (solution.curve.distance_m > radius_m).all()
     if thrust_n == 20.0:
-        assert (solution.verdict, solution.exhausted) == (Verdict.ESCAPES, "pursuer")
+        assert (solution.verdict, solution.exhausted) == (CertificateVerdict.ESCAPES, "pursuer")
     else:  # its propellant is spent first: what it does then is not looked at
-        assert (solution.verdict, solution.exhausted) == (Verdict.PROPELLANT_EXHAUSTED, "evader")
+        assert (solution.verdict, solution.exhausted) == (
+            CertificateVerdict.PROPELLANT_EXHAUSTED,
+            "evader",
+        )
 
 
 def test_propellant_that_is_spent_too_early(slides: MakeGame) -> None:
     solution = solve(slides(dry_kg=1800.0))
-    assert (solution.verdict, solution.exhausted) == (Verdict.PROPELLANT_EXHAUSTED, "pursuer")
+    assert (solution.verdict, solution.exhausted) == (
+        CertificateVerdict.PROPELLANT_EXHAUSTED,
+        "pursuer",
+    )
     assert solution.looked_at_s == pytest.approx(200.0 * 350.0 * 9.80665 / 20.0)
     assert solution.looked_at_s < 45343.6
 
@@ -113,7 +119,7 @@ def test_propellant_that_is_spent_too_early(slides: MakeGame) -> None:
 def test_a_game_is_looked_at_as_long_as_it_says(slides: MakeGame) -> None:
     game = slides()
     solution = solve(Game(game.gravity, game.pursuer, game.evader, longest_s=20e3))
-    assert (solution.verdict, solution.exhausted) == (Verdict.ESCAPES, None)
+    assert (solution.verdict, solution.exhausted) == (CertificateVerdict.ESCAPES, None)
     assert solution.looked_at_s == pytest.approx(20e3, rel=1e-6)
 
 
@@ -217,7 +223,7 @@ def test_where_the_branch_folds_another_one_keeps_the_evader_farther(slides: Mak
     game = slides(18.0, anomaly_deg=330.0)
     plain = solve(game, change_branch=False)
     changed = solve(game)
-    assert plain.verdict is Verdict.BRANCH_NOT_CERTIFIED
+    assert plain.verdict is CertificateVerdict.BRANCH_NOT_CERTIFIED
     assert plain.capture is None
     assert captured(changed).time_s > plain.looked_at_s
     assert changed.branch_changes > 0
@@ -238,5 +244,5 @@ def test_a_capture_that_misses_the_conditions_is_not_returned(
 
     monkeypatch.setattr(Pair, "solve", inexact)
     solution = solve(game, change_branch=False)
-    assert solution.verdict is Verdict.BRANCH_NOT_CERTIFIED
+    assert solution.verdict is CertificateVerdict.BRANCH_NOT_CERTIFIED
     assert solution.capture is None

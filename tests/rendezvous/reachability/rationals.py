@@ -9,7 +9,7 @@ from math import lcm
 import numpy as np
 
 from infoset.arrays import Floats
-from infoset.rendezvous.reachability.problem import Block
+from infoset.rendezvous.reachability.problem import StateBlock
 from tests.rationals import Fraction
 
 with suppress(ModuleNotFoundError):  # tests that need it are skipped
@@ -85,7 +85,7 @@ def rational_intersection(normals: Floats, offsets: Floats) -> RationalSet:
     return rounded(polyhedron)
 
 
-def rational_sets(block: Block) -> tuple[list[RationalSet], list[RationalSet]]:
+def rational_sets(block: StateBlock) -> tuple[list[RationalSet], list[RationalSet]]:
     """Return the exact forward sets of a block and its exact tube to zero, at t = 0..T.
 
     Thrust is in a box and constraints hold at whole periods; floats are taken as the rationals they
@@ -125,7 +125,7 @@ def rational_sets(block: Block) -> tuple[list[RationalSet], list[RationalSet]]:
     ]
 
 
-def _step(block: Block, period: int, before: int, after: int) -> ppl.C_Polyhedron:
+def _step(block: StateBlock, period: int, before: int, after: int) -> ppl.C_Polyhedron:
     """States (first index: before), controls and next states (after) of a period, states
     unconstrained.
     """

@@ -14,10 +14,10 @@ from infoset.experiments.common.hill_axes import to_paper
 from infoset.rendezvous.reachability import (
     MotionModel,
     NonlinearMotion,
-    SetCounts,
     SetKind,
     Solution,
     ThrustShape,
+    VertexCounts,
     effort,
     min_periods,
     minimum_energy,
@@ -99,12 +99,12 @@ def test_bounds_of_forward_sets_and_tube(exact: Solution) -> None:
 def test_counts(exact: Solution, paper: Paper) -> None:
     found = [exact.sets.counts(SetKind.FORWARD, t) for t in range(1, 5)]
     assert found == [
-        SetCounts(10, 7, 3),
-        SetCounts(130, 15, 6),
-        SetCounts(100, 15, 6),
-        SetCounts(96, 15, 6),
+        VertexCounts(10, 7, 3),
+        VertexCounts(130, 15, 6),
+        VertexCounts(100, 15, 6),
+        VertexCounts(96, 15, 6),
     ]
-    assert exact.sets.counts(SetKind.TUBE, 2) == SetCounts(27, 9, 6)
+    assert exact.sets.counts(SetKind.TUBE, 2) == VertexCounts(27, 9, 6)
     dimensions = [exact.sets.counts(SetKind.TUBE, t) for t in (1, 3)]
     assert [each.dimension for each in dimensions if each is not None] == [3, 3]
     assert solve(paper(thrust=ThrustShape.BALL)).sets.counts(SetKind.TUBE, 2) is None

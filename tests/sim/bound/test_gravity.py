@@ -22,7 +22,7 @@ from infoset.guidance import Thruster
 from infoset.sim import Scenario, Sun
 from infoset.sim.bound.coasting import coasting
 from infoset.sim.bound.lower_bound import pair_at
-from infoset.sim.bound.pair_of_motions import Approach, TruthPair, later_impulses
+from infoset.sim.bound.pair_of_motions import PairApproach, TruthPair, later_impulses
 from infoset.sim.scenario import of_model
 from tests.space import in_space
 
@@ -350,7 +350,7 @@ def near_a_planet() -> Scenario:
 )
 def test_one_of_two_motions_misses_by_the_bound_in_two_body_gravity(scenario: Scenario) -> None:
     box = scenario.set_model.bounds
-    approach = Approach(scenario, box.x_m[1], box.vx_m_s[1])
+    approach = PairApproach(scenario, box.x_m[1], box.vx_m_s[1])
     pair = approach.best_pair()
     single = approach.single()
     assert pair.bound_m > 0.0
@@ -392,7 +392,7 @@ def test_the_bound_of_pairs_changes_gradually_with_gravity() -> None:
     common step.
     """
     bounds = [
-        Approach(scenario, 140000.5e3, -1999.99).best_pair().bound_m
+        PairApproach(scenario, 140000.5e3, -1999.99).best_pair().bound_m
         for scenario in (
             replace(strong(1.0), sun=None),
             *map(strong, (0.01, 1.0, 5.0, 7.9, 8.1, 8.5, 20.0, 40.0, 80.0)),

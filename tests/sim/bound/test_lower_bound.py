@@ -22,7 +22,7 @@ from infoset.guidance import Thruster
 from infoset.sim import Scenario, Sun
 from infoset.sim.bound.lower_bound import lower_bound, pair_at
 from infoset.sim.bound.pair_flight import fly_pair
-from infoset.sim.bound.pair_of_motions import Approach, TruthPair
+from infoset.sim.bound.pair_of_motions import PairApproach, TruthPair
 from infoset.sim.scenario import of_model
 from tests.space import in_space
 
@@ -425,7 +425,7 @@ def test_best_pair_is_the_best_of_all_last_common_steps(case: str) -> None:
     """
     scenario = load_scenario(CASES / f"{case}.toml")
     box = scenario.set_model.bounds
-    approach = Approach(scenario, box.x_m[1], box.vx_m_s[0])
+    approach = PairApproach(scenario, box.x_m[1], box.vx_m_s[0])
 
     found = approach.best_pair()
 

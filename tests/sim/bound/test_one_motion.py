@@ -14,7 +14,7 @@ from infoset.guidance import Thruster, make_strategy
 from infoset.sim import Scenario
 from infoset.sim.bound.lower_bound import lower_bound, pair_at
 from infoset.sim.bound.pair_flight import fly_pair
-from infoset.sim.bound.pair_of_motions import Approach
+from infoset.sim.bound.pair_of_motions import PairApproach
 from infoset.sim.scenario import of_model
 from tests.space import in_space
 
@@ -99,7 +99,7 @@ def test_the_middle_of_a_pair_adds_nothing_to_pair_and_single_motion() -> None:
     """
     for low_m in (0.0, 4e3, 4.9e3, 6e3):
         scenario = offset((low_m, low_m + 200.0))
-        approach = Approach(scenario, 5801.3e3, -58e3)
+        approach = PairApproach(scenario, 5801.3e3, -58e3)
         single = approach.single()
         pair = approach.best_pair()
         spent = single.correction_m - pair.correction_m
