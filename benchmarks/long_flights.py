@@ -1,5 +1,5 @@
 """Cost of long flights: time, vertices, sections and memory against the number of steps; table of
-docs/performance.md.
+docs/measured/performance.md.
 
     python -m benchmarks.long_flights
     python -m benchmarks.long_flights --strategies symmetric-miss,patient,kalman

@@ -97,7 +97,7 @@ nitpick_ignore = [
         "infoset.rendezvous.pursuit_evasion._pair": ("Node",),
         "infoset.rendezvous.pursuit_evasion.paths": ("SteeredPath",),
         "infoset.rendezvous.reachability.sets": ("ExactSets", "LiftedSets"),
-        "infoset.rendezvous.reachability.problem": ("Block",),
+        "infoset.rendezvous.reachability.problem": ("StateBlock",),
         "infoset.rendezvous.reachability.admissible": ("Lifted",),
         "infoset.rendezvous.reachability.optimum": ("BlockOptimum",),
         "infoset.sim.bound.pair_of_motions": ("TruthPair",),

@@ -316,11 +316,10 @@ class LinearObserver:
     initial : ConvexPolygons, Polytope or Zonotope
         Set of the state at step 0, before its measurement; for two states also one polygon for each
         run, shape (B,).
-    noise : array_like, shape (), (q,) or (K, q), or ConvexPolygons, Polytope or Zonotope, or a
-    sequence of these sets
-        Half-widths of the box V, those of each step, V, or V of each step.
-    disturbance : ConvexPolygons, Polytope or Zonotope, or a sequence of them, or array_like, shape
-    (n,) or (K, n)
+    noise : array_like, shape (), (q,) or (K, q), or a set, or a sequence of sets
+        Half-widths of the box V, those of each step, V, or V of each step. A set is a
+        ConvexPolygons, a Polytope or a Zonotope.
+    disturbance : array_like, shape (n,) or (K, n), or a set, or a sequence of sets
         W, W of each step, or half-widths of a box W; without it (optional) the point 0.
     input_matrix : array_like, shape (n, p) or (K, n, p), optional
         B.
