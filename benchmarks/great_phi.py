@@ -73,7 +73,7 @@ class Watched:
             state = information._state
             nearest = state.lower_label[0]
             farthest = min(state.upper_label[0], information._min_label_next())
-            for label in living_labels(information, nearest, farthest):
+            for label in feasible_labels(information, nearest, farthest):
                 vertices = information.section_at(label).polygons[0].polygon()
                 if not len(vertices):
                     continue
@@ -91,25 +91,25 @@ class Watched:
         return maximum * (1.0 + model.speed_error)
 
 
-def living_labels(information: InformationSet, nearest: float, farthest: float) -> Floats:
-    """Return `LABELS` labels between the ends of the living ones, whose ends are bisected from as
+def feasible_labels(information: InformationSet, nearest: float, farthest: float) -> Floats:
+    """Return `LABELS` labels between the ends of the feasible ones, whose ends are bisected from as
     many labels.
     """
 
-    def lives(label: float) -> bool:
+    def is_feasible(label: float) -> bool:
         return len(information.section_at(label).polygons[0].polygon()) > 0
 
     coarse = np.linspace(nearest, farthest, LABELS)
-    living = np.flatnonzero([lives(label) for label in coarse])
-    if not len(living):
+    feasible = np.flatnonzero([is_feasible(label) for label in coarse])
+    if not len(feasible):
         return np.empty(0)
     ends = []
-    for last, dead in ((living[0], living[0] - 1), (living[-1], living[-1] + 1)):
+    for last, infeasible in ((feasible[0], feasible[0] - 1), (feasible[-1], feasible[-1] + 1)):
         inside = coarse[last]
-        outside = coarse[min(max(dead, 0), len(coarse) - 1)]
+        outside = coarse[min(max(infeasible, 0), len(coarse) - 1)]
         for _ in range(40):
             middle = 0.5 * (inside + outside)
-            inside, outside = (middle, outside) if lives(middle) else (inside, middle)
+            inside, outside = (middle, outside) if is_feasible(middle) else (inside, middle)
         ends.append(inside)
     return np.linspace(ends[0], ends[1], LABELS)
 

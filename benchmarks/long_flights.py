@@ -80,12 +80,12 @@ def of_steps(scenario: Scenario, steps: int) -> Scenario:
 
 
 def vertices(flight: Engagements) -> NDArray[np.int64]:
-    """Return the numbers of vertices of all living sections."""
+    """Return the numbers of vertices of all feasible sections."""
     state = flight._information._state
     records = state.sections.chains.records.reshape(-1, 2)
-    living = np.tile(state.living.ravel(), len(state.laws))
-    counts = (records["end"] - records["begin"])[: living.size]
-    return np.asarray(counts.sum(axis=1)[living])
+    feasible = np.tile(state.feasible.ravel(), len(state.laws))
+    counts = (records["end"] - records["begin"])[: feasible.size]
+    return np.asarray(counts.sum(axis=1)[feasible])
 
 
 def cost(scenario: Scenario, steps: int) -> Cost:

@@ -71,7 +71,7 @@ class Clock:
         def part(measured: Any, *others: Any) -> str:
             sections = others[-2]
             self.section_steps += int(
-                (sections.slots["living"] & (measured | sections.behind)[:, None]).sum()
+                (sections.slots["feasible"] & (measured | sections.behind)[:, None]).sum()
             )
             return SECTION_STEPS
 
@@ -106,7 +106,7 @@ def vertices(scenario: Scenario, together: int) -> tuple[float, float, int]:
     while flight.flying:
         flight.advance()
         sections = flight._information._state.sections
-        records = sections.chains.records.reshape(-1, 2)[sections.slots["living"].ravel()]
+        records = sections.chains.records.reshape(-1, 2)[sections.slots["feasible"].ravel()]
         if len(records):
             count = (records["end"] - records["begin"]).sum(axis=1)
             means.append(float(count.mean()))

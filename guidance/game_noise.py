@@ -196,7 +196,7 @@ def _ranges_of_corners(
     lower, upper = predicted.predicted_miss_by_section_m()
     is_upper = upper_is_worse[..., None]
     ranges = predicted.ranges_m
-    living = predicted.living & (ranges != 0.0)
+    feasible = predicted.feasible & (ranges != 0.0)
     rows = np.arange(len(ranges))
     side = np.where(is_upper, 1.0, -1.0)
     worst, other = (
@@ -204,8 +204,8 @@ def _ranges_of_corners(
         for corner in (np.where(is_upper, upper, lower), np.where(is_upper, lower, upper))
     )
     return (
-        ranges[rows, np.where(living, worst, -np.inf).argmax(axis=1)],
-        ranges[rows, np.where(living, other, np.inf).argmin(axis=1)],
+        ranges[rows, np.where(feasible, worst, -np.inf).argmax(axis=1)],
+        ranges[rows, np.where(feasible, other, np.inf).argmin(axis=1)],
     )
 
 

@@ -62,8 +62,8 @@ class LeastEffort:
         ranges = view.ranges_m
         pending = situation.pending_m(ranges / e)
         minimum, maximum = view.predicted_miss_by_section_m()
-        lower = _between(np.where(view.living, minimum - pending, NO_DEMAND_M))
-        upper = _between(np.where(view.living, maximum - pending, -NO_DEMAND_M))
+        lower = _between(np.where(view.feasible, minimum - pending, NO_DEMAND_M))
+        upper = _between(np.where(view.feasible, maximum - pending, -NO_DEMAND_M))
         ranges = _between(ranges)
         fastest = max(e, *(-vx for vx in view.model.bounds.vx_m_s)) / e
         authority = correctable_later_m(situation, ranges) / fastest

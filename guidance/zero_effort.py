@@ -38,12 +38,12 @@ class ZeroEffortMiss:
     def decide(self, situation: Situation, state: None) -> Floats:
         """Return the impulse that makes the miss of the middle zero, m/s."""
         lower, upper = situation.information.predicted_miss_by_section_m()
-        living = situation.information.living
+        feasible = situation.information.feasible
         e = situation.closing_speed_m_s
         ranges = situation.information.ranges_m
         # The addition keeps the weights positive if every section is a single point.
         width = upper - lower + np.finfo(np.float64).tiny
-        weight = np.where(living, width, 0.0)
+        weight = np.where(feasible, width, 0.0)
         weight = weight / np.maximum(weight.max(axis=-1, keepdims=True), np.finfo(np.float64).tiny)
         middle = 0.5 * (lower + upper)
         if situation.pending:

@@ -275,7 +275,7 @@ class InformationSet(InformationSetView):
         min_label = self._min_label_next()
         if self._state.min_label >= min_label:
             return False
-        return bool(((self._state.labels < min_label) & self.living).any())
+        return bool(((self._state.labels < min_label) & self.feasible).any())
 
     def _min_label_next(self) -> float:
         """Minimum label, m, whose range is not below the threshold after the next step."""
@@ -292,7 +292,7 @@ class InformationSet(InformationSetView):
 
     @property
     def _computes_phi(self) -> Flags:
-        """Engagements in which Phi is updated, also without a living label above the threshold."""
+        """Engagements in which Phi is updated, also without feasible labels above the threshold."""
         status = self._state.status
         return np.asarray((status != SetStatus.STOPPED.value) & (status != SetStatus.EMPTY.value))
 
@@ -315,7 +315,7 @@ class InformationSet(InformationSetView):
         if not some(empty):
             return empty
         self._state.refine(empty, 2 * self.model.fewest_sections + 1)
-        empty &= ~self.living.any(axis=1)
+        empty &= ~self.feasible.any(axis=1)
         self._state.status[empty] = emptied.value
         if emptied is SetStatus.EMPTY:
             self._state.status[empty & self._state.some_left] = SetStatus.REFUTED.value
@@ -335,32 +335,32 @@ class InformationSet(InformationSetView):
         history = self._state.history
         for b in np.flatnonzero(empty & (state.lost_step < 0)):
             state.lost_step[b] = history.elapsed
-            state.lost_label[b] = self._nearest_to_living(int(b), event, lower[b], upper[b])
+            state.lost_label[b] = self._nearest_to_feasible(int(b), event, lower[b], upper[b])
         if self.model.recovery is Recovery.NONE:
             return
         if event is not None:
             history.retract(event, empty)
         history.record(WIDENING, applies=empty)
-        # The sections that this measurement emptied live again; the refinement below recomputes
-        # their polygons.
+        # The labels that this measurement emptied are feasible again; the refinement below
+        # recomputes their polygons.
         slots = state.sections.slots
         stored = np.arange(slots.shape[1]) < state.sections.used[:, None]
-        killed = (slots["died"] == section_life.ALIVE) | (
-            slots["died"] == (-1 if event is None else event)
+        feasible_before = (slots["emptied_at"] == section_life.NEVER_EMPTIED) | (
+            slots["emptied_at"] == (-1 if event is None else event)
         )
-        slots["living"][empty] = (stored & killed)[empty]
+        slots["feasible"][empty] = (stored & feasible_before)[empty]
         state.lower_label[empty], state.upper_label[empty] = lower[empty], upper[empty]
         state.status[empty] = SetStatus.TRACKING.value
         state.refine(empty, 2 * self.model.fewest_sections + 1)
         state.status[empty & (self.section_counts == 0)] = SetStatus.EMPTY.value
 
-    def _nearest_to_living(self, b: int, event: int | None, lower: float, upper: float) -> float:
+    def _nearest_to_feasible(self, b: int, event: int | None, lower: float, upper: float) -> float:
         """Label, m, whose section was closest to the band of a measurement that emptied the set."""
         state = self._state
         sections = self._state.sections
         slots = sections.slots[b, : sections.used[b]]
-        killed = slots["died"] == event
-        if event is not None and killed.any():
-            return float(slots["label"][np.where(killed, slots["overlap"], -np.inf).argmax()])
+        emptied_now = slots["emptied_at"] == event
+        if event is not None and emptied_now.any():
+            return float(slots["label"][np.where(emptied_now, slots["overlap"], -np.inf).argmax()])
         middle = 0.5 * (state.lower_label[b] + state.upper_label[b])
         return float(min(max(middle, lower), upper))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from infoset.arrays import Flags, Floats
 from infoset.engine import section_life
 from infoset.engine.predicted_miss import ExtremePoints, PredictedMiss
-from infoset.engine.replays import PROBE, ROWS, past_of, replay_label
+from infoset.engine.replays import LAST_REPLAY, ROWS, past_of, replay_label
 from infoset.engine.set_state import SetState, SetStatus
 from infoset.geometry.convex_polygons import ConvexPolygons
 from infoset.limits import NUMBER, WHOLE, Limits
@@ -110,8 +110,8 @@ class SetQueries:
 
     @property
     def inconsistency(self) -> tuple[MaskedIntegers, MaskedFloats]:
-        """Step at which each set first became empty, and its label closest to living, m; masked if
-        it never did.
+        """Step at which each set first became empty, and its label closest to feasibility, m;
+        masked if it never did.
         """
         never = ~self.inconsistent
         return (
@@ -120,11 +120,11 @@ class SetQueries:
         )
 
     @property
-    def living(self) -> Flags:
-        """Whether each stored section lives, that is, is not empty, shape (B, S)."""
-        living = self._state.living.view()
-        living.flags.writeable = False
-        return living
+    def feasible(self) -> Flags:
+        """Whether each stored section is feasible, that is, not empty, shape (B, S)."""
+        feasible = self._state.feasible.view()
+        feasible.flags.writeable = False
+        return feasible
 
     @property
     def labels_m(self) -> Floats:
@@ -140,30 +140,30 @@ class SetQueries:
 
     @property
     def section_counts(self) -> NDArray[np.int64]:
-        """Number of living sections, shape (B,)."""
+        """Number of feasible sections, shape (B,)."""
         return self._state.section_counts
 
     def stored_range_interval_m(self) -> tuple[Floats, Floats]:
-        """Return the minimum and the maximum range of the living sections, m; zeros where none
-        lives.
+        """Return the minimum and the maximum range of the feasible sections, m; zeros where there
+        is none.
         """
         ranges = self.ranges_m
-        living = self.living
-        tracked = living.any(axis=1)
+        feasible = self.feasible
+        tracked = feasible.any(axis=1)
         rows = np.arange(len(ranges))
         # The labels increase with the slot.
-        minimum = ranges[rows, living.argmax(axis=1)]
-        maximum = ranges[rows, -1 - living[:, ::-1].argmax(axis=1)]
+        minimum = ranges[rows, feasible.argmax(axis=1)]
+        maximum = ranges[rows, -1 - feasible[:, ::-1].argmax(axis=1)]
         return np.where(tracked, minimum, 0.0), np.where(tracked, maximum, 0.0)
 
     def min_and_max_alpha(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Return the minimum and the maximum line-of-sight angle of the living sections, and their
-        ranges.
+        """Return the minimum and the maximum line-of-sight angle of the feasible sections, and
+        their ranges.
 
         Returns
         -------
         alpha_min, alpha_max, range_of_min, range_of_max : ndarray, shape (C, B)
-            rad and m; zeros where no section lives.
+            rad and m; zeros where no section is feasible.
         """
         minimum, maximum, of_min, of_max = self._state.extreme_angles()
         return minimum, maximum, of_min, of_max
@@ -191,13 +191,13 @@ class SetQueries:
         is empty.
         """
         summaries = self._state.summaries
-        living = self.living
+        feasible = self.feasible
         lower = summaries[..., section_life.LOWER_MISS]
         upper = summaries[..., section_life.UPPER_MISS]
-        return np.where(living, lower, 0.0), np.where(living, upper, 0.0)
+        return np.where(feasible, lower, 0.0), np.where(feasible, upper, 0.0)
 
     def sections(self, engagement: int = 0) -> list[Section]:
-        """Return the living sections of one engagement in order of increasing range."""
+        """Return the feasible sections of one engagement in order of increasing range."""
         self._need_engagement(engagement)
         state = self._state
         axes = range(len(self.axes))
@@ -207,7 +207,7 @@ class SetQueries:
             self._section(
                 labels[s], ranges[s], [state.polygon(axis, engagement, s) for axis in axes]
             )
-            for s in np.flatnonzero(self.living[engagement]).tolist()
+            for s in np.flatnonzero(self.feasible[engagement]).tolist()
         ]
 
     def _section(self, label_m: float, range_m: float, outlines: list[Floats]) -> Section:
@@ -241,10 +241,10 @@ class SetQueries:
         state = self._state
         label = float(label_m)
         past = past_of(state.history, state.table)
-        died = replay_label(label, engagement, past)
+        emptied_at = replay_label(label, engagement, past)
         outlines = [np.empty((0, 2)) for _ in self.axes]
-        if died == section_life.ALIVE:
-            rows = [ROWS * axis + PROBE for axis in range(len(self.axes))]
+        if emptied_at == section_life.NEVER_EMPTIED:
+            rows = [ROWS * axis + LAST_REPLAY for axis in range(len(self.axes))]
             outlines = [state.outline(past.room.chains, row, label) for row in rows]
         x = label - state.law.closing_speed * (state.law.step * state.elapsed)
         return self._section(label, x, outlines)

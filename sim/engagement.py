@@ -300,7 +300,7 @@ class Engagements:
                 if name in values:
                     sensor.cut(self._information, values, where)
                     sensor.cut(self._truth_section, values, where)
-            self._truth_section.look(where, sight)
+            self._truth_section.store_state(where, sight)
         self._measured = self._measured | kept
         return measured
 
@@ -398,10 +398,10 @@ class Engagements:
         if not (self._label_ends.ends_now(is_over) or information.sections_are_leaving()):
             information.drop_below_threshold()
             return
-        living = information.living.copy()
+        feasible = information.feasible.copy()
         labels = information.labels_m.copy()
         misses = np.stack(information.predicted_miss_by_section_m())
-        self._label_ends.end(information.drop_below_threshold(), living, is_over, labels, misses)
+        self._label_ends.end(information.drop_below_threshold(), feasible, is_over, labels, misses)
 
     def _control_is_over(self) -> Flags:
         """Return whether no later step can give an impulse: after the last one of the schedule, or

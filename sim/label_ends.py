@@ -63,14 +63,19 @@ class LabelEnds:
         self._misses_m[1] -= (impulse - doubt)[:, self._of] * to_go_s
 
     def end(
-        self, left: Flags, living: Flags, control_is_over: Flags, labels_m: Floats, misses_m: Floats
+        self,
+        left: Flags,
+        feasible: Flags,
+        control_is_over: Flags,
+        labels_m: Floats,
+        misses_m: Floats,
     ) -> None:
         """Add the sections whose control ends in this step.
 
         Parameters
         ----------
-        left, living : ndarray of bool, shape (B, S)
-            Sections that leave the set now, and those that lived before.
+        left, feasible : ndarray of bool, shape (B, S)
+            Sections that leave the set now, and those that were feasible before.
         control_is_over : ndarray of bool, shape (B,)
             Engagements in which no further impulse can be given.
         labels_m : ndarray, shape (B, S)
@@ -78,7 +83,7 @@ class LabelEnds:
         misses_m : ndarray, shape (2, C, B, S)
             Minimum and maximum predicted miss of each section along each lateral axis, m.
         """
-        of, slots = np.nonzero(np.where(control_is_over[:, None], living, left))
+        of, slots = np.nonzero(np.where(control_is_over[:, None], feasible, left))
         leaves = left[of, slots]
         counts = ~self._is_over[of]
         misses = misses_m[:, :, of, slots]

@@ -28,7 +28,7 @@ widens the set.
 
 
 @dataclass(frozen=True)
-class _Look:
+class _OutputTime:
     """True states of the flights that measure in a step, after some events; slopes have the shape
     (C, B).
     """
@@ -55,9 +55,9 @@ class TruthSection:
         self._exact_angles = model.is_guaranteed
         self._min_range_m = model.min_range_m
         self._history = History(len(laws), batch)
-        self._looks: list[_Look] = []
+        self._output_times: list[_OutputTime] = []
 
-    def look(self, where: Flags, sight: Sight) -> None:
+    def store_state(self, where: Flags, sight: Sight) -> None:
         """Store which flights measured in this step, after the measurements, and the true
         states.
         """
@@ -66,7 +66,9 @@ class TruthSection:
         if self._exact_angles:
             slope = sight.slope
             rate = sight.slope_rate_per_s
-        self._looks.append(_Look(self._history.elapsed, self._history.events, where, slope, rate))
+        self._output_times.append(
+            _OutputTime(self._history.elapsed, self._history.events, where, slope, rate)
+        )
 
     def measure_angle(self, alpha_rad: Floats, where: Flags) -> None:
         """Store a measured angle."""
@@ -100,8 +102,8 @@ class TruthSection:
         latest = np.full(len(arrival_s), np.inf)
         margins = []
         measured: dict[int, Floats] = {}
-        for look, margin in zip(self._looks, self._margins(arrival_s), strict=True):
-            measured[look.step] = np.minimum(margin, measured.get(look.step, np.inf))
+        for time, margin in zip(self._output_times, self._margins(arrival_s), strict=True):
+            measured[time.step] = np.minimum(margin, measured.get(time.step, np.inf))
         for step in range(self._history.elapsed + 1):
             margin = measured.get(step, latest)
             latest = np.where(np.isinf(margin), latest, margin)
@@ -115,13 +117,13 @@ class TruthSection:
         return _if_measured(self._margins(arrival_s).min(axis=0, initial=np.inf))
 
     def _margins(self, arrival_s: Floats) -> Floats:
-        """Return the margin of each flight at each look, m, shape (L, B); infinite where it does
+        """Return the margin of each flight at each time, m, shape (L, B); infinite where it does
         not measure.
         """
         law = self._law
         history = copy.copy(self._history)
-        looks = self._looks
-        if not looks:
+        times = self._output_times
+        if not times:
             return np.empty((0, len(arrival_s)))
         labels = law.closing_speed * arrival_s
         ranges = labels - law.closing_speed * (law.step * np.arange(history.elapsed + 1))[:, None]
@@ -130,16 +132,16 @@ class TruthSection:
         steps = np.cumsum(kinds == PREDICTION)
         history.applies = history.applies[: history.events].copy()
         history.applies[measured] &= (ranges >= self._min_range_m)[steps[measured]]
-        at = [look.step for look in looks]
+        at = [time.step for time in times]
         ranges = ranges[at]
-        where = np.reshape([look.where for look in looks], ranges.shape) & (
+        where = np.reshape([time.where for time in times], ranges.shape) & (
             ranges >= self._min_range_m
         )
         # Shape (L, C, B), then (C, L, B).
-        each = (len(looks), len(self._laws), len(labels))
-        slope = np.reshape([look.slope for look in looks], each).swapaxes(0, 1)
-        rate = np.reshape([look.slope_rate_per_s for look in looks], each).swapaxes(0, 1)
-        ends = np.array([look.events for look in looks], dtype=np.int64)
+        each = (len(times), len(self._laws), len(labels))
+        slope = np.reshape([time.slope for time in times], each).swapaxes(0, 1)
+        rate = np.reshape([time.slope_rate_per_s for time in times], each).swapaxes(0, 1)
+        ends = np.array([time.events for time in times], dtype=np.int64)
         v = np.ascontiguousarray(rate * ranges - law.closing_speed * slope)
         z = np.ascontiguousarray(slope * ranges)
         margins, reaches = margins_along(labels, ends, v, z, history, self._laws)

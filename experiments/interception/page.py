@@ -218,7 +218,7 @@ def computed_again(
         step, is_measured = divmod(number, 2)
         if is_measured and step in wanted:
             intervals = np.stack(information.predicted_miss_by_section_m(), axis=-1)
-            misses_m[step] = intervals[:, 0, information.living[0]]
+            misses_m[step] = intervals[:, 0, information.feasible[0]]
         elif not is_measured and {step - 1, step} & wanted:
             before[step] = tuple(information.sections())
     return before, misses_m

@@ -339,8 +339,8 @@ def cut(section: SectionView, tau: float, lower: float, upper: float) -> tuple[b
     """Intersect a section at time to go `tau` with the band lower <= z <= upper, the heights of the
     levels, m.
 
-    Return whether it lives, and the smaller overlap of section and band at the two borders, m:
-    minus their distance if they do not intersect. If the intersection is empty, the section is
+    Return whether it is not empty, and the smaller overlap of section and band at the two borders,
+    m: minus their distance if they do not intersect. If the intersection is empty, the section is
     unchanged. A band with `lower` above `upper` is empty: that of a label behind x = 0, or beyond
     the range at which the error bound is zero.
     """

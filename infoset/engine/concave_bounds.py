@@ -9,9 +9,9 @@ from infoset.arrays import Floats
 from infoset.engine.replays import Records
 
 CERTAIN = 1e-13
-"""Labels count as dead if their overlap is certainly less than minus this number times the label:
-the rounding error of an overlap is a few ulp of the terms of a height, which are less than the
-label."""
+"""Labels count as infeasible if their overlap is certainly less than minus this number times the
+label: the rounding error of an overlap is a few ulp of the terms of a height, which are less than
+the label."""
 
 
 @allocation_free
@@ -56,25 +56,27 @@ def bound_between(
 
 
 @allocation_free
-def is_dead_between(dead: Records, latest: Floats) -> bool:
-    """Return whether all labels from the first to the last of some dead labels, in increasing
-    order, are dead.
+def is_infeasible_between(infeasible: Records, latest: Floats) -> bool:
+    """Return whether all labels from the first to the last of some infeasible labels, in increasing
+    order, are infeasible.
 
     The overlap at the latest event at which one of them became empty is a concave function of the
-    label. `latest`, shape (2, len(dead)), is a working array.
+    label. `latest`, shape (2, len(infeasible)), is a working array.
     """
-    last_event = dead[0].died
-    for i in range(1, len(dead)):
-        last_event = max(last_event, dead[i].died)
+    last_event = infeasible[0].emptied_at
+    for i in range(1, len(infeasible)):
+        last_event = max(last_event, infeasible[i].emptied_at)
     known = latest[0]
     values = latest[1]
     count = ZERO
-    for i in range(len(dead)):
-        if dead[i].died == last_event and (count == 0 or dead[i].label > known[count - 1]):
-            known[count], values[count] = dead[i].label, dead[i].overlap
+    for i in range(len(infeasible)):
+        if infeasible[i].emptied_at == last_event and (
+            count == 0 or infeasible[i].label > known[count - 1]
+        ):
+            known[count], values[count] = infeasible[i].label, infeasible[i].overlap
             count += 1
-    minimum = dead[0].label
-    maximum = dead[len(dead) - 1].label
+    minimum = infeasible[0].label
+    maximum = infeasible[len(infeasible) - 1].label
     last = known[count - 1]
     rounding = -CERTAIN * maximum
     known = known[:count]

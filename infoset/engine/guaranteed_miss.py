@@ -25,27 +25,33 @@ from infoset.engine.location import (
     LABEL_RESOLUTION,
     LAST,
     MIDDLE,
-    Living,
+    FeasibleLabels,
     locate_end,
     search_bracket,
 )
 from infoset.engine.replays import (
+    LAST_REPLAY,
     LOWER,
-    PROBE,
     UPPER,
     Past,
     Records,
+    evaluate_label,
     keep_section,
     middle_label,
     past_of,
-    probe,
     replayed_section,
     run,
     select,
     with_window,
 )
 from infoset.engine.section_law import Laws, SectionLaw, law_of
-from infoset.engine.section_life import ALIVE, across_of, impulse_doubt, range_of, time_to_go
+from infoset.engine.section_life import (
+    NEVER_EMPTIED,
+    across_of,
+    impulse_doubt,
+    range_of,
+    time_to_go,
+)
 from infoset.engine.section_passes import Sections
 
 LABELS = 3
@@ -86,7 +92,7 @@ class Leaving(NamedTuple):
     near, far : ndarray, shape (W, B)
         Limits of the labels, m; the lower one is greater if none leaves.
     known : ndarray, shape (W, B)
-        A label between them that lives, m; minus infinity if none is known.
+        A feasible label between them, m; minus infinity if none is known.
     events, elapsed : ndarray of int, shape (W,)
         Numbers of events and of predictions before they leave.
     """
@@ -121,7 +127,7 @@ class Outlines(NamedTuple):
 
 class WindowLabels(NamedTuple):
     """Number of the labels replayed for a window, and how many of them are below and above its
-    living ones.
+    feasible ones.
     """
 
     number: int
@@ -231,20 +237,20 @@ def max_exact_miss(replayed: WindowLabels, reached: float, past: Past, outlines:
     if past.errors is not None and miss > reached:
         label = outlines.labels[worst]
         alone = with_window(past, np.inf, -np.inf)
-        if run(label, alone)[0] != ALIVE:
+        if run(label, alone)[0] != NEVER_EMPTIED:
             return 0.0
-        write_outline(outlines, ZERO, label, PROBE, alone)
+        write_outline(outlines, ZERO, label, LAST_REPLAY, alone)
         miss = miss_at(outlines, ZERO, alone)
     return miss
 
 
 @allocation_free
-def living_part(known: float, past: Past) -> Living:
-    """Return the living labels of the window of a history, which form an interval, and leave the
+def feasible_part(known: float, past: Past) -> FeasibleLabels:
+    """Return the feasible labels of the window of a history, which form an interval, and leave the
     sections at its ends.
 
-    With rates, the bands are those that are convex on the window. `known` is a label of the window
-    that lives; any other number if none is known.
+    With rates, the bands are those that are convex on the window. `known` is a feasible label of
+    the window; any other number if none is known.
     """
     near = past.nearest
     far = past.farthest
@@ -253,70 +259,76 @@ def living_part(known: float, past: Past) -> Living:
     lower = near
     upper = far
     above = far
-    lower_lives = probe(limits, FIRST, near, past)
-    if lower_lives:
+    lower_is_feasible = evaluate_label(limits, FIRST, near, past)
+    if lower_is_feasible:
         keep_section(past, LOWER)
-    upper_lives = probe(limits, LAST, far, past)
-    if upper_lives:
+    upper_is_feasible = evaluate_label(limits, LAST, far, past)
+    if upper_is_feasible:
         keep_section(past, UPPER)
-    living = near if lower_lives else far
-    if not lower_lives and not upper_lives:
-        living = known if near <= known <= far else 0.5 * (near + far)
+    feasible = near if lower_is_feasible else far
+    if not lower_is_feasible and not upper_is_feasible:
+        feasible = known if near <= known <= far else 0.5 * (near + far)
         if past.errors is not None:
-            # A label that lives by itself may be dead with the bands of the window, and others may
-            # live.
-            if not (probe(limits, MIDDLE, living, past) or search_bracket(past)):
-                return Living(False, below, lower, upper, above)
-            living = limits[1].label
-        elif living != known:
-            # The living labels of the set form an interval. None of it is known here, and both
-            # limits are dead.
-            return Living(False, below, lower, upper, above)
+            # A label that is feasible by itself may be infeasible with the bands of the window, and
+            # others may be feasible.
+            if not (evaluate_label(limits, MIDDLE, feasible, past) or search_bracket(past)):
+                return FeasibleLabels(False, below, lower, upper, above)
+            feasible = limits[1].label
+        elif feasible != known:
+            # The feasible labels of the set form an interval. None of it is known here, and both
+            # limits are infeasible.
+            return FeasibleLabels(False, below, lower, upper, above)
     resolution = LABEL_RESOLUTION * far
-    if not lower_lives:
-        below, lower = locate_end(limits[0], living, resolution, past, LOWER)
-    if not upper_lives:
-        above, upper = locate_end(limits[2], living, resolution, past, UPPER)
-    return Living(True, below, lower, upper, above)
+    if not lower_is_feasible:
+        below, lower = locate_end(limits[0], feasible, resolution, past, LOWER)
+    if not upper_is_feasible:
+        above, upper = locate_end(limits[2], feasible, resolution, past, UPPER)
+    return FeasibleLabels(True, below, lower, upper, above)
 
 
 @allocation_free
-def replay_labels(living: Living, past: Past, outlines: Outlines) -> WindowLabels:
-    """Write the sections of equally spaced living labels, and of one more on each side without
+def replay_labels(feasible: FeasibleLabels, past: Past, outlines: Outlines) -> WindowLabels:
+    """Write the sections of equally spaced feasible labels, and of one more on each side without
     rates.
 
     The sections at the ends are in the workspace. A single label is replayed if the interval is as
     short as the resolution.
     """
-    spacing = (living.upper - living.lower) / (LABELS - 1)
+    spacing = (feasible.upper - feasible.lower) / (LABELS - 1)
     law = law_of(past.laws, ZERO)
-    travelled = living.lower - range_of(living.lower, past.log.elapsed, law)
+    travelled = feasible.lower - range_of(feasible.lower, past.log.elapsed, law)
     number = inner = outer = ZERO
-    if spacing <= LABEL_RESOLUTION * living.upper:
-        write_outline(outlines, ZERO, living.lower, LOWER, past)
+    if spacing <= LABEL_RESOLUTION * feasible.upper:
+        write_outline(outlines, ZERO, feasible.lower, LOWER, past)
         return WindowLabels(ZERO + 1, inner, outer)
     for k in range(-1, LABELS + 1):
-        label = living.lower + k * spacing
-        row = PROBE
+        label = feasible.lower + k * spacing
+        row = LAST_REPLAY
         if k < 0 and label <= travelled:
             # No section exists behind x = 0. A much shorter distance would amplify rounding errors.
-            label = travelled + 0.5 * (living.lower - travelled)
-            if living.lower - label < NEAREST_OUTSIDE * spacing:
+            label = travelled + 0.5 * (feasible.lower - travelled)
+            if feasible.lower - label < NEAREST_OUTSIDE * spacing:
                 continue
         if k == 0:
             row = LOWER
         elif k == LABELS - 1:
-            label = living.upper
+            label = feasible.upper
             row = UPPER
         elif k < 0 or k == LABELS:
-            # Labels live outside if the limit does. The bands of rates are convex only on the
+            # Labels are feasible outside if the limit is. The bands of rates are convex only on the
             # window.
-            limit_lives = living.below == living.lower if k < 0 else living.above == living.upper
-            if past.errors is not None or not limit_lives or run(label, past)[0] != ALIVE:
+            limit_is_feasible = (
+                feasible.below == feasible.lower if k < 0 else feasible.above == feasible.upper
+            )
+            if (
+                past.errors is not None
+                or not limit_is_feasible
+                or run(label, past)[0] != NEVER_EMPTIED
+            ):
                 continue
             inner = inner + (k < 0)
             outer = outer + (k > 0)
-        elif run(label, past)[0] != ALIVE:
+        elif run(label, past)[0] != NEVER_EMPTIED:
             continue
         write_outline(outlines, number, label, row, past)
         number += 1
@@ -325,7 +337,7 @@ def replay_labels(living: Living, past: Past, outlines: Outlines) -> WindowLabel
 
 @allocation_free
 def bound_pieces(
-    living: Living,
+    feasible: FeasibleLabels,
     replayed: WindowLabels,
     past: Past,
     outlines: Outlines,
@@ -335,22 +347,22 @@ def bound_pieces(
     """Add the pieces between replayed labels, with their bounds, to `count` pieces; return the new
     count.
 
-    The first piece ends at the first living label, and the last one begins at the last living
+    The first piece ends at the first feasible label, and the last one begins at the last feasible
     label.
     """
     number, inner, outer = replayed
     if number < 3:
-        # The living labels are equal to within the resolution: one outline and a small margin bound
-        # them all.
+        # The feasible labels are equal to within the resolution: one outline and a small margin
+        # bound them all.
         piece = pieces[count]
-        piece.near, piece.far = living.below, living.above
+        piece.near, piece.far = feasible.below, feasible.above
         piece.bound = miss_at(outlines, ZERO, past) + margin_of(
-            outlines, living.above - living.below, past
+            outlines, feasible.above - feasible.below, past
         )
         return count + 1
     for first in range(inner, number - outer + 1):
-        near = living.below if first == inner else outlines.labels[first - 1]
-        far = living.above if first == number - outer else outlines.labels[first]
+        near = feasible.below if first == inner else outlines.labels[first - 1]
+        far = feasible.above if first == number - outer else outlines.labels[first]
         if near < far:
             piece = pieces[count]
             piece.near = near
@@ -483,11 +495,11 @@ def bound_all(
                 log.kinds, log.values, log.applies, leaving.events[step], leaving.elapsed[step]
             )
             window = Past(until, past.errors, past.laws, past.room, near, far, TRUE)
-            living = living_part(leaving.known[step, b], window)
-            if living.exists:
-                replayed = replay_labels(living, window, outlines)
+            feasible = feasible_part(leaving.known[step, b], window)
+            if feasible.exists:
+                replayed = replay_labels(feasible, window, outlines)
                 before = count
-                count = bound_pieces(living, replayed, window, outlines, pieces, count)
+                count = bound_pieces(feasible, replayed, window, outlines, pieces, count)
                 for i in range(before, count):
                     pieces[i].step = step
                 reached = max(reached, max_exact_miss(replayed, reached, window, outlines))
@@ -517,7 +529,7 @@ class GuaranteedMiss:
     def leave(
         self, active: Flags, lower: Floats, upper: Floats, sections: Sections, history: History
     ) -> None:
-        """Note that the living labels from `lower` to `upper`, shape (B,), m, leave in this step.
+        """Note that the feasible labels from `lower` to `upper`, shape (B,), m, leave in this step.
 
         Labels that leave during the following steps of a group are noted too, so that their number
         of windows does not grow with the number of steps.
@@ -531,11 +543,11 @@ class GuaranteedMiss:
         far = np.minimum(upper, below)
         self._bounded_below = np.where(active, below, self._bounded_below)
         slots = sections.slots
-        lives = (
-            slots["living"] & (slots["label"] >= near[:, None]) & (slots["label"] <= far[:, None])
+        is_feasible = (
+            slots["feasible"] & (slots["label"] >= near[:, None]) & (slots["label"] <= far[:, None])
         )
-        lives &= np.arange(slots.shape[1]) < sections.used[:, None]
-        known = np.where(lives, slots["label"], -np.inf).max(axis=1)
+        is_feasible &= np.arange(slots.shape[1]) < sections.used[:, None]
+        known = np.where(is_feasible, slots["label"], -np.inf).max(axis=1)
         events = np.array(history.events)
         elapsed = np.array(history.elapsed)
         self._leaving.append(Leaving(near, far, known, events, elapsed))

@@ -1,10 +1,10 @@
-"""Search for the living labels: those whose section is not empty. Each probe of a label replays the
-history.
+"""Search for the feasible labels: those whose section is not empty. Each evaluation of a label
+replays the history.
 
-If the set is convex in (z, V, label), the living labels form one interval. This holds for the
+If the set is convex in (z, V, label), the feasible labels form one interval. This holds for the
 guaranteed model without rates. With rates the search finds one interval and does not narrow the
-limits of the labels to it; before it reports that no label lives, it searches windows of labels
-with bands that are convex there. See docs/guarantee.md for the other cases.
+limits of the labels to it; before it reports that no label is feasible, it searches windows of
+labels with bands that are convex there. See docs/guarantee.md for the other cases.
 """
 
 from __future__ import annotations
@@ -17,51 +17,54 @@ from infoset._compile import allocation_free, constants, entry, pasted
 from infoset.arrays import Flags, Floats
 from infoset.engine.chain_storage import copy_section, room_of, view_of
 from infoset.engine.chains import CAPACITY, count_of
-from infoset.engine.concave_bounds import is_dead_between
+from infoset.engine.concave_bounds import is_infeasible_between
 from infoset.engine.replays import (
+    LAST_REPLAY,
     LOWER,
     MAX_HALVED_WINDOWS,
-    PROBE,
     ROWS,
     UPPER,
     Past,
     Record,
-    keep_living,
+    empties_later,
+    evaluate_label,
+    keep_feasible,
     keep_section,
-    outlives,
-    probe,
     run,
     select,
     with_window,
 )
 from infoset.engine.section_law import Laws, law_of
-from infoset.engine.section_life import ALIVE, summarise_section
+from infoset.engine.section_life import NEVER_EMPTIED, summarise_section
 from infoset.engine.section_passes import Sections, row_of
 
 FIRST, MIDDLE, LAST = constants(3)
 """Indices of a bracket of three labels."""
 LABEL_RESOLUTION = 1e-13
-"""Accuracy of the ends of the living labels, relative to the labels: some 500 ulp, so that probes
-differ; 1 um of range in the scenario of 1997."""
+"""Accuracy of the ends of the feasible labels, relative to the labels: some 500 ulp, so that
+evaluations differ; 1 um of range in the scenario of 1997.
+"""
 COARSE = 1.0 / 64.0
-"""Accuracy of an end in a window for Phi, relative to the living labels there: bounds hold up to
-the dead label.
+"""Accuracy of an end in a window for Phi, relative to the feasible labels there: bounds hold up to
+the infeasible label.
 """
 NARROWEST = 1e-15
-"""Width of an interval of living labels that the search may miss, relative to the labels: 5 to 9
-ulp. The slack of the cuts makes the labels next to that of a true state live over a wider interval.
+"""Width of an interval of feasible labels that the search may miss, relative to the labels: 5 to 9
+ulp. The slack of the cuts makes the labels next to the label of a true state feasible over a wider
+interval.
 """
-MAX_PROBES = 200
-"""Maximum number of probes of one search; bisection alone needs 53 to divide an interval to an
+MAX_EVALUATIONS = 200
+"""Maximum number of evaluations of one search; bisection alone needs 53 to divide an interval to an
 ulp.
 """
 
 
-class Living(NamedTuple):
-    """Interval of living labels [lower, upper], m, and a bracket of each end: `below` and `above`.
+class FeasibleLabels(NamedTuple):
+    """Interval of feasible labels [lower, upper], m, and a bracket of each end: `below` and
+    `above`.
 
-    The outer two labels are dead, or equal to an end at a limit of the search. `exists` is whether
-    a label lives.
+    The outer two labels are infeasible, or equal to an end at a limit of the search. `exists` is
+    whether a label is feasible.
     """
 
     exists: bool
@@ -73,89 +76,93 @@ class Living(NamedTuple):
 
 @allocation_free
 def locate_end(
-    dead: Record,
-    living: float,
+    infeasible: Record,
+    feasible: float,
     resolution: float,
     past: Past,
     row: int,
 ) -> tuple[float, float]:
-    """Narrow the bracket between a dead and a living label; return the bracket (dead, living).
+    """Narrow the bracket between an infeasible and a feasible label; return the bracket in this
+    order.
 
-    The section at the living label is stored in `row` of the workspace. The overlap at the event
+    The section at the feasible label is stored in `row` of the workspace. The overlap at the event
     that makes the section empty is a concave function of the label, so that the Illinois variant of
-    regula falsi converges fast. If four probes have not narrowed the bracket to an eighth, because
-    that event changes with the label, one bisection follows.
+    regula falsi converges fast. If four evaluations have not narrowed the bracket to an eighth,
+    because that event changes with the label, one bisection follows.
     """
-    run(living, past)
-    keep_living(past, row)
-    end = dead.label
-    died = dead.died
-    overlap = dead.overlap
-    emptied = dead.emptied
-    weight_dead = overlap
-    weight_living = past.room.living_overlaps[emptied, died]
+    run(feasible, past)
+    keep_feasible(past, row)
+    end = infeasible.label
+    emptied_at = infeasible.emptied_at
+    overlap = infeasible.overlap
+    emptied_axis = infeasible.emptied_axis
+    infeasible_weight = overlap
+    feasible_weight = past.room.feasible_overlaps[emptied_axis, emptied_at]
     side = 0
     before = 0.0
-    first = living
-    for probes in range(MAX_PROBES):
-        width = abs(living - end)
+    first = feasible
+    for evaluations in range(MAX_EVALUATIONS):
+        width = abs(feasible - end)
         coarse = past.errors is not None and past.thinned
-        if width <= resolution or (coarse and width <= COARSE * abs(living - first)):
+        if width <= resolution or (coarse and width <= COARSE * abs(feasible - first)):
             break
-        slow = probes % 4 == 3 and width > 0.125 * before
-        if probes % 4 == 0:
+        slow = evaluations % 4 == 3 and width > 0.125 * before
+        if evaluations % 4 == 0:
             before = width
         fraction = 0.5
-        if not slow and weight_living > weight_dead:
-            # A probe at an end gives no information: keep half a resolution away from both.
+        if not slow and feasible_weight > infeasible_weight:
+            # An evaluation at an end gives no information: keep half a resolution away from both.
             minimum = 0.5 * resolution / width
             fraction = min(
-                max(-weight_dead / (weight_living - weight_dead), minimum), 1.0 - minimum
+                max(-infeasible_weight / (feasible_weight - infeasible_weight), minimum),
+                1.0 - minimum,
             )
-        label = end + fraction * (living - end)
-        probe_died, probe_overlap, probe_emptied = run(label, past)
-        if probe_died == ALIVE:
-            living = label
-            keep_living(past, row)
-            weight_living = past.room.living_overlaps[emptied, died]
-            weight_dead = 0.5 * weight_dead if side == 1 else overlap
+        label = end + fraction * (feasible - end)
+        new_emptied_at, new_overlap, new_emptied_axis = run(label, past)
+        if new_emptied_at == NEVER_EMPTIED:
+            feasible = label
+            keep_feasible(past, row)
+            feasible_weight = past.room.feasible_overlaps[emptied_axis, emptied_at]
+            infeasible_weight = 0.5 * infeasible_weight if side == 1 else overlap
             side = 1
         else:
             end = label
-            died = probe_died
-            overlap = probe_overlap
-            emptied = probe_emptied
-            weight_dead = overlap
-            weight_living = (0.5 if side == -1 else 1.0) * past.room.living_overlaps[emptied, died]
+            emptied_at = new_emptied_at
+            overlap = new_overlap
+            emptied_axis = new_emptied_axis
+            infeasible_weight = overlap
+            feasible_weight = (0.5 if side == -1 else 1.0) * past.room.feasible_overlaps[
+                emptied_axis, emptied_at
+            ]
             side = -1
-    return end, living
+    return end, feasible
 
 
 @allocation_free
-def search_living(past: Past) -> bool:
-    """Search for a living label between the first three known ones, which are dead; the middle one
-    outlives the others.
+def search_feasible_label(past: Past) -> bool:
+    """Search for a feasible label between the first three known ones, which are infeasible; the
+    middle one empties later than the others.
 
-    Return whether the middle label now lives; if not, there is no living label in the bracket. The
+    Return whether the middle label is feasible now; if not, the bracket has no feasible label. The
     pair (event, overlap) is a unimodal function of the label: the larger half of the bracket is
-    probed at its middle. The search ends if the bracket is as narrow as `NARROWEST`, or if no label
-    in it can live.
+    evaluated at its middle. The search ends if the bracket is as narrow as `NARROWEST`, or if no
+    label in it can be feasible.
     """
     known = past.room.known
     four = past.room.four
-    for _ in range(MAX_PROBES):
+    for _ in range(MAX_EVALUATIONS):
         if known[2].label - known[0].label <= NARROWEST * known[2].label:
             return False
         lower_half = known[1].label - known[0].label > known[2].label - known[1].label
         outer, at = (0, 1) if lower_half else (2, 2)
         for i in range(3):
             four[i if i < at else i + 1] = known[i]
-        lives = probe(four, at, 0.5 * (known[1].label + known[outer].label), past)
-        if not lives and is_dead_between(four, past.room.latest):
+        is_feasible = evaluate_label(four, at, 0.5 * (known[1].label + known[outer].label), past)
+        if not is_feasible and is_infeasible_between(four, past.room.latest):
             return False
-        if lives or outlives(four[at], known[1]):
+        if is_feasible or empties_later(four[at], known[1]):
             known[2 - outer], known[1] = known[1], four[at]
-            if lives:
+            if is_feasible:
                 return True
         else:
             known[outer] = four[at]
@@ -169,14 +176,14 @@ def search_window(
     first: float,
     past: Past,
 ) -> bool:
-    """Return whether a label of the window lives with the bands that are convex on the window.
+    """Return whether a label of the window is feasible with the bands that are convex on it.
 
-    `first` is the first label replayed. If a label lives, it is the second of the known ones
+    `first` is the first label replayed. If a label is feasible, it is the second of the known ones
     afterwards.
     """
     known = past.room.known
     for i, label in ((MIDDLE, first), (FIRST, lower), (LAST, upper)):
-        if probe(known, i, label, past):
+        if evaluate_label(known, i, label, past):
             known[1] = known[i]
             return True
     return search_bracket(past)
@@ -184,38 +191,38 @@ def search_window(
 
 @allocation_free
 def search_bracket(past: Past) -> bool:
-    """Return whether a label lives between the first three known ones, which are dead; it is then
-    the second one.
+    """Return whether a label between the first three known ones, which are infeasible, is feasible;
+    it is then the second one.
     """
     known = past.room.known
     for end in (0, 2):
-        if outlives(known[end], known[1]):
+        if empties_later(known[end], known[1]):
             known[2 - end] = known[1]
             known[1] = known[end]
             break
-    return search_living(past)
+    return search_feasible_label(past)
 
 
 @allocation_free
 def search_everywhere(
     lower: float, upper: float, past: Past, errors: Floats | None
 ) -> tuple[bool, float]:
-    """Find a living label within limits if the living labels need not form an interval, or prove
-    that none lives.
+    """Find a feasible label within limits if the feasible labels need not form an interval, or
+    prove that none is feasible.
 
-    A window without living labels under the bands that are convex on it is discarded. The others
-    are halved until they are as narrow as `NARROWEST`, beginning with the one in which a probed
-    label lived longest with its own bands.
+    A window without feasible labels under the bands that are convex on it is discarded. The others
+    are halved until they are as narrow as `NARROWEST`, beginning with the one in which an evaluated
+    label empties last with its own bands.
 
     Only rates make the search necessary. `errors` are those of the history, as in `replay`.
     """
     if errors is None:
         return False, lower
     windows = past.room.windows
-    probed = past.room.four
+    evaluated = past.room.four
     windows[0].near = lower
     windows[0].far = upper
-    windows[0].died = ALIVE
+    windows[0].emptied_at = NEVER_EMPTIED
     windows[0].overlap = 0.0
     count = 1
     for _ in range(MAX_HALVED_WINDOWS):
@@ -223,7 +230,7 @@ def search_everywhere(
             break
         best = 0
         for i in range(1, count):
-            if outlives(windows[i], windows[best]):
+            if empties_later(windows[i], windows[best]):
                 best = i
         near = windows[best].near
         far = windows[best].far
@@ -234,31 +241,31 @@ def search_everywhere(
             if not search_window(p, q, 0.5 * (p + q), with_window(past, p, q)):
                 continue
             new = windows[count]
-            new.near, new.far, new.died, new.overlap = p, q, -1, -np.inf
+            new.near, new.far, new.emptied_at, new.overlap = p, q, -1, -np.inf
             for label in (past.room.known[1].label, p, q):
-                if probe(probed, FIRST, label, past):
+                if evaluate_label(evaluated, FIRST, label, past):
                     return True, label
-                if outlives(probed[0], new):
-                    new.died, new.overlap = probed[0].died, probed[0].overlap
+                if empties_later(evaluated[0], new):
+                    new.emptied_at, new.overlap = evaluated[0].emptied_at, evaluated[0].overlap
             count += q - p > NARROWEST * q
     return False, lower
 
 
 @pasted
-def locate_living(
+def locate_feasible_labels(
     b: int,
     limit_below: float,
     limit_above: float,
     sections: Sections,
     past: Past,
-) -> Living:
-    """Locate the living labels of an engagement within limits, from its stored labels.
+) -> FeasibleLabels:
+    """Locate the feasible labels of an engagement within limits, from its stored labels.
 
     The sections at both ends are left in the workspace.
     """
-    none_lives = Living(False, limit_below, limit_below, limit_above, limit_above)
+    none_feasible = FeasibleLabels(False, limit_below, limit_below, limit_above, limit_above)
     if limit_below > limit_above:
-        return none_lives
+        return none_feasible
     resolution = LABEL_RESOLUTION * max(abs(limit_below), abs(limit_above))
     # The limits, and the stored labels between them.
     slots = sections.slots
@@ -272,38 +279,38 @@ def locate_living(
         # Labels of a grid over a very short interval may be equal. A bracket needs different ones.
         if known[end - 1].label < slot.label < limit_above:
             new = known[end]
-            new.label, new.overlap, new.emptied = slot.label, slot.overlap, slot.emptied
-            new.died = ALIVE if slot.living else slot.died
-            if slot.living:
+            new.label, new.overlap, new.emptied_axis = slot.label, slot.overlap, slot.emptied_axis
+            new.emptied_at = NEVER_EMPTIED if slot.feasible else slot.emptied_at
+            if slot.feasible:
                 first = first if last > 0 else end
                 last = end
             end += 1
     known[end].label = limit_above
-    some_live = last > 0
-    # A limit must be replayed only if no dead label separates it from the living ones.
-    if (not some_live or first == 1) and probe(known, FIRST, limit_below, past):
+    some_feasible = last > 0
+    # A limit must be replayed only if no infeasible label separates it from the feasible ones.
+    if (not some_feasible or first == 1) and evaluate_label(known, FIRST, limit_below, past):
         keep_section(past, LOWER)
-        first, some_live = 0, True
-    if (not some_live or last == end - 1) and probe(known, end, limit_above, past):
+        first, some_feasible = 0, True
+    if (not some_feasible or last == end - 1) and evaluate_label(known, end, limit_above, past):
         keep_section(past, UPPER)
-        first = first if some_live else end
+        first = first if some_feasible else end
         last = end
-        some_live = True
-    if not some_live:
+        some_feasible = True
+    if not some_feasible:
         best = 0
         for i in range(1, end + 1):
-            if outlives(known[i], known[best]):
+            if empties_later(known[i], known[best]):
                 best = i
-        # Bracket of the dead label that lived longest: this label and its neighbours, at the front
-        # of the same array.
+        # Bracket of the label that empties last: this label and its neighbours, at the front of the
+        # same array.
         past.room.four[0] = known[best]
         known[0], known[2] = known[max(best - 1, 0)], known[min(best + 1, end)]
         known[1] = past.room.four[0]
         first, last, end = 1, 1, 2
-        if not search_living(past):
-            alive_now, label = search_everywhere(limit_below, limit_above, past, past.errors)
-            if not alive_now:
-                return none_lives
+        if not search_feasible_label(past):
+            found, label = search_everywhere(limit_below, limit_above, past, past.errors)
+            if not found:
+                return none_feasible
             below = limit_below
             above = limit_above
             for s in range(stored):
@@ -313,10 +320,10 @@ def locate_living(
                 elif label < stored_label < above:
                     above = stored_label
             known[1].label = label
-            if probe(known, FIRST, below, past):
+            if evaluate_label(known, FIRST, below, past):
                 keep_section(past, LOWER)
                 first = 0
-            if probe(known, LAST, above, past):
+            if evaluate_label(known, LAST, above, past):
                 keep_section(past, UPPER)
                 last = 2
     below = lower = known[first].label
@@ -325,12 +332,12 @@ def locate_living(
     above = upper = known[last].label
     if last < end:
         above, upper = locate_end(known[last + 1], upper, resolution, past, UPPER)
-    return Living(True, below, lower, upper, above)
+    return FeasibleLabels(True, below, lower, upper, above)
 
 
 @allocation_free
 def is_convex(laws: Laws) -> bool:
-    """Whether sets without rates are convex along all axes, so that the living labels form one
+    """Whether sets without rates are convex along all axes, so that the feasible labels form one
     interval.
     """
     for channel in range(laws.shape[0]):
@@ -344,13 +351,13 @@ def is_convex(laws: Laws) -> bool:
 def refine_all(
     wanted: Flags, number: int, limits: tuple[Floats, Floats], past: Past, sections: Sections
 ) -> int:
-    """Replace the sections of the wanted engagements by a grid of `number` over the living labels,
-    ends included.
+    """Replace the sections of the wanted engagements by a grid of `number` over the feasible
+    labels, ends included.
 
-    Return the number of vertices that every new section may gain. If no label lives, the engagement
-    has no living section afterwards. The limits of the labels, each of shape (B,), are narrowed to
-    dead labels, except where other labels may live beyond them: with rates, and with an error bound
-    that rises with range in the paper's model.
+    Return the number of vertices that every new section may gain. If no label is feasible, the
+    engagement has no feasible section afterwards. The limits of the labels, each of shape (B,), are
+    narrowed to infeasible labels, except where other labels may be feasible beyond them: with
+    rates, and with an error bound that rises with range in the paper's model.
     """
     spare = CAPACITY
     slots = sections.slots
@@ -361,31 +368,31 @@ def refine_all(
         if not wanted[b]:
             continue
         select(past, b)
-        living = locate_living(b, limit_below[b], limit_above[b], sections, past)
+        feasible = locate_feasible_labels(b, limit_below[b], limit_above[b], sections, past)
         for s in range(used[b]):
-            slots[b, s].living = False
-        if not living.exists:
+            slots[b, s].feasible = False
+        if not feasible.exists:
             continue
         if past.errors is None and is_convex(laws):
-            limit_below[b] = living.below
-            limit_above[b] = living.above
+            limit_below[b] = feasible.below
+            limit_above[b] = feasible.above
         used[b] = number
         for s in range(number):
             share = s / (number - 1) if number > 1 else 0.5
-            label = living.lower + share * (living.upper - living.lower)
+            label = feasible.lower + share * (feasible.upper - feasible.lower)
             if s > 0 and s == number - 1:
-                label = living.upper
+                label = feasible.upper
             slot = slots[b, s]
-            row = PROBE
+            row = LAST_REPLAY
             slot.label = label
             if number > 1 and (s == 0 or s == number - 1):
                 row = LOWER if s == 0 else UPPER
-                slot.died = ALIVE
+                slot.emptied_at = NEVER_EMPTIED
                 slot.overlap = 0.0
             else:
-                slot.died, slot.overlap, slot.emptied = run(label, past)
-            slot.living = slot.died == ALIVE
-            if slot.living:
+                slot.emptied_at, slot.overlap, slot.emptied_axis = run(label, past)
+            slot.feasible = slot.emptied_at == NEVER_EMPTIED
+            if slot.feasible:
                 for channel in range(laws.shape[0]):
                     n = row_of(sections, channel, b, s)
                     law = law_of(laws, channel)

@@ -31,7 +31,7 @@ class PredictedMiss:
     Parameters
     ----------
     exists : ndarray of bool, shape (B,)
-        Whether the set has a living section; the other fields are zero where it has none.
+        Whether the set has a feasible section; the other fields are zero where it has none.
     lower_m, upper_m : ndarray, shape (C, B)
         Ends pi_* and pi^* of the interval along each lateral axis, signed, m.
     lower_point, upper_point : ExtremePoints

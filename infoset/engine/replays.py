@@ -26,7 +26,7 @@ from infoset.engine.history import (
 )
 from infoset.engine.section_law import Laws, SectionLaw, law_of
 from infoset.engine.section_life import (
-    ALIVE,
+    NEVER_EMPTIED,
     across_of,
     measure_section,
     predict_section,
@@ -54,9 +54,9 @@ MAX_HALVED_WINDOWS = 1000
 empty.
 """
 
-PROBE, LOWER, UPPER = constants(3)
-"""Rows of the workspace: the section of the last replay, and the sections at the ends of the living
-labels.
+LAST_REPLAY, LOWER, UPPER = constants(3)
+"""Rows of the workspace: the section of the last replay, and the sections at the ends of the
+feasible labels.
 
 Row i of axis c is `ROWS` c + i.
 """
@@ -67,11 +67,11 @@ Records = np.recarray[tuple[int], np.dtype[np.record]]
 Record = Any
 """One of the records: a label that was replayed, or a window."""
 
-OUTCOME = [("died", np.int64), ("overlap", np.float64), ("emptied", np.int64)]
-"""Event at which a label became empty, or ALIVE, its overlap with the band there, m, and along
-which axis.
+OUTCOME = [("emptied_at", np.int64), ("overlap", np.float64), ("emptied_axis", np.int64)]
+"""Event at which a label became empty, or NEVER_EMPTIED, its overlap with the band there, m, and
+along which axis.
 """
-PROBED = np.dtype([("label", np.float64), *OUTCOME])
+EVALUATED = np.dtype([("label", np.float64), *OUTCOME])
 """A replayed label, m."""
 WINDOW = np.dtype([("near", np.float64), ("far", np.float64), *OUTCOME])
 """A window of labels, m, with the latest outcome that a label of it reached."""
@@ -86,22 +86,22 @@ class Workspace(NamedTuple):
         Events of the engagement that is replayed, contiguous: values and whether they apply, as in
         `EventLog`.
     chains : Chains
-        The sections `PROBE`, which is the last replay, `LOWER` and `UPPER` along each axis.
-    overlaps, living_overlaps : ndarray, shape (C, E)
-        Overlap of section and band at each measurement, m, in the last replay and in that of a
-        living label.
+        The sections `LAST_REPLAY`, which is the last replay, `LOWER` and `UPPER` along each axis.
+    overlaps, feasible_overlaps : ndarray, shape (C, E)
+        Overlap of section and band at each measurement, m, in the last replay and in the replay of
+        a feasible label.
     drifts : ndarray, shape (C, 2)
-        With rates: `turned` and the room of (13), m/s and m, of the window of the last replay that
-        lived.
+        With rates: `turned` and the room of (13), m/s and m, of the window of the last replay of a
+        feasible label.
     points : ndarray, shape (n, 2)
         Vertices of a section.
     cuts : ndarray of bool, shape (E,)
         With rates, the measurements that have cut the section of a single label, in replays of all
         events.
-    known : recarray of PROBED, shape (K,)
+    known : recarray of EVALUATED, shape (K,)
         Replayed labels.
-    four : recarray of PROBED, shape (4,)
-        A bracket of three labels and the label probed in it.
+    four : recarray of EVALUATED, shape (4,)
+        A bracket of three labels and the label evaluated in it.
     latest : ndarray, shape (2, 4)
         Labels and overlaps of those that became empty at the latest event.
     windows : recarray of WINDOW, shape (MAX_HALVED_WINDOWS + 2,)
@@ -112,7 +112,7 @@ class Workspace(NamedTuple):
     applies: Flags
     chains: Chains
     overlaps: Floats
-    living_overlaps: Floats
+    feasible_overlaps: Floats
     drifts: Floats
     points: Floats
     cuts: Flags
@@ -163,12 +163,12 @@ def past_of(history: History, laws: Laws, slots: int = 1) -> Past:
         np.empty(events, dtype=bool),
         empty_sections(ROWS * channels),
         overlaps=np.empty((channels, events)),
-        living_overlaps=np.empty((channels, events)),
+        feasible_overlaps=np.empty((channels, events)),
         drifts=np.zeros((channels, 2)),
         points=working_room(),
         cuts=np.zeros(events, dtype=bool),
-        known=np.recarray(slots + 2, PROBED),
-        four=np.recarray(4, PROBED),
+        known=np.recarray(slots + 2, EVALUATED),
+        four=np.recarray(4, EVALUATED),
         latest=np.empty((2, 4)),
         windows=np.recarray(MAX_HALVED_WINDOWS + 2, WINDOW),
     )
@@ -229,9 +229,9 @@ def replay(
     """Compute the section at any label along one axis: apply the events after those `done`, up to
     number `until`.
 
-    Return the number of the event that makes the section empty, or ALIVE, and the events done.
-    About 30 ns for each event. The workspace receives the section, in row `PROBE` of the axis, and
-    the overlaps with the bands of the measurements up to the one that makes it empty.
+    Return the number of the event that makes the section empty, or NEVER_EMPTIED, and the events
+    done. About 30 ns for each event. The workspace receives the section, in row `LAST_REPLAY` of
+    the axis, and the overlaps with the bands of the measurements up to the one that makes it empty.
 
     `errors` are those of the history. They are an argument because the compiler omits the code for
     rates, which is most of it, only if an argument is None.
@@ -251,7 +251,7 @@ def replay(
         stretch = new_stretch(elapsed)
         middle = middle_of(window)
         room = window.fastest * half_time(window, law)
-    section = replayed_section(past, law.channel, PROBE, middle)
+    section = replayed_section(past, law.channel, LAST_REPLAY, middle)
     if first == 0:
         start_section(section, room, law)
     for event in range(first, until):
@@ -283,14 +283,16 @@ def replay(
             continue
         elif kinds[event] == ANGLE:
             if errors is None:
-                living, overlaps[event] = measure_section(section, elapsed, own[event], across, law)
+                feasible, overlaps[event] = measure_section(
+                    section, elapsed, own[event], across, law
+                )
             else:
                 angles = own[event], across
-                living, overlaps[event], is_cut = measure_in_window(
+                feasible, overlaps[event], is_cut = measure_in_window(
                     section, label, elapsed, angles, window, law
                 )
                 cuts[event] |= is_cut
-            if not living:
+            if not feasible:
                 return event, done
         elif kinds[event] == IMPULSE:
             shift_section(section, elapsed, own[event], across, law)
@@ -298,11 +300,11 @@ def replay(
             widen_section(section, elapsed, law)
         elif errors is not None:
             rate = Rate(own[event], errors[event], sight)
-            living, overlaps[event], is_cut = measure_rate_section(
+            feasible, overlaps[event], is_cut = measure_rate_section(
                 section, label, elapsed, rate, window, law, points
             )
             cuts[event] |= is_cut
-            if not living:
+            if not feasible:
                 return event, done
         if errors is not None:
             sight = sight_after(sight, kinds[event], own[event], across, applies[event], law)
@@ -317,42 +319,44 @@ def replay(
             apply_stretch(section, stretch, elapsed, law, points)
         past.room.drifts[law.channel, 0] = window.turned
         past.room.drifts[law.channel, 1] = window.loose * half_time(window, law)
-    return ALIVE, Replayed(until, elapsed, sight)
+    return NEVER_EMPTIED, Replayed(until, elapsed, sight)
 
 
 @allocation_free
 def run(label: float, past: Past) -> tuple[int, float, int]:
-    """Replay a label along all axes; return the event at which it became empty, or ALIVE, the
-    overlap, m, and its axis.
+    """Replay a label along all axes; return the event at which it became empty, or NEVER_EMPTIED,
+    the overlap, m, and its axis.
 
     A label becomes empty with the first of its axes. If several become empty at one event, the
     minimum overlap counts.
     """
-    died = ALIVE
+    emptied_at = NEVER_EMPTIED
     overlap = 0.0
-    emptied = 0
+    emptied_axis = 0
     for channel in range(past.laws.shape[0]):
         # Later events of a label that is empty along one axis do not matter.
-        until = past.log.number if died == ALIVE else died + 1
-        died_here, _ = replay(AT_START, label, until, past, past.errors, law_of(past.laws, channel))
-        if died_here != ALIVE:
-            overlap_here = past.room.overlaps[channel, died_here]
-            if died_here != died or overlap_here < overlap:
+        until = past.log.number if emptied_at == NEVER_EMPTIED else emptied_at + 1
+        emptied_at_here, _ = replay(
+            AT_START, label, until, past, past.errors, law_of(past.laws, channel)
+        )
+        if emptied_at_here != NEVER_EMPTIED:
+            overlap_here = past.room.overlaps[channel, emptied_at_here]
+            if emptied_at_here != emptied_at or overlap_here < overlap:
                 overlap = overlap_here
-                emptied = channel
-            died = died_here
-    return died, overlap, emptied
+                emptied_axis = channel
+            emptied_at = emptied_at_here
+    return emptied_at, overlap, emptied_axis
 
 
 @allocation_free
-def probe(known: Records, i: int, label: float, past: Past) -> bool:
-    """Replay a label and write it to record `i`; return whether it lives."""
-    died, overlap, emptied = run(label, past)
+def evaluate_label(known: Records, i: int, label: float, past: Past) -> bool:
+    """Replay a label and write it to record `i`; return whether it is feasible."""
+    emptied_at, overlap, emptied_axis = run(label, past)
     known[i].label = label
-    known[i].died = died
+    known[i].emptied_at = emptied_at
     known[i].overlap = overlap
-    known[i].emptied = emptied
-    return died == ALIVE
+    known[i].emptied_axis = emptied_axis
+    return emptied_at == NEVER_EMPTIED
 
 
 @allocation_free
@@ -360,48 +364,51 @@ def keep_section(past: Past, row: int) -> None:
     """Copy the sections of the last replay to a row of the workspace."""
     chains = past.room.chains
     for channel in range(past.laws.shape[0]):
-        copy_section(chains, ROWS * channel + PROBE, chains, ROWS * channel + row)
+        copy_section(chains, ROWS * channel + LAST_REPLAY, chains, ROWS * channel + row)
 
 
 @allocation_free
-def keep_living(past: Past, row: int) -> None:
-    """Copy sections and overlaps of the last replay to those of the living label."""
+def keep_feasible(past: Past, row: int) -> None:
+    """Keep the sections and overlaps of the last replay as those of a feasible label."""
     keep_section(past, row)
     overlaps = past.room.overlaps
     for channel in range(overlaps.shape[0]):
         for event in range(past.log.number):
-            past.room.living_overlaps[channel, event] = overlaps[channel, event]
+            past.room.feasible_overlaps[channel, event] = overlaps[channel, event]
 
 
 @allocation_free
-def outlives(one: Record, other: Record) -> bool:
+def empties_later(one: Record, other: Record) -> bool:
     """Whether a label became empty later than another one, or at the same event with a greater
     overlap.
     """
-    return bool(one.died > other.died or (one.died == other.died and one.overlap > other.overlap))
+    return bool(
+        one.emptied_at > other.emptied_at
+        or (one.emptied_at == other.emptied_at and one.overlap > other.overlap)
+    )
 
 
 def margins_along(
-    labels: Floats, looks: Integers, v: Floats, z: Floats, history: History, laws: Laws
+    labels: Floats, events_before: Integers, v: Floats, z: Floats, history: History, laws: Laws
 ) -> tuple[Floats, Floats]:
     """Return the signed distances, m, of states (V, z) to the boundaries of sections during an
     engagement, (C, L, B).
 
     They are positive inside; for an empty section the overlap with the band that made it empty.
     Also return the bounds of |V| in the sections, m/s, (C, L, B), to which rounding errors are
-    relative. `labels` has the shape (B,), and `looks`, shape (L,), the number of events before each
-    state. The states `v` and `z`, shape (C, L, B), are along each axis, m/s and m.
+    relative. `labels` has the shape (B,), and `events_before`, shape (L,), is the number of events
+    before each state. The states `v` and `z`, shape (C, L, B), are along each axis, m/s and m.
     """
     margins = np.empty(v.shape)
     reaches = np.empty(v.shape)
-    margins_all(labels, looks, v, z, past_of(history, laws), margins, reaches)
+    margins_all(labels, events_before, v, z, past_of(history, laws), margins, reaches)
     return margins, reaches
 
 
 @entry
 def margins_all(
     labels: Floats,
-    looks: Integers,
+    events_before: Integers,
     v: Floats,
     z: Floats,
     past: Past,
@@ -414,26 +421,26 @@ def margins_all(
         select(past, b)
         for channel in range(past.laws.shape[0]):
             law = law_of(past.laws, channel)
-            section = replayed_section(past, channel, PROBE, label)
-            died = ALIVE
+            section = replayed_section(past, channel, LAST_REPLAY, label)
+            emptied_at = NEVER_EMPTIED
             done = AT_START
-            for look in range(looks.shape[0]):
-                if died == ALIVE:
-                    died, done = replay(done, label, looks[look], past, past.errors, law)
-                if died == ALIVE:
+            for k in range(events_before.shape[0]):
+                if emptied_at == NEVER_EMPTIED:
+                    emptied_at, done = replay(done, label, events_before[k], past, past.errors, law)
+                if emptied_at == NEVER_EMPTIED:
                     tau = time_to_go(label, done.elapsed, law)
-                    margins[channel, look, b] = chains.margin_in(
-                        section, tau, v[channel, look, b], z[channel, look, b]
+                    margins[channel, k, b] = chains.margin_in(
+                        section, tau, v[channel, k, b], z[channel, k, b]
                     )
                 else:
-                    margins[channel, look, b] = past.room.overlaps[channel, died]
-                reaches[channel, look, b] = section.right.reach
+                    margins[channel, k, b] = past.room.overlaps[channel, emptied_at]
+                reaches[channel, k, b] = section.right.reach
 
 
 @entry
 def replay_label(label: float, b: int, past: Past) -> int:
     """Replay a label of an engagement from Python; return the event at which it became empty, or
-    ALIVE.
+    NEVER_EMPTIED.
     """
     select(past, b)
     return run(label, past)[0]

@@ -32,7 +32,7 @@ RIGHT_ANGLE = 0.5 * math.pi
 ANGLE_SLACK = 1e-12
 """Added to an angle of about 1 rad, whose iteration has rounding errors of some 1e-16 rad."""
 
-ALIVE = np.iinfo(np.int64).max
+NEVER_EMPTIED = np.iinfo(np.int64).max
 
 # Columns of a section's summary.
 LOWER_MISS, UPPER_MISS, Z_MIN, Z_MAX = range(4)

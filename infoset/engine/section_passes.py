@@ -17,9 +17,9 @@ from infoset.engine.chains import SectionView
 from infoset.engine.history import EventLog, LastSight
 from infoset.engine.section_law import Laws, SectionLaw, law_of
 from infoset.engine.section_life import (
-    ALIVE,
     CUT_SLACK,
     LOWER_MISS,
+    NEVER_EMPTIED,
     SUMMARY_COLUMNS,
     UPPER_MISS,
     Z_MAX,
@@ -56,28 +56,29 @@ class Slot(Protocol):
     ----------
     label : float
         Label, m.
-    living : bool
+    feasible : bool
         Whether the slot contains sections that are not empty.
-    died : int
-        Number of the event that made a section empty, or ALIVE.
+    emptied_at : int
+        Number of the event that made a section empty, or NEVER_EMPTIED.
     overlap : float
         Overlap of an empty section with the band that made it empty, m: negative. The minimum one
         if several became empty at that event.
-    emptied : int
+    emptied_axis : int
         Axis of the section with that overlap.
     """
 
     label: float
-    living: bool
-    died: int
+    feasible: bool
+    emptied_at: int
     overlap: float
-    emptied: int
+    emptied_axis: int
 
 
 class Sections(NamedTuple):
     """B engagements x S slots for one section each, in the plane of each of C lateral axes.
 
-    A label lives if it lives in all planes: the set at a label is the product of its sections.
+    A label is feasible if it is feasible in all planes: the set at a label is the product of its
+    sections.
 
     Parameters
     ----------
@@ -109,7 +110,7 @@ def room_for_sections(channels: int, labels: Floats, used: Integers) -> Sections
     """Allocate the arrays of a batch of sections for a number of axes."""
     slots = np.zeros(labels.shape, dtype=record_of(Slot))
     slots["label"] = labels
-    slots["died"] = ALIVE
+    slots["emptied_at"] = NEVER_EMPTIED
     return Sections(
         slots=slots,
         used=used,
@@ -141,33 +142,33 @@ def start_all(sections: Sections, laws: Laws) -> None:
         for b in range(len(sections.used)):
             for s in range(sections.used[b]):
                 start_section(section_of(sections, channel, b, s), 0.0, law)
-                sections.slots[b, s].living = True
+                sections.slots[b, s].feasible = True
 
 
 @inlined
 def is_cut(sections: Sections, channel: int, event: int, b: int, s: int) -> bool:
-    """Whether a section is cut at an event: if the label lives, or another axis has just made it
-    empty.
+    """Whether a section is cut at an event: if the label is feasible, or another axis has just made
+    it empty.
 
     The overlap of a label that an event makes empty is the smallest one of its axes, whatever their
     order.
     """
     slot = sections.slots[b, s]
-    return bool(slot.living or (channel > 0 and slot.died == event))
+    return bool(slot.feasible or (channel > 0 and slot.emptied_at == event))
 
 
 @inlined
 def mark_empty(slot: Slot, channel: int, event: int, overlap: float) -> int:
-    """Note that an event has made a section empty; return 1 if the label lived until now, else
-    0.
+    """Note that an event has made a section empty; return 1 if the label was feasible until now,
+    else 0.
     """
-    lived = slot.living
-    if lived or overlap < slot.overlap:
+    was_feasible = slot.feasible
+    if was_feasible or overlap < slot.overlap:
         slot.overlap = overlap
-        slot.emptied = channel
-    slot.living = False
-    slot.died = event
-    return 1 if lived else 0
+        slot.emptied_axis = channel
+    slot.feasible = False
+    slot.emptied_at = event
+    return 1 if was_feasible else 0
 
 
 @allocation_free
@@ -204,15 +205,15 @@ def step_all(
     sections: Sections,
     laws: Laws,
 ) -> int:
-    """Predict, cut and summarise the living sections in one pass; return the number of labels that
-    became empty.
+    """Predict, cut and summarise the feasible sections in one pass; return the number of labels
+    that became empty.
 
     Sections that are behind are moved to the present step `elapsed`. Those of the engagements that
     are `measured`, shape (B,), are cut by angles `alpha`, shape (C, B), rad, and summarised.
     `event` is the number of the measurement, `NO_EVENT` without one. `wanted` is what is brought up
     to date besides: `MOVED`, `SUMMARISED` or `WITH_HEIGHTS`.
     """
-    deaths = 0
+    newly_emptied = 0
     slots = sections.slots
     summaries = sections.summaries
     rows = sections.rows
@@ -229,12 +230,12 @@ def step_all(
             if behind[b]:
                 predict_section(section, elapsed, law)
             if measured[b]:
-                survives, overlap = measure_section(
+                is_feasible, overlap = measure_section(
                     section, elapsed, alpha[channel, b], across_of(alpha, b, law), law
                 )
-                if not survives:
-                    deaths += mark_empty(slot, channel, event, overlap)
-                if not slot.living:
+                if not is_feasible:
+                    newly_emptied += mark_empty(slot, channel, event, overlap)
+                if not slot.feasible:
                     continue
             if measured[b] or (stale[b] and wanted >= SUMMARISED):
                 summarise_section(section, elapsed, law, summaries, b, s)
@@ -245,7 +246,7 @@ def step_all(
     for b in range(len(behind)):
         behind[b] = False
         stale[b] = stale[b] and not measured[b] and wanted < SUMMARISED
-    return deaths
+    return newly_emptied
 
 
 @allocation_free
@@ -283,13 +284,13 @@ def measure_rate_all(
     laws: Laws,
     points: Floats,
 ) -> int:
-    """Cut the living sections by the rates of the latest event and summarise them; return how many
-    became empty.
+    """Cut the feasible sections by the rates of the latest event and summarise them; return how
+    many became empty.
 
     `error` is the error bound of the rates, rad/s; `sights` has the last sights after `done` events
     and is updated.
     """
-    deaths = 0
+    newly_emptied = 0
     slots = sections.slots
     used = sections.used
     event = log.number - 1
@@ -306,21 +307,21 @@ def measure_rate_all(
                 section = section_of(sections, channel, b, s)
                 label = slots[b, s].label
                 alone = new_window(label, label, law)
-                survives, overlap, _ = measure_rate_section(
+                is_feasible, overlap, _ = measure_rate_section(
                     section, label, log.elapsed, rate, alone, law, points
                 )
-                if not survives:
-                    deaths += mark_empty(slots[b, s], channel, event, overlap)
-                if slots[b, s].living:
+                if not is_feasible:
+                    newly_emptied += mark_empty(slots[b, s], channel, event, overlap)
+                if slots[b, s].feasible:
                     summarise_section(section, log.elapsed, law, sections.summaries, b, s)
         sections.stale[b] = sections.stale[b] and not active[b]
-    return deaths
+    return newly_emptied
 
 
 @entry
 def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, laws: Laws) -> None:
-    """Shift the living sections of the active engagements and their summaries by impulses of shape
-    (C, B).
+    """Shift the feasible sections of the active engagements and their summaries by impulses of
+    shape (C, B).
     """
     slots = sections.slots
     used = sections.used
@@ -336,7 +337,7 @@ def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, 
                 continue
             for s in range(used[b]):
                 slot = slots[b, s]
-                if not slot.living:
+                if not slot.feasible:
                     continue
                 shift_section(section_of(sections, channel, b, s), elapsed, along, across, law)
                 tau = time_to_go(slot.label, elapsed, law)
@@ -355,7 +356,7 @@ def make_room_all(
     points: Floats,
     widen: bool,
 ) -> tuple[int, int]:
-    """Compute the room that the living sections need; with `widen`, enlarge their rings.
+    """Compute the room that the feasible sections need; with `widen`, enlarge their rings.
 
     Every section must be able to gain `added` vertices. Return the number of floats by which the
     rings are too small, for which memory must be allocated, and the number of vertices that every
@@ -371,7 +372,7 @@ def make_room_all(
         for b in range(len(used)):
             for s in range(used[b]):
                 slot = slots[b, s]
-                if not slot.living:
+                if not slot.feasible:
                     continue
                 section = section_of(sections, channel, b, s)
                 if widen and active[b] and chains.is_crowded(section):
@@ -390,12 +391,12 @@ def make_room_all(
 @entry
 def widest_all(elapsed: int, sections: Sections, laws: Laws, exists: Flags, ends: Floats) -> None:
     """Write the predicted-miss interval of each engagement along each axis, and whether it has a
-    living section.
+    feasible section.
 
     `ends`, shape (C, B, 2, 4), has for the lower and the upper end the predicted miss, m, and
     alpha, rad, omega, rad/s, and range, m, of a state that reaches it; it is not written for
-    engagements without a living section. An extreme is usually reached on a whole edge. The lowest
-    point is taken for the upper end and the highest for the lower end, so that a mirrored
+    engagements without a feasible section. An extreme is usually reached on a whole edge. The
+    lowest point is taken for the upper end and the highest for the lower end, so that a mirrored
     engagement gives exactly mirrored results.
     """
     slots = sections.slots
@@ -407,7 +408,7 @@ def widest_all(elapsed: int, sections: Sections, laws: Laws, exists: Flags, ends
             lowest = highest = -1
             for s in range(used[b]):
                 # Only sections of stopped engagements can be at range zero.
-                if not slots[b, s].living or range_of(slots[b, s].label, elapsed, law) == 0.0:
+                if not slots[b, s].feasible or range_of(slots[b, s].label, elapsed, law) == 0.0:
                     continue
                 if (
                     lowest < 0
@@ -439,10 +440,10 @@ def widest_all(elapsed: int, sections: Sections, laws: Laws, exists: Flags, ends
 
 @entry
 def extreme_angles_all(elapsed: int, sections: Sections, laws: Laws, extremes: Floats) -> None:
-    """Write the minimum and the maximum alpha of the living sections along each axis, rad, and
+    """Write the minimum and the maximum alpha of the feasible sections along each axis, rad, and
     their ranges, m.
 
-    `extremes`, shape (4, C, B), is not written for engagements without a living section.
+    `extremes`, shape (4, C, B), is not written for engagements without a feasible section.
     """
     slots = sections.slots
     used = sections.used
@@ -454,7 +455,7 @@ def extreme_angles_all(elapsed: int, sections: Sections, laws: Laws, extremes: F
             for s in range(used[b]):
                 x = range_of(slots[b, s].label, elapsed, law)
                 # Only sections of stopped engagements can be at range zero.
-                if not slots[b, s].living or x == 0.0:
+                if not slots[b, s].feasible or x == 0.0:
                     continue
                 minimum = summaries[channel, b, s, Z_MIN] / x
                 maximum = summaries[channel, b, s, Z_MAX] / x
@@ -471,7 +472,8 @@ def extreme_angles_all(elapsed: int, sections: Sections, laws: Laws, extremes: F
 def keep_labels_all(
     active: Flags, minimum: Floats, maximum: Floats, sections: Sections, removed: Flags
 ) -> int:
-    """Remove the living sections with labels outside limits of shape (B,), m; return their number.
+    """Remove the feasible sections with labels outside limits of shape (B,), m; return their
+    number.
 
     `removed`, shape (B, S), receives the mask of the removed ones.
     """
@@ -479,8 +481,8 @@ def keep_labels_all(
     for b in range(len(sections.used)):
         for s in range(sections.used[b]):
             slot = sections.slots[b, s]
-            if active[b] and slot.living and not minimum[b] <= slot.label <= maximum[b]:
-                slot.living = False
+            if active[b] and slot.feasible and not minimum[b] <= slot.label <= maximum[b]:
+                slot.feasible = False
                 removed[b, s] = True
                 number += 1
     return number
@@ -488,11 +490,11 @@ def keep_labels_all(
 
 @entry
 def count_all(sections: Sections, counts: Integers) -> None:
-    """Write the number of living sections of each engagement, shape (B,)."""
+    """Write the number of feasible sections of each engagement, shape (B,)."""
     for b in range(len(counts)):
         counts[b] = 0
         for s in range(sections.used[b]):
-            counts[b] += sections.slots[b, s].living
+            counts[b] += sections.slots[b, s].feasible
 
 
 @entry

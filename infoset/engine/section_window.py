@@ -247,10 +247,10 @@ def measure_in_window(
         lower_far, upper_far = slope_band(alpha, across, travelled, far, law)
         lower = min(lower, lower_far)
         upper = max(upper, upper_far)
-    living, overlap = chains.cut(
+    feasible, overlap = chains.cut(
         section, middle / e, scale * lower + turn - slack, scale * upper + turn + slack
     )
-    return living, overlap, overlap < maximum - minimum
+    return feasible, overlap, overlap < maximum - minimum
 
 
 @inlined
@@ -340,5 +340,5 @@ def measure_rate_section(
         lower, upper = rate_band(label, elapsed, rate, 1.0 + steepest * steepest, window, law)
     if chains.is_crowded(section):
         chains.reduce_outward(section, tau, points)
-    living, overlap = chains.cut_misses(section, tau, lower - slack, upper + slack, points)
-    return living, overlap, overlap < upper_miss - lower_miss
+    feasible, overlap = chains.cut_misses(section, tau, lower - slack, upper + slack, points)
+    return feasible, overlap, overlap < upper_miss - lower_miss

@@ -50,7 +50,7 @@ class SetState:
     history : History
         The events so far.
     min_label : float
-        Lower bound of the labels of living sections, m.
+        Lower bound of the labels of feasible sections, m.
     lower_label, upper_label : ndarray, shape (B,)
         Limits of the labels, m.
     status : ndarray of int, shape (B,)
@@ -60,7 +60,7 @@ class SetState:
     lost_step : ndarray of int, shape (B,)
         Step at which the set first became empty; -1 if it never did.
     lost_label : ndarray, shape (B,)
-        Label closest to living at that step, m.
+        Label closest to feasibility at that step, m.
     phi : GuaranteedMiss or None
         The guaranteed miss; None if it is not computed.
     """
@@ -114,13 +114,13 @@ class SetState:
         return self.sections.slots["label"]
 
     @property
-    def living(self) -> Flags:
-        """Whether each slot contains a living section, shape (B, S)."""
-        return self.sections.slots["living"]
+    def feasible(self) -> Flags:
+        """Whether each slot contains a feasible section, shape (B, S)."""
+        return self.sections.slots["feasible"]
 
     @property
     def section_counts(self) -> Integers:
-        """Number of living sections, shape (B,)."""
+        """Number of feasible sections, shape (B,)."""
         counts = np.empty(self.batch, dtype=np.int64)
         section_passes.count_all(self.sections, counts)
         return counts
@@ -132,7 +132,7 @@ class SetState:
 
     @property
     def summaries(self) -> Floats:
-        """Summaries of the living sections, shape (C, B, S, columns). The columns of z may be out
+        """Summaries of the feasible sections, shape (C, B, S, columns). The columns of z may be out
         of date.
         """
         if some(self.sections.stale):
@@ -140,7 +140,7 @@ class SetState:
         return self.sections.summaries
 
     def extreme_angles(self) -> Floats:
-        """Return the extreme angles of the living sections in the format of
+        """Return the extreme angles of the feasible sections in the format of
         `section_passes.extreme_angles_all`.
         """
         # The predicted misses are usually needed next: one pass computes both.
@@ -160,7 +160,7 @@ class SetState:
         )
 
     def _make_room(self, active: Flags) -> None:
-        """Give each living section room for the vertices that one step adds.
+        """Give each feasible section room for the vertices that one step adds.
 
         Only the active engagements change, but the others may use their room later without another
         count.
@@ -189,8 +189,8 @@ class SetState:
         )
 
     def refine(self, wanted: Flags, number: int) -> None:
-        """Replace the sections of the wanted engagements by a grid over their living labels, found
-        by replay.
+        """Replace the sections of the wanted engagements by a grid over their feasible labels,
+        found by replay.
         """
         self._catch_up()
         new = number * int(np.count_nonzero(wanted)) * len(self.laws)
@@ -201,29 +201,29 @@ class SetState:
         self.min_label = self._min_label()
 
     def _min_label(self) -> float:
-        return float(np.where(self.living, self.labels, np.inf).min())
+        return float(np.where(self.feasible, self.labels, np.inf).min())
 
     def measure_rate(self, error: float) -> int:
-        """Cut the living sections by the rates of the latest event; return the number of labels
+        """Cut the feasible sections by the rates of the latest event; return the number of labels
         that became empty.
         """
         history = self.history
         self._catch_up()
         self._make_room(history.applies[history.events - 1])
         points = chain_storage.working_room()
-        deaths = section_passes.measure_rate_all(
+        newly_emptied = section_passes.measure_rate_all(
             history.log, error, history.seen, history.sights, self.sections, self.table, points
         )
         history.seen = history.events
-        return deaths
+        return newly_emptied
 
     def shift(self, active: Flags, impulse: Floats) -> None:
-        """Shift the living sections and their summaries by impulses of shape (C, B), m/s."""
+        """Shift the feasible sections and their summaries by impulses of shape (C, B), m/s."""
         self._catch_up()
         section_passes.shift_all(active, impulse, self.elapsed, self.sections, self.table)
 
     def predict(self, active: Flags) -> None:
-        """Move the living sections one step.
+        """Move the feasible sections one step.
 
         The move is postponed to the next measurement or query, so that one pass over the memory
         does both.
@@ -235,8 +235,8 @@ class SetState:
         self.sections.stale[active] = True
 
     def keep_labels(self, active: Flags) -> tuple[Flags, int]:
-        """Remove the living sections with labels beyond the limits; return a mask of them and their
-        number.
+        """Remove the feasible sections with labels beyond the limits; return a mask of them and
+        their number.
         """
         removed = np.zeros(self.labels.shape, dtype=bool)
         lower = self.lower_label
@@ -272,7 +272,7 @@ class SetState:
         return summaries
 
     def polygon(self, channel: int, engagement: int, slot: int) -> Floats:
-        """Return the vertices (V, z) of a living section, counter-clockwise, shape (n, 2)."""
+        """Return the vertices (V, z) of a feasible section, counter-clockwise, shape (n, 2)."""
         self._catch_up()
         row = (channel * self.batch + engagement) * self.labels.shape[1] + slot
         return self.outline(self.sections.chains, row, float(self.labels[engagement, slot]))

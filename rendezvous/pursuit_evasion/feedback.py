@@ -23,7 +23,7 @@ PathNow = Callable[[float], Floats]
 HIT_M = 100.0
 """Distance that counts as capture of a point: the accuracy of a last leg without observation."""
 
-_LOOKS = 65
+_OUTPUT_TIMES = 65
 _PAST, _WIDE, _PATIENCE = 1.05, 2.0, 1.0
 _MAX_PLANS, _LONGEST = 10_000, 1e3
 
@@ -160,7 +160,7 @@ class _Pursuit:
                 return self._end(Ended.PROPELLANT_EXHAUSTED)
             pursuer = extremal_paths(self._pursuer, self._evader, plan)[0]
             evader, evader_mass = self._evader_path(own, spell)
-            ended = self._look(pursuer, evader, spell, last)
+            ended = self._end_in_leg(pursuer, evader, spell, last)
             if ended is not None:
                 return ended
             self._past.append((self._time, evader))
@@ -264,7 +264,7 @@ class _Pursuit:
             state = since.state_at(delay)[0]
         return replace(self._evader, start=state)
 
-    def _look(
+    def _end_in_leg(
         self, pursuer: ExtremalPath, evader: PathNow, spell: float, last: bool
     ) -> PursuitFlight | None:
         """Return the flight if it ends in the leg: by a capture, or in the last leg at the closest
@@ -279,7 +279,7 @@ class _Pursuit:
             return None
         if self._radius == 0.0 and not last:
             return None
-        times = np.linspace(0.0, spell, _LOOKS)
+        times = np.linspace(0.0, spell, _OUTPUT_TIMES)
         values = np.array([distance(time) for time in times])
         if self._radius > 0.0:
             inside = np.flatnonzero(values <= self._radius)
@@ -294,7 +294,7 @@ class _Pursuit:
             return self._flight(Ended.CAPTURED, self._time + at, distance(at))
         near = int(np.argmin(values))
         low = times[max(0, near - 1)]
-        high = times[min(_LOOKS - 1, near + 1)]
+        high = times[min(_OUTPUT_TIMES - 1, near + 1)]
         at = float(
             minimize_scalar(
                 distance, bounds=(low, high), method="bounded", options={"xatol": 1e-12}

@@ -217,8 +217,8 @@ def assert_scales(
         for mine, yours, unit in zip(one.seen, other.seen, (length, length, speed), strict=True):
             assert (unit * mine).tolist() == yours.tolist()
         return
-    # A new grid has labels at the ends of those that live, where sections are points: rounding lets
-    # them die or not.
+    # A new grid has labels at the ends of the feasible ones, where sections are points: rounding
+    # empties them or not.
     alike = min(one.steps_before_a_new_grid, other.steps_before_a_new_grid)
     compared = [
         (one.lower_m[:alike], other.lower_m[:alike] / length, 0.0),

@@ -26,7 +26,7 @@ from infoset import (
     SetModel,
     StateBox,
 )
-from tests.infoset.test_information_set import living_range_interval_m
+from tests.infoset.test_information_set import feasible_range_interval_m
 
 pytestmark = pytest.mark.thorough
 
@@ -138,7 +138,7 @@ def test_measuring_again_tells_nothing_new(
         assert first.is_empty == second.is_empty
         assert same(first, second, HAIR)
         np.testing.assert_allclose(
-            living_range_interval_m(once), living_range_interval_m(information), rtol=1e-9
+            feasible_range_interval_m(once), feasible_range_interval_m(information), rtol=1e-9
         )
 
 
@@ -189,7 +189,7 @@ def test_more_data_give_smaller_sets_in_whatever_order(
         <= misses[1].upper_m[0]
         <= misses[0].upper_m[0] + HAIR
     )
-    ends = [living_range_interval_m(information) for information in (before, one)]
+    ends = [feasible_range_interval_m(information) for information in (before, one)]
     assert (
         ends[0][0][0] * (1.0 - 1e-12)
         <= ends[1][0][0]

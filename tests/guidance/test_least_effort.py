@@ -66,16 +66,16 @@ class Checked(LeastEffort):
         impulse = super().decide(situation, state)
         view = situation.information
         e = situation.closing_speed_m_s
-        living = view.living[0]
+        feasible = view.feasible[0]
         ranges = view.ranges_m
-        if situation.step % 7 or not living.any():
+        if situation.step % 7 or not feasible.any():
             return impulse
         # Between two sections the misses are interpolated at three labels.
         (lower_m,), (upper_m,) = view.predicted_miss_by_section_m()
         known = (lower_m, upper_m, ranges)
-        number = np.arange(4 * int(living.sum()) - 3) / 4.0
+        number = np.arange(4 * int(feasible.sum()) - 3) / 4.0
         lower, upper, x = (
-            np.interp(number, np.arange(living.sum()), each[0, living]) for each in known
+            np.interp(number, np.arange(feasible.sum()), each[0, feasible]) for each in known
         )
         to_go_s = x / e
         authority = correctable_later_m(situation, x[None])[0] / (59.0 / 58.0)

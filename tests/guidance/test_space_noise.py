@@ -171,7 +171,7 @@ class Misses:
         self.lower = lower
         self.upper = upper
         self.ranges_m = ranges
-        self.living = np.ones(ranges.shape, dtype=bool)
+        self.feasible = np.ones(ranges.shape, dtype=bool)
 
     def predicted_miss_by_section_m(self) -> tuple[Floats, Floats]:
         return self.lower, self.upper

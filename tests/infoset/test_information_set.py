@@ -29,7 +29,7 @@ MODEL = SetModel(
 )
 
 
-def living_range_interval_m(information: InformationSet) -> tuple[Floats, Floats]:
+def feasible_range_interval_m(information: InformationSet) -> tuple[Floats, Floats]:
     """Return the minimum and the maximum range that agree with the history, to rounding, m, shape
     (B,).
     """
@@ -113,7 +113,7 @@ def test_in_space_a_value_is_that_of_all_axes_and_engagements_or_one_is_needed_f
         np.testing.assert_array_equal(one.predicted_miss().upper_m, each.predicted_miss().upper_m)
 
 
-def test_regridding_gives_twice_the_fewest_and_one_over_the_living_range_ends_included() -> None:
+def test_regridding_gives_twice_the_fewest_and_one_over_the_feasible_range_ends_included() -> None:
     model = replace(MODEL, sections=5, fewest_sections=5)
     information = InformationSet(model)
     information.measure_range(5801.3e3, 0.05)
@@ -127,7 +127,7 @@ def test_regridding_gives_twice_the_fewest_and_one_over_the_living_range_ends_in
 def test_a_range_measurement_keeps_exactly_the_ranges_it_allows() -> None:
     information = InformationSet(replace(MODEL, sections=101))
     information.measure_range(5801.3e3, 0.05)
-    minimum, maximum = living_range_interval_m(information)
+    minimum, maximum = feasible_range_interval_m(information)
     assert minimum[0] == pytest.approx(5801.3e3 / 1.05, rel=1e-13)
     assert maximum[0] == pytest.approx(5801.3e3 / 0.95, rel=1e-13)
     ranges = [section.range_m for section in information.sections()]
@@ -136,7 +136,7 @@ def test_a_range_measurement_keeps_exactly_the_ranges_it_allows() -> None:
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_the_ends_of_the_range_are_alive_and_just_beyond_them_is_dead(seed: int) -> None:
+def test_the_ends_of_the_range_are_feasible_and_labels_just_beyond_them_are_not(seed: int) -> None:
     # A sharp sensor and a large offset make angles tell range, so that the ends are found between
     # stored labels.
     sharp = AngleSensor(0.5, 2e-6, 2e-6, 5801.3e3)
@@ -155,7 +155,7 @@ def test_the_ends_of_the_range_are_alive_and_just_beyond_them_is_dead(seed: int)
         x = x - E * STEP
     assert information.tracking[0]
     travelled = E * information.time_s
-    minimum, maximum = living_range_interval_m(information)
+    minimum, maximum = feasible_range_interval_m(information)
     assert maximum[0] - minimum[0] < 0.9 * 1000e3
     for end, outward in ((minimum[0], -1.0), (maximum[0], 1.0)):
         assert not information.section_at(end + travelled).polygons[0].is_empty
@@ -310,17 +310,17 @@ def test_a_copy_of_a_view_goes_on_as_the_set_does(recovery: Recovery) -> None:
 
 
 @pytest.mark.parametrize(("range_m", "nearest"), [(5.0e6, "minimum"), (6.5e6, "maximum")])
-def test_a_range_that_contradicts_names_the_living_label_nearest_to_it(
+def test_a_range_that_contradicts_names_the_feasible_label_nearest_to_it(
     range_m: float, nearest: str
 ) -> None:
     information = InformationSet(MODEL)
     information.measure_range(5.5e6, 1e-3)
-    living = information.labels_m[information.living]
+    feasible = information.labels_m[information.feasible]
     information.measure_range(range_m, 1e-3)
     (step,), (label,) = information.inconsistency
     assert step == 0
     # The limits stand a little outside the outermost sections' labels.
-    wanted = living.min() if nearest == "minimum" else living.max()
+    wanted = feasible.min() if nearest == "minimum" else feasible.max()
     assert label == pytest.approx(wanted, rel=1e-3)
 
 

@@ -55,7 +55,7 @@ def sound(results: Results) -> bool:
             marks=pytest.mark.thorough,
         ),
         ("rate-free-space", 4006, NoiseKind.GAME, TieRule.UPPER, [84]),
-        # Living labels beyond those found were taken to be refuted.
+        # Feasible labels beyond those found were taken to be refuted.
         pytest.param(
             *("rate-between-labels", 13014, NoiseKind.GAME, TieRule.UPPER, [1, 22, 36, 47]),
             marks=pytest.mark.thorough,
@@ -240,7 +240,7 @@ def test_a_truth_inside_a_section_that_is_thinner_than_rounding_is_not_outside(
     assert sound(simulate(scenario, 50, seed=1))
 
 
-# Living labels that form two intervals
+# Feasible labels that form two intervals
 # --------------------------------------------------------------------------------------------------
 
 
@@ -393,7 +393,7 @@ def two_intervals(steps: int) -> tuple[SetModel, Floats, InformationSetView]:
 def test_a_new_grid_takes_the_interval_of_its_stored_sections_and_keeps_the_limits(
     y: str | None,
 ) -> None:
-    """Two intervals of living labels, at 2400 km and above 2560 km; the measurement of step 16
+    """Two intervals of feasible labels, at 2400 km and above 2560 km; the measurement of step 16
     empties the latter.
     """
     model, measured, _ = two_intervals(17)
@@ -421,15 +421,15 @@ def test_a_new_grid_takes_the_interval_of_its_stored_sections_and_keeps_the_limi
             np.testing.assert_array_equal(section.polygons.vertices, replayed.polygons.vertices)
         return information
 
-    def lives(information: InformationSet, label_m: float) -> bool:
+    def is_feasible(information: InformationSet, label_m: float) -> bool:
         return not information.section_at(label_m).polygons.is_empty.any()
 
     def stored(information: InformationSet) -> Floats:
-        return information.labels_m[information.living]
+        return information.labels_m[information.feasible]
 
-    # Many sections: both intervals are stored, and the set goes on with the one that lives longer.
+    # Many sections: both intervals are stored, and the set goes on with the one that empties later.
     many = after(16, 29)
-    assert [lives(many, label) for label in (2.4e6, 2.48e6, 2.59e6)] == [True, False, True]
+    assert [is_feasible(many, label) for label in (2.4e6, 2.48e6, 2.59e6)] == [True, False, True]
     assert stored(many).min() < 2.41e6
     assert stored(many).max() > 2.55e6
     many = after(17, 29)
@@ -442,6 +442,6 @@ def test_a_new_grid_takes_the_interval_of_its_stored_sections_and_keeps_the_limi
     few = after(16, 3)
     assert len(stored(few)) == 7
     assert stored(few).min() > 2.55e6
-    assert lives(few, 2.4e6)
+    assert is_feasible(few, 2.4e6)
     assert (few._state.lower_label[0], few._state.upper_label[0]) == model.label_limits_m
     assert after(17, 3).inconsistent.all()

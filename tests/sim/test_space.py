@@ -276,9 +276,9 @@ def test_sections_are_those_of_the_two_planar_sets(
             for label in labels:
                 section = whole.section_at(float(label))
                 planes = [one.section_at(float(label)).polygons[0] for one in planar]
-                dead = any(plane.is_empty for plane in planes)
-                assert section.polygons.is_empty.tolist() == [dead, dead]
-                if not dead:
+                is_empty = any(plane.is_empty for plane in planes)
+                assert section.polygons.is_empty.tolist() == [is_empty, is_empty]
+                if not is_empty:
                     for along, plane in zip(section.polygons, planes, strict=True):
                         np.testing.assert_array_equal(along.polygon(), plane.polygon())
                     compared += 1

@@ -1,5 +1,5 @@
-"""Verdicts that rounding must not decide: exactly known parts, few living labels, a guaranteed miss
-of zero.
+"""Verdicts that rounding must not decide: exactly known parts, few feasible labels, a guaranteed
+miss of zero.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def test_a_truth_outside_by_a_hundred_allowances_is_reported(
         assert not displaced(scenario, side * 100.0 * allowance_m).truth_kept.any()
 
 
-# Living labels in a very short interval
+# Feasible labels in a very short interval
 # --------------------------------------------------------------------------------------------------
 
 
@@ -110,8 +110,8 @@ class Stored:
 
 
 def narrow_labels(share: float) -> Engagements:
-    """Errors of 1e-12 rad, almost at their bounds: labels live within 150 ulp around that of the
-    truth at the end.
+    """Errors of 1e-12 rad, almost at their bounds: labels are feasible within 150 ulp around that
+    of the truth at the end.
     """
     scenario = load_scenario(CASES / "narrow-labels.toml")
     scenario = replace(scenario, **of_model(replace(scenario.set_model, recovery=Recovery.NONE)))
@@ -128,7 +128,7 @@ def narrow_labels(share: float) -> Engagements:
 
 
 @pytest.mark.parametrize("share", [3e-8, 1e-7, 1e-6, 1e-4])
-def test_a_set_with_few_living_labels_does_not_become_empty(share: float) -> None:
+def test_a_set_with_few_feasible_labels_does_not_become_empty(share: float) -> None:
     flight = narrow_labels(share)
     while flight.flying:
         flight.advance()
@@ -141,8 +141,8 @@ def test_a_set_with_few_living_labels_does_not_become_empty(share: float) -> Non
 
 
 def test_labels_are_found_down_to_the_stated_width() -> None:
-    """The last angle is moved step by step until no label lives; replays of all floats show the
-    interval.
+    """The last angle is moved step by step until no label is feasible; replays of all floats show
+    the interval.
     """
     flight = narrow_labels(3e-8)
     while flight.step < LAST_ANGLE_AT:
@@ -154,12 +154,12 @@ def test_labels_are_found_down_to_the_stated_width() -> None:
     for moved_rad in np.linspace(0.0, 2e-16, 41).tolist():
         after = flight._information.copy()
         after.measure_angle(last_rad + moved_rad)
-        lives = labels[
+        feasible = labels[
             [not after.section_at(label).polygons[0].is_empty for label in labels.tolist()]
         ]
-        width = np.ptp(lives) / LABEL_M if lives.size else 0.0
-        if width > 1e-15 or lives.size == 0:
-            assert after.living.any() == (lives.size > 0)
+        width = np.ptp(feasible) / LABEL_M if feasible.size else 0.0
+        if width > 1e-15 or feasible.size == 0:
+            assert after.feasible.any() == (feasible.size > 0)
         widths.append(width)
     assert min(widths) == 0.0
     assert sum(1e-15 < width < 3e-14 for width in widths) > 20

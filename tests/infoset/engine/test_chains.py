@@ -258,12 +258,12 @@ class Life:
         self.check()
 
     def cut(self, lower: float, upper: float, of_miss: bool = False) -> bool:
-        """Cut by a band of height or of predicted miss; whether the section is alive as it should
-        be.
+        """Cut by a band of height or of predicted miss; whether the section is nonempty as it
+        should be.
         """
         normal = MISS if of_miss else upward(self.section.tau)
         operation = self.section.cut_misses if of_miss else self.section.cut
-        alive, overlap = operation(lower, upper)
+        nonempty, overlap = operation(lower, upper)
         rounding = 16 * U * self.maximum + self.tolerance
         # The overlap itself is a difference, of levels that need not be near the section.
         doubt = rounding + 4 * U * (abs(Fraction(lower)) + abs(Fraction(upper)))
@@ -272,8 +272,8 @@ class Life:
                 minimum, most = reaches(polygon, normal)
                 exact = min(most - Fraction(lower), Fraction(upper) - minimum)
                 assert sign * (Fraction(overlap) - exact) <= doubt
-                assert alive or sign > 0 or exact <= doubt
-                assert not alive or sign < 0 or exact >= -doubt
+                assert nonempty or sign > 0 or exact <= doubt
+                assert not nonempty or sign < 0 or exact >= -doubt
         self.narrow = exact_clip(
             self.narrow, normal, Fraction(lower) + rounding, Fraction(upper) - rounding
         )
@@ -281,12 +281,12 @@ class Life:
             self.wide, normal, Fraction(lower) - rounding, Fraction(upper) + rounding
         )
         self.operations += 1
-        if alive:
+        if nonempty:
             assert self.wide
             self.check()
         else:
             assert not self.narrow
-        return bool(alive)
+        return bool(nonempty)
 
     def check(self) -> None:
         """All that holds after any operation."""
@@ -467,7 +467,7 @@ def tell(life: Life, step: Step) -> bool:
     return lower > upper or life.cut(lower, upper, step.band.of_miss)
 
 
-# Lives.
+# Sequences of operations.
 
 
 @checked
@@ -524,7 +524,7 @@ def test_a_step_of_a_square_by_hand() -> None:
     assert section.heights() == (-1.0, 1.0)
     assert section.cut(1.0 + 2.0**-40, 3.0) == (False, -(2.0**-40))
     assert sorted(section.outline().tolist()) == sorted(map(list, wanted)), (
-        "a dead section is left as it was"
+        "an empty section is left as it was"
     )
     assert section.cut(1.0, 3.0) == (True, 0.0)
     np.testing.assert_array_equal(np.sort(section.outline(), axis=0), [(-0.25, 1.0), (1.75, 1.0)])
@@ -563,8 +563,8 @@ def test_extremal_bands_never_lose_the_truth(
             if from_below
             else (level - width - slack, level + slack)
         )
-        alive, overlap = section.cut(*band)
-        assert alive
+        nonempty, overlap = section.cut(*band)
+        assert nonempty
         assert overlap > 0.0
     # A truth once lost would be far outside by now, for the level has turned.
     assert_contains(

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from infoset import AngleSensor, InformationSet, InitialSet, Model, SetModel, StateBox
 from infoset.engine import chains, replays
-from infoset.engine.replays import PROBE, Past, past_of
+from infoset.engine.replays import LAST_REPLAY, Past, past_of
 from infoset.engine.section_law import law_of
-from infoset.engine.section_life import ALIVE, time_to_go
+from infoset.engine.section_life import NEVER_EMPTIED, time_to_go
 from infoset.kernels import JIT
 
 SPEED, STEP, STEPS = 58e3, 0.5, 190
@@ -34,14 +34,14 @@ def _extremes(label: float, near: float, far: float, past: Past) -> Any:
         for each in (near, 0.5 * (near + far), far):
             replays.run(each, replays.with_window(past, np.inf, -np.inf))
     window = Past(past.log, past.errors, past.laws, past.room, near, far, past.thinned)
-    died, _, _ = replays.run(label, window)
+    emptied_at, _, _ = replays.run(label, window)
     law = law_of(past.laws, 0)
     middle = replays.middle_label(label, window)
-    section = replays.replayed_section(window, 0, PROBE, middle)
+    section = replays.replayed_section(window, 0, LAST_REPLAY, middle)
     upper, lower = chains.max_and_min_miss(section, time_to_go(middle, past.log.elapsed, law))
     turn = past.room.drifts[0, 0] * (label - middle) / law.closing_speed
     return (
-        died == ALIVE,
+        emptied_at == NEVER_EMPTIED,
         lower - turn - past.room.drifts[0, 1],
         upper - turn + past.room.drifts[0, 1],
     )
@@ -94,21 +94,21 @@ def test_the_section_of_a_window_holds_the_motion_and_the_sections_of_its_labels
 ) -> None:
     past, label, miss = flight(seed, rate_period)
     windows = past._replace(thinned=thinned)
-    alive, lowest, highest = extremes(label, np.inf, -np.inf, past)
-    assert alive
+    is_feasible, lowest, highest = extremes(label, np.inf, -np.inf, past)
+    assert is_feasible
     assert lowest <= miss <= highest
     place = np.random.default_rng(seed).random()
     for width in (1.0, 1e3, 3e4, 2e5):
         window = label - place * width, label + (1.0 - place) * width
-        alive, lower, upper = extremes(label, *window, windows)
-        assert alive
+        is_feasible, lower, upper = extremes(label, *window, windows)
+        assert is_feasible
         assert lower <= miss <= upper
         rounding = 1e-9 * (highest - lowest)
         for other in np.linspace(*window, 5):
-            lives, own_lower, own_upper = extremes(other, np.inf, -np.inf, past)
-            if lives:
-                alive, lower, upper = extremes(other, *window, windows)
-                assert alive
+            other_is_feasible, own_lower, own_upper = extremes(other, np.inf, -np.inf, past)
+            if other_is_feasible:
+                is_feasible, lower, upper = extremes(other, *window, windows)
+                assert is_feasible
                 assert lower <= own_lower + rounding
                 assert own_upper <= upper + rounding
 
