@@ -61,6 +61,16 @@ def pytest_configure() -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Compile kernels before the workers of a run of all tests start."""
+    config = session.config
+    is_whole = config.args == [str(path) for path in config.getini("testpaths")]
+    if is_whole and config.getoption("numprocesses", None) and not hasattr(config, "workerinput"):
+        from tests.compiled_first import compile_first
+
+        compile_first()
+
+
 def pytest_report_header() -> str | None:
     """Name the skipped tests."""
     return None if IN_A_CHECKOUT else f"not a checkout; skipped: {', '.join(OF_THE_CHECKOUT)}"

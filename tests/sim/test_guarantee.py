@@ -4,11 +4,9 @@ bounds.
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 import itertools
-import sys
 from dataclasses import replace
-from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -29,16 +27,8 @@ from infoset.sim.target import acceleration_m_s2
 
 def script(name: str) -> ModuleType:
     """A benchmark script: its engagements are flown here too, fewer of them."""
-    path = Path(__file__).parents[2] / "benchmarks" / f"{name}.py"
-    if not path.exists():
-        pytest.skip("benchmarks are in a checkout only")
-    spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
+    pytest.importorskip("benchmarks", reason="benchmarks are in a checkout only")
+    return importlib.import_module(f"benchmarks.{name}")
 
 
 @pytest.fixture(scope="module")
