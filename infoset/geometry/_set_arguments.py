@@ -1,5 +1,6 @@
-"""Checks of the arguments of operations on sets: each message has the name of the argument and what
-is possible.
+"""Checks of the arguments of operations on sets.
+
+A message has the name of the argument, and what is possible.
 """
 
 from __future__ import annotations
@@ -18,8 +19,10 @@ Set = TypeVar("Set")
 
 def need_finite(name: str, values: Floats) -> None:
     """Raise an error if a number is not finite, or too large for exact decisions."""
-    # The sum of squares shows it for almost all arrays; it is the fastest test of a small one.
-    if not np.vdot(values, values) <= MAXIMUM and not (np.abs(values) <= MAXIMUM).all():
+    # The sum of squares is the fastest test of a small array, and enough for almost all arrays.
+    if np.vdot(values, values) <= MAXIMUM:
+        return
+    if not (np.abs(values) <= MAXIMUM).all():
         raise ValueError(f"{name} must be finite, at most {MAXIMUM:g} in size: got {shown(values)}")
 
 
@@ -30,22 +33,31 @@ def finite_values(name: str, value: ArrayLike, *shape: str | int) -> Floats:
     is any number of axes.
     """
     values = real_values(name, value)
-    last = shape[1:] if shape[:1] == ("...",) else shape
+    has_batch = shape[:1] == ("...",)
+    last = shape[1:] if has_batch else shape
     if values.shape == (0,) and len(last) == 2 and not isinstance(last[1], str):
         values = values.reshape(0, last[1])
-    sizes = values.shape[values.ndim - len(last) :]
-    if (values.ndim != len(last) if last is shape else values.ndim < len(last)) or any(
-        size != wanted if isinstance(wanted, int) else wanted in "nm" and not size
-        for size, wanted in zip(sizes, last, strict=True)
-    ):
-        text = f"({', '.join(map(str, shape))}{',' if len(shape) == 1 else ''})"
+
+    has_axes = values.ndim >= len(last) if has_batch else values.ndim == len(last)
+    if not has_axes or not _fit(values.shape[values.ndim - len(last) :], last):
+        text = str(shape).replace("'", "")
         raise ValueError(f"{name} must have the shape {text}: got {values.shape}")
     need_finite(name, values)
     return values
 
 
+def _fit(sizes: tuple[int, ...], wanted: tuple[str | int, ...]) -> bool:
+    """Return whether sizes of axes are as wanted: numbers, or letters as in `finite_values`."""
+    for size, one in zip(sizes, wanted, strict=True):
+        if isinstance(one, int) and size != one:
+            return False
+        if one in ("n", "m") and size == 0:
+            return False
+    return True
+
+
 def bound_values(name: str, value: ArrayLike, *shapes: tuple[int, ...]) -> Floats:
-    """Return numbers that may be infinite, of one of some shapes; any shape if there is none."""
+    """Return numbers that may be infinite, of one of `shapes`; of any shape if none is given."""
     bounds = real_values(name, value)
     if math.isnan(np.vdot(bounds, bounds)):
         raise ValueError(f"{name} must be a number, not NaN: got {shown(value)}")
@@ -59,12 +71,14 @@ def bound_values(name: str, value: ArrayLike, *shapes: tuple[int, ...]) -> Float
 def constraint_values(
     names: tuple[str, str], rows: ArrayLike, limits: ArrayLike, *shape: str | int
 ) -> Any:
-    """Return rows of a shape (..., k, n) and their limits, shape (..., k), which may be
-    infinite.
+    """Return rows of a shape (..., k, n) and their limits, shape (..., k).
+
+    The limits may be infinite.
     """
     normals = finite_values(names[0], rows, *shape)
     ends = real_values(names[1], limits)
-    if (ends.ndim != 1 and shape[0] != "...") or ends.shape[-1:] != normals.shape[-2:-1]:
+    has_axes = ends.ndim == 1 or shape[0] == "..."
+    if not has_axes or ends.shape[-1:] != normals.shape[-2:-1]:
         raise ValueError(
             f"{names[0]} and {names[1]} must have as many rows: got the shapes {normals.shape} and "
             f"{ends.shape}"
@@ -74,24 +88,25 @@ def constraint_values(
 
 
 def offset_values(offset: ArrayLike, *shape: Any) -> Floats:
-    """Return offsets of a shape (..., n), from such an array or from one number for all
-    coordinates.
-    """
+    """Return offsets of a shape (..., n), also from one number for all coordinates."""
     values = real_values("offset", offset)
-    return finite_values("offset", values if values.ndim else np.full(shape[-1], values), *shape)
+    if values.ndim == 0:
+        values = np.full(shape[-1], values)
+    return finite_values("offset", values, *shape)
 
 
 def box_ends(lower: ArrayLike, upper: ArrayLike, *shape: str | int) -> tuple[Floats, Floats]:
-    """Return the ends of boxes, of the same shape."""
+    """Return the lower and the upper ends of boxes, of the same shape."""
     minimum = finite_values("lower", lower, *shape)
-    most = finite_values("upper", upper, *(shape if shape[0] == "..." else minimum.shape))
-    minimum, most = np.broadcast_arrays(minimum, most)
-    if (minimum > most).any():
+    upper_shape = shape if shape[0] == "..." else minimum.shape
+    maximum = finite_values("upper", upper, *upper_shape)
+    minimum, maximum = np.broadcast_arrays(minimum, maximum)
+    if (minimum > maximum).any():
         raise ValueError(
             "the box is reversed: its lower end exceeds the upper one by "
-            f"{float((minimum - most).max()):g}"
+            f"{float((minimum - maximum).max()):g}"
         )
-    return minimum, most
+    return minimum, maximum
 
 
 def radius_values(radius: ArrayLike, *shape: str) -> Floats:
@@ -103,13 +118,14 @@ def radius_values(radius: ArrayLike, *shape: str) -> Floats:
 
 
 def axis_numbers(axes: ArrayLike, space: int, most: int) -> list[int]:
-    """Return different axes of a space from one number or several, at most some."""
+    """Return different axes of a space, at most `most`, from one number or several."""
     numbers = np.atleast_1d(real_values("axes", axes))
     listed = [int(number) for number in numbers.flat if number in range(space)]
     if numbers.ndim > 1 or not 0 < len(set(listed)) == numbers.size <= most:
+        not_all = ", not all" if most < space else ""
         raise ValueError(
-            "axes must be one or more different numbers from 0 to "
-            f"{space - 1}{', not all' if most < space else ''}: got {shown(axes)}"
+            f"axes must be one or more different numbers from 0 to {space - 1}{not_all}: "
+            f"got {shown(axes)}"
         )
     return listed
 
@@ -123,6 +139,6 @@ def need_set(name: str, value: object, kind: type[Set]) -> Set:
 
 def not_negative(name: str, value: float) -> float:
     """Return a number that is not negative."""
-    if value != 0.0:
+    if value != 0.0:  # the default of most arguments
         NOT_NEGATIVE.need(name, value)
     return value

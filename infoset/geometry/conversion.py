@@ -1,9 +1,8 @@
-"""Conversion of convex sets of the plane: shapely geometries, and the vertices of polytopes, to
-rings of vertices.
+"""Conversion of convex sets of the plane to rings of vertices, and of rings to shapely.
 
-A ring is an array of shape (k, 2) with the vertices counter-clockwise: one of a point, two of a
-segment, none of the empty set. The methods of `ConvexPolygons` and `Polytope` with the same purpose
-call these functions.
+The sets are shapely geometries, or the vertices of polytopes. A ring is an array of shape (k, 2)
+with the vertices counter-clockwise: one of a point, two of a segment, none of the empty set. The
+methods of `ConvexPolygons` and `Polytope` with the same purpose call these functions.
 """
 
 from __future__ import annotations
@@ -25,10 +24,10 @@ AREA_ROUNDING = 64.0 * float(np.finfo(np.float64).eps)
 
 
 def ring_of_points(points: Floats) -> Floats:
-    """Return the ring of the convex hull of points, shape (n, 2). O(n) for sorted points, O(n^2) at
-    worst.
+    """Return the ring of the convex hull of points, shape (n, 2).
 
-    Exact: vertices are points, and rounding does not decide which.
+    O(n) for sorted points, O(n^2) at worst. Exact: vertices are points, and rounding does not
+    decide which.
     """
     count = len(points)
     ring = np.zeros((1, count, 2))
@@ -38,8 +37,9 @@ def ring_of_points(points: Floats) -> Floats:
 
 
 def ring_of_geometry(geometry: BaseGeometry) -> Floats:
-    """Return the ring of a convex shapely Point, LineString or Polygon, without vertices along a
-    side. O(n).
+    """Return the ring of a convex shapely Point, LineString or Polygon. O(n).
+
+    Vertices along a side are dropped.
 
     Raises
     ------
@@ -66,8 +66,9 @@ def ring_of_geometry(geometry: BaseGeometry) -> Floats:
 
 
 def geometry_of_ring(ring: Floats) -> BaseGeometry:
-    """Return a ring as a shapely Point, LineString or Polygon; without vertices it is an empty
-    Polygon.
+    """Return a ring as a shapely Point, LineString or Polygon.
+
+    A ring without vertices is an empty Polygon.
     """
     from shapely import LineString, Point, Polygon
 

@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 PolygonsOrPolytope = TypeVar("PolygonsOrPolytope", "ConvexPolygons", "Polytope")
 """The class of the other set of an operation, and of its result."""
+_MORE_OF_DIFFERENCE = 6
+"""Room for more vertices of a difference: four sides of the bounding box, and two to spare."""
 
 
 class ConvexPolygons(ConvexSet):
@@ -46,10 +48,10 @@ class ConvexPolygons(ConvexSet):
     vertices : array_like, shape (..., V, 2)
         The polygon is the convex hull of the first `counts` rows; the others are padding. As an
         attribute, these rows are the vertices counter-clockwise: one for a point, two for a
-        segment, none for the empty set. `polygon` returns those of a single polygon without
+        segment, none for the empty set. `polygon` returns the vertices of a single polygon without
         padding.
     counts : array_like of int, shape (...)
-        Number of points; as an attribute, of vertices.
+        Number of points; as an attribute, number of vertices.
 
     Raises
     ------
@@ -59,18 +61,18 @@ class ConvexPolygons(ConvexSet):
     Notes
     -----
     Operations return new objects. Their arguments are broadcast over the batch. A single polygon is
-    broadcast to the shape of the other polygons, and of several points or directions: `contains` of
-    a polygon takes any number of points. The cost of an operation is for one polygon of n vertices.
-    All arguments are checked: numbers are finite (TypeError if they are not real numbers), and
-    shapes fit (ValueError).
+    broadcast to the shape of the other polygons, or to the number of points or directions:
+    `contains` of a single polygon takes any number of points. Costs are for one polygon of n
+    vertices. All arguments are checked: numbers are finite (TypeError if they are not real
+    numbers), and shapes fit (ValueError).
 
     An empty member of a batch does not affect the others: sets made from it are empty, its support
     function is -inf, its distance from any set is inf, and points such as its centroid are masked
     (`numpy.ma.MaskedArray`). A single empty set has no such points; then a ValueError is raised.
 
-    An operation of a single polygon with a `Polytope` of the plane, in either order, is that of two
-    polytopes: a set that it gives is a `Polytope`, and it is exact only to rounding.
-    `ConvexPolygons.from_points(polytope.vertices)` converts the other one.
+    An operation of a single polygon with a `Polytope` of the plane, in either order, converts the
+    polygon to a `Polytope`: the resulting set is a `Polytope`, and exact only to rounding.
+    `ConvexPolygons.from_points(polytope.vertices)` converts a polytope instead.
 
     Operators: `P & Q` (intersection), `P + Q` (Minkowski sum), `P + vector` (translation), `A @ P`
     (linear map), `point in P`, `P <= Q` (subset). `P == Q` compares objects; `equals` compares
@@ -102,8 +104,9 @@ class ConvexPolygons(ConvexSet):
 
     @classmethod
     def unchecked(cls, vertices: Floats, counts: Integers) -> Self:
-        """Return polygons of arrays `vertices` and `counts`, counter-clockwise, without checks and
-        without a copy.
+        """Return polygons of arrays `vertices`, counter-clockwise, and `counts`.
+
+        The arrays are not checked and not copied.
         """
         self = cls.__new__(cls)
         self.vertices = vertices
@@ -112,11 +115,11 @@ class ConvexPolygons(ConvexSet):
 
     @classmethod
     def from_vertices(cls, rings: ArrayLike) -> Self:
-        """Return the polygons with rings of vertices, shape (..., V, 2), in either order around the
-        polygon. O(n).
+        """Return the polygons with rings of vertices, shape (..., V, 2). O(n).
 
-        A ring may repeat vertices, also its first at the end, and have vertices along a side.
-        `stack` makes a batch of polygons from rings of different lengths.
+        A ring goes around the polygon in either order. It may repeat vertices, also its first one
+        at the end, and have vertices along a side. `stack` makes a batch of polygons from rings of
+        different lengths.
 
         Raises
         ------
@@ -145,25 +148,22 @@ class ConvexPolygons(ConvexSet):
 
     @classmethod
     def from_points(cls, points: ArrayLike) -> Self:
-        """Return the convex hull of points, shape (n, 2) or (..., n, 2); no points give the empty
-        set.
+        """Return the convex hull of points, shape (n, 2) or (..., n, 2).
 
-        O(n) for sorted points, O(n^2) at worst. Exact: vertices are points, and rounding does not
-        decide which.
+        No points give the empty set. O(n) for sorted points, O(n^2) at worst. Exact: vertices are
+        points, and rounding does not decide which.
         """
         array = finite_values("points", points, "...", "k", 2)
-        return cls.unchecked(array, np.full(array.shape[:-2], array.shape[-2]))._make(
-            0, kernels.hull
-        )
+        cloud = cls.unchecked(array, np.full(array.shape[:-2], array.shape[-2]))
+        return cloud._make(0, kernels.hull)
 
     @classmethod
     def from_constraints(cls, normals: ArrayLike, offsets: ArrayLike) -> Self:
-        """Return {p: normals p <= offsets}, with normals of shape (..., k, 2), of any length, and
-        offsets (..., k).
+        """Return {p: normals p <= offsets}.
 
-        Infinite offsets are no limit. O(k^2). Exact: which constraints are redundant, and whether
-        the set is empty, is decided without rounding, and each coordinate is within a few ulp of
-        itself.
+        The normals have the shape (..., k, 2) and any length, the offsets (..., k). Infinite
+        offsets are no limit. O(k^2). Exact: which constraints are redundant, and whether the set is
+        empty, is decided without rounding, and each coordinate is rounded by a few ulp.
 
         Raises
         ------
@@ -182,14 +182,16 @@ class ConvexPolygons(ConvexSet):
         sets = cls.empty(shape[:-1])._make(shape[-1] + 4, kernels.intersect_lines, lines)
         if (sets.counts < 0).any():
             index = np.argwhere(sets.counts < 0)[0].tolist()
-            raise ValueError(f"the set{f' {index}' if index else ''} is unbounded")
+            number = f" {index}" if index else ""
+            raise ValueError(f"the set{number} is unbounded")
 
         return sets
 
     @classmethod
     def from_box(cls, lower: ArrayLike, upper: ArrayLike) -> Self:
-        """Return {p: lower <= p <= upper}, of shapes (2,) or (..., 2). Exact; equal ends give a
-        segment or a point.
+        """Return {p: lower <= p <= upper}, of shapes (2,) or (..., 2). Exact.
+
+        Equal ends give a segment or a point.
         """
         minimum, most = box_ends(lower, upper, "...", 2)
         corners = np.stack([minimum, minimum, most, most], axis=-2)
@@ -205,26 +207,28 @@ class ConvexPolygons(ConvexSet):
     def from_ball(
         cls, centre: ArrayLike, radius: ArrayLike, sides: int = 16, *, outer: bool = True
     ) -> Self:
-        """Return regular polygons around discs with `centre`, shape (..., 2), and `radius`, shape
-        (...), or in them.
+        """Return regular polygons around discs, or in them.
 
-        An `outer` polygon contains the disc and exceeds it by the factor 1 / cos(pi / sides); an
-        inner one is contained in it. Both to rounding: a few ulp. O(sides), at least three.
+        The discs have a `centre`, shape (..., 2), and a `radius`, shape (...). An `outer` polygon
+        contains the disc and exceeds it by the factor 1 / cos(pi / sides); an inner polygon is
+        contained in it. Both are true up to rounding, a few ulp. O(sides), at least three.
         """
         Limits(minimum=3, whole=True).need("sides", sides)
         middle = finite_values("centre", centre, "...", 2)
         radii = radius_values(radius, "...")
 
+        # The sides of an outer polygon touch the disc where an inner one has its vertices.
         first = 0.5 if outer else 0.0
-        stretch = math.cos(math.pi / sides) if outer else 1.0
+        inradius = math.cos(math.pi / sides) if outer else 1.0
         angles = (np.arange(sides) + first) * (2.0 * math.pi / sides)
-        unit = np.stack([np.cos(angles), np.sin(angles)], axis=-1) / stretch
+        unit = np.stack([np.cos(angles), np.sin(angles)], axis=-1) / inradius
         return cls.from_points(middle[..., None, :] + radii[..., None, None] * unit)
 
     @classmethod
     def from_zonotope(cls, zonotope: ZonotopeArrays) -> Self:
-        """Return a `Zonotope` of R^2 as a single polygon. O(g^2) for g generators; coordinates are
-        rounded g times.
+        """Return a `Zonotope` of R^2 as a single polygon. O(g^2) for g generators.
+
+        Coordinates are rounded g times.
 
         Raises
         ------
@@ -253,8 +257,9 @@ class ConvexPolygons(ConvexSet):
         return cls.unchecked(ring, np.array(len(ring), dtype=np.int64))
 
     def to_shapely(self) -> BaseGeometry:
-        """Return a single polygon as a shapely Point, LineString or Polygon; the empty set is an
-        empty Polygon.
+        """Return a single polygon as a shapely Point, LineString or Polygon.
+
+        The empty set is an empty Polygon.
         """
         return conversion.geometry_of_ring(self.polygon())
 
@@ -276,7 +281,8 @@ class ConvexPolygons(ConvexSet):
         if len(shapes) > 1:
             raise ValueError(f"sets must be batches of the same shape: got {sorted(shapes)}")
 
-        shape = (len(sets), *(sets[0].shape if sets else ()))
+        member_shape = sets[0].shape if sets else ()
+        shape = (len(sets), *member_shape)
         counts = np.array([one.counts for one in sets], dtype=np.int64).reshape(shape)
         room = max((one.vertices.shape[-2] for one in sets), default=0)
         vertices = np.zeros((*shape, room, 2))
@@ -322,8 +328,9 @@ class ConvexPolygons(ConvexSet):
         return np.array(self.vertices[: int(self.counts)])
 
     def broadcast_to(self, shape: tuple[int, ...]) -> Self:
-        """Return the batch repeated along new axes to another shape; the vertices are shared, not
-        copied.
+        """Return the batch repeated along new axes to another shape.
+
+        The vertices are shared, not copied.
 
         Raises
         ------
@@ -333,17 +340,16 @@ class ConvexPolygons(ConvexSet):
         if shape == self.shape:
             return self
 
-        counts = np.broadcast_to(self.counts, shape)
-        return self.unchecked(
-            np.broadcast_to(self.vertices, (*shape, *self.vertices.shape[-2:])), counts
-        )
+        vertices = np.broadcast_to(self.vertices, (*shape, *self.vertices.shape[-2:]))
+        return self.unchecked(vertices, np.broadcast_to(self.counts, shape))
 
     def __repr__(self) -> str:
         return f"ConvexPolygons(shape={self.shape}, counts={self.counts.tolist()})"
 
     def polytope(self) -> Polytope:
-        """Return a single polygon as a `Polytope`; `ConvexPolygons.from_points(polytope.vertices)`
-        is the reverse.
+        """Return a single polygon as a `Polytope`.
+
+        `ConvexPolygons.from_points(polytope.vertices)` is the reverse.
 
         Raises
         ------
@@ -358,8 +364,9 @@ class ConvexPolygons(ConvexSet):
                 "convert the Polytope of an operation with "
                 "ConvexPolygons.from_points(polytope.vertices)"
             )
-        ring = self.polygon()
-        return Polytope.from_vertices(ring) if len(ring) else Polytope.empty(2)
+        if self.is_empty:
+            return Polytope.empty(2)
+        return Polytope.from_vertices(self.polygon())
 
     def cut(
         self,
@@ -393,19 +400,18 @@ class ConvexPolygons(ConvexSet):
         return self._make(2, kernels.cut, normals, bounds, float(slack_ulp))
 
     def linear_map(self, matrix: ArrayLike) -> ConvexPolygons:
-        """Return the image under a matrix, shape (2, 2) or (..., 2, 2); a singular one gives
-        segments or points.
+        """Return the image under a matrix, shape (2, 2) or (..., 2, 2).
 
-        O(n). Each coordinate of a vertex is rounded three times. `affine_map` maps to other
-        dimensions.
+        A singular matrix gives segments or points. O(n). Each coordinate of a vertex is rounded
+        three times. `affine_map` maps to other dimensions.
         """
         return self._make(0, kernels.linear_map, self._each("matrix", matrix, 2, 2))
 
     def affine_map(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> Any:
-        """Return {matrix p + offset}; a matrix of shape (m, 2), m not 2, maps a single polygon to a
-        `Polytope` in R^m.
+        """Return {matrix p + offset}.
 
-        `offset` has the shape (2,), (..., 2) or (m,), or is 0. O(n), as `linear_map`.
+        A matrix of shape (m, 2), m not 2, maps a single polygon to a `Polytope` in R^m. `offset`
+        has the shape (2,), (..., 2) or (m,), or is 0. O(n), as `linear_map`.
         """
         rows = real_values("matrix", matrix)
         if rows.shape[-2:] == (2, 2):
@@ -414,19 +420,19 @@ class ConvexPolygons(ConvexSet):
         return self.polytope().affine_map(rows, offset)
 
     def translate(self, offset: ArrayLike) -> ConvexPolygons:
-        """Return the polygons moved by an offset, shape (2,) or (..., 2). O(n); each coordinate is
-        rounded once.
+        """Return the polygons moved by an offset, shape (2,) or (..., 2). O(n).
+
+        Each coordinate is rounded once.
         """
         moved = self.vertices + self._each("offset", offset, 2).reshape(*self.shape, 1, 2)
         return ConvexPolygons.unchecked(moved, self.counts)
 
     def preimage(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> Any:
-        """Return {p: matrix p + offset in the set}; a matrix of shape (2, m), m not 2, gives a
-        `Polytope` in R^m.
+        """Return {p: matrix p + offset in the set}.
 
-        O(n). The vertices are mapped by the inverse matrix, whose entries are within a few ulp of
-        themselves. If the matrix is singular, the preimage is unbounded or empty, which is decided
-        exactly.
+        A matrix of shape (2, m), m not 2, gives a `Polytope` in R^m. O(n). The vertices are mapped
+        by the inverse matrix, whose entries are rounded by a few ulp. If the matrix is singular,
+        the preimage is unbounded or empty, which is decided exactly.
 
         Raises
         ------
@@ -446,12 +452,11 @@ class ConvexPolygons(ConvexSet):
         if is_regular.all():
             return mapped
 
+        # All points of the plane are mapped into the range of a singular matrix.
         singular = ~is_regular.reshape(self.shape)
-        meets = (
-            self._measure(kernels.range_meets, matrices, self._each("offset", start, 2))[..., 0]
-            > 0.0
-        )
-        unbounded = singular & meets
+        offsets = self._each("offset", start, 2)
+        meets = self._measure(kernels.range_meets, matrices, offsets)[..., 0]
+        unbounded = singular & (meets > 0.0)
         if unbounded.any():
             index = np.argwhere(unbounded)[0].tolist()
             of_member = f" of polygon {index}" if index else ""
@@ -497,7 +502,7 @@ class ConvexPolygons(ConvexSet):
                 raise ValueError("the difference with an empty set is unbounded")
             # Without a bounded difference a member of a batch is empty.
             one = ConvexPolygons.unchecked(one.vertices, np.where(absent, 0, one.counts))
-        return one._make(6, kernels.difference, *two._flat())
+        return one._make(_MORE_OF_DIFFERENCE, kernels.difference, *two._flat())
 
     def intersection(self, other: PolygonsOrPolytope) -> PolygonsOrPolytope:
         """Return the intersection.
@@ -512,8 +517,9 @@ class ConvexPolygons(ConvexSet):
         return one._make(two.vertices.shape[-2], kernels.intersect, *two._flat())
 
     def convex_hull(self, other: PolygonsOrPolytope) -> PolygonsOrPolytope:
-        """Return the convex hull of the union. O((n + m)^2) at worst; exact, the vertices are
-        vertices of the sets.
+        """Return the convex hull of the union. O((n + m)^2) at worst.
+
+        Exact: the vertices are vertices of the sets.
         """
         if not isinstance(other, ConvexPolygons):
             return self._polytope_with(other).convex_hull(other)
@@ -528,11 +534,11 @@ class ConvexPolygons(ConvexSet):
         return ConvexPolygons.unchecked(points, one.counts + two.counts)._make(0, kernels.hull)
 
     def project(self, axes: ArrayLike) -> Any:
-        """Return the projection on an axis (0 or 1) as intervals: minimum and maximum values, shape
-        (...).
+        """Return the projection on an axis, 0 or 1, as intervals.
 
-        `axes` is an integer or a sequence of integers; both axes give the polygons, their
-        coordinates in this order. O(n), exact.
+        An interval is its minimum and its maximum, both of shape (...). `axes` is an integer or a
+        sequence of integers; both axes give the polygons, their coordinates in this order. O(n),
+        exact.
         """
         numbers = axis_numbers(axes, 2, 2)
         if len(numbers) > 1:
@@ -564,18 +570,18 @@ class ConvexPolygons(ConvexSet):
         return intervals
 
     def reduce_outward(self, cap: int) -> ConvexPolygons:
-        """Polygons of at most `cap` (>= 4) vertices that contain these, by removing sides with
-        minimum added area.
+        """Return polygons of at most `cap` (>= 4) vertices that contain these.
 
-        O(n) for each side; new vertices are rounded.
+        The sides whose removal adds the minimum area are removed first. O(n) for each side; new
+        vertices are rounded.
         """
         Limits(minimum=4, whole=True).need("cap", cap)
         return self._make(0, kernels.reduce_outward, np.int64(cap))
 
     def constraints(self) -> tuple[Floats, Floats]:
-        """Return normals, shape (..., k, 2), of unit length, and offsets, shape (..., k): the set
-        is normals p <= offsets.
+        """Return the polygons as half-planes, normals p <= offsets.
 
+        The normals have the shape (..., k, 2) and the length one, the offsets the shape (..., k).
         There is one for each side, and four for a segment or a point. Unused rows of a batch are 0
         p <= 0; an empty set has the row 0 p <= -1. O(n^2); directions and offsets are rounded.
         """
@@ -593,40 +599,40 @@ class ConvexPolygons(ConvexSet):
         return normals, offsets
 
     def support_function(self, direction: ArrayLike) -> Floats:
-        """Return max(direction . p), shape (...); -inf for the empty set. O(n); rounded as one
-        scalar product.
+        """Return max(direction . p), shape (...); -inf for the empty set. O(n).
+
+        It is rounded as one scalar product.
         """
         return self._measure_at(kernels.support, "direction", direction)[..., 0]
 
     def support_vector(self, direction: ArrayLike) -> Floats:
         """Return a vertex farthest along a direction, shape (..., 2). O(n)."""
-        return self._known(
-            self._measure_at(kernels.support, "direction", direction)[..., 1:], "support vector"
-        )
+        values = self._measure_at(kernels.support, "direction", direction)
+        return self._known(values[..., 1:], "support vector")
 
     def margin(self, point: ArrayLike) -> Floats:
-        """Return the signed distance of a point, shape (2,) or (..., 2), from the boundary,
-        positive inside.
+        """Return the signed distance of a point from the boundary, positive inside.
 
-        -inf for the empty set. O(n), within rounding of the coordinates.
+        The point has the shape (2,) or (..., 2). The result is -inf for the empty set. O(n), within
+        rounding of the coordinates.
         """
         return self._measure_at(kernels.margin, "point", point)[..., 0]
 
     def contains(self, point: ArrayLike, tolerance: float = 0.0) -> Flags:
-        """Return whether a point, shape (2,) or (..., 2), is inside, on the boundary, or within a
-        distance of the set.
+        """Return whether a point is in the set or on its boundary, or within a distance of it.
 
-        O(n). Exact for a tolerance of 0: rounding does not affect the answer.
+        The point has the shape (2,) or (..., 2). O(n). Exact for a tolerance of 0: rounding does
+        not affect the answer.
         """
         distance = self._measure_at(kernels.nearest, "point", point)[..., 2]
         return np.asarray(distance <= not_negative("tolerance", tolerance))
 
     def is_subset(self, other: ConvexPolygons | Polytope, tolerance: float = 0.0) -> Flags:
-        """Return whether all points of the set are in the other one, or within a distance of it,
-        shape (...).
+        """Return whether all points of the set are in the other one, shape (...).
 
-        O(n m). Exact for a tolerance of 0: rounding does not affect the answer. Sets that were
-        computed are subsets only up to rounding in general.
+        With a tolerance, they may be within a distance of it. O(n m). Exact for a tolerance of 0:
+        rounding does not affect the answer. Sets that were computed are subsets only up to rounding
+        in general.
         """
         if not isinstance(other, ConvexPolygons):
             return np.asarray(self._polytope_with(other).is_subset(other, tolerance))
@@ -634,8 +640,9 @@ class ConvexPolygons(ConvexSet):
         return np.asarray(self._excess(other) <= not_negative("tolerance", tolerance))
 
     def _excess(self, other: ConvexPolygons) -> Floats:
-        """Return the maximum distance of a point of the set from the other one, shape (...); 0 only
-        for a subset.
+        """Return the maximum distance of a point of the set from the other one, shape (...).
+
+        It is 0 only for a subset.
         """
         one, two = self._with(other)
         return one._measure(kernels.excess, *two._flat())[..., 0]
@@ -647,32 +654,32 @@ class ConvexPolygons(ConvexSet):
     volume = area
 
     def centroid(self) -> Floats:
-        """Return the centroid, shape (..., 2); the middle of a segment. O(n); it is in the set, to
-        rounding.
+        """Return the centroid, shape (..., 2); the middle of a segment. O(n).
+
+        It is in the set, to rounding.
         """
         return self._known(self._measure(kernels.moments)[..., 1:], "centroid")
 
     def chebyshev_centre(self) -> tuple[Floats, Floats]:
-        """Return the centres, shape (..., 2), and the radii, shape (...), of largest discs in the
-        polygons.
+        """Return the centres and the radii of largest discs in the polygons.
 
-        O(n^2), within rounding of the coordinates. Of several centres it is the middle one.
+        They have the shapes (..., 2) and (...). O(n^2), within rounding of the coordinates. If
+        there are several largest discs, the centre is the middle of their centres.
         """
         values = self._known(self._measure(kernels.max_disc), "Chebyshev centre")
         return values[..., :2], values[..., 2]
 
     def bounding_box(self) -> tuple[Floats, Floats]:
-        """Return the minimum and the maximum coordinates, two arrays of shape (..., 2). O(n),
-        exact.
-        """
+        """Return the minimum and the maximum coordinates, each (..., 2). O(n), exact."""
         used = self._used()[..., None]
         lower = np.min(self.vertices, axis=-2, where=used, initial=np.inf)
         upper = np.max(self.vertices, axis=-2, where=used, initial=-np.inf)
         return self._known(lower, "bounding box"), self._known(upper, "bounding box")
 
     def diameter(self) -> Floats:
-        """Return the maximum distance between two points, shape (...); 0 for the empty set. O(n^2),
-        rounded.
+        """Return the maximum distance between two points, shape (...). O(n^2), rounded.
+
+        It is 0 for the empty set.
         """
         return self._measure(kernels.diameter)[..., 0]
 
@@ -700,16 +707,17 @@ class ConvexPolygons(ConvexSet):
         return np.asarray(self.distance(other) > 0.0)
 
     def closest_point(self, point: ArrayLike) -> Floats:
-        """Return the point of the set nearest to a point, shape (2,) or (..., 2): itself if inside.
-        O(n), rounded.
+        """Return the point of the set nearest to a point, shape (2,) or (..., 2). O(n), rounded.
+
+        A point inside is its own nearest point.
         """
-        return self._known(
-            self._measure_at(kernels.nearest, "point", point)[..., :2], "closest point"
-        )
+        values = self._measure_at(kernels.nearest, "point", point)
+        return self._known(values[..., :2], "closest point")
 
     def hausdorff_distance(self, other: ConvexPolygons | Polytope) -> Floats:
-        """Return the Hausdorff distance, shape (...); inf between an empty and a nonempty set. O(n
-        m), rounded.
+        """Return the Hausdorff distance, shape (...). O(n m), rounded.
+
+        It is inf between an empty and a nonempty set.
         """
         if not isinstance(other, ConvexPolygons):
             return np.asarray(self._polytope_with(other).hausdorff_distance(other))
@@ -728,18 +736,18 @@ class ConvexPolygons(ConvexSet):
         return self._known(out.reshape(*self.shape, count, 2), "points")
 
     def plot(self, ax: Any = None, **style: Any) -> list[Any]:
-        """Draw the polygons on matplotlib axes (default: the present ones of pyplot), and return
-        the artists.
+        """Draw the polygons on matplotlib axes, and return the artists.
 
-        There is one for each polygon that is not empty, in the order of the batch. `style` has the
-        options of matplotlib's `fill`, and of `scatter` for a point. Edges have the colour of the
-        face, unless the style has another: segments and thin sets are visible.
+        Without `ax`, pyplot's present axes are used. There is one artist for each polygon that is
+        not empty, in the order of the batch. `style` has the options of matplotlib's `fill`, and of
+        `scatter` for a point. Edges have the colour of the face, unless the style has another:
+        segments and thin sets are visible.
         """
         rings = [self.vertices[index][: self.counts[index]] for index in np.ndindex(self.shape)]
         return draw_polygons(ax, rings, style)
 
     def _used(self) -> Flags:
-        """Which rows of the array hold vertices, shape (..., V)."""
+        """Return which rows of the array are vertices, shape (..., V)."""
         return np.asarray(np.arange(self.vertices.shape[-2]) < self.counts[..., None])
 
     def _known(self, values: Floats, quantity: str) -> Floats:
@@ -754,8 +762,9 @@ class ConvexPolygons(ConvexSet):
         return np.ma.masked_array(values, np.broadcast_to(empty.reshape(shape), values.shape))
 
     def _measure_at(self, kernel: Callable[..., None], name: str, value: ArrayLike) -> Floats:
-        """Apply a kernel that measures at a vector for each polygon; a single polygon is measured
-        at all vectors.
+        """Apply a kernel that measures at a vector for each polygon.
+
+        A single polygon is measured at all vectors.
         """
         polygons = self
         if not self.shape:
@@ -770,16 +779,17 @@ class ConvexPolygons(ConvexSet):
         """
         if not isinstance(value, np.ma.MaskedArray) or value.shape != (*self.shape, *last):
             return value
+
         is_masked = np.ma.getmaskarray(value).any(axis=tuple(range(-len(last), 0)))
         if (is_masked & ~self.is_empty).any():
             return value
         return np.asarray(value.filled(1.0))
 
     def _each(self, name: str, value: ArrayLike, *last: int) -> Floats:
-        """Return a value for each polygon, shape (B, *last), from such values or from one of the
-        shape `last`.
+        """Return a value for each polygon, shape (B, *last).
 
-        Numbers, whose shape is (), may be infinite.
+        `value` is such values, or one of the shape `last`. Numbers, whose shape is (), may be
+        infinite.
         """
         value = self._without_mask(value, *last)
         values = finite_values(name, value, "...", *last) if last else bound_values(name, value)
@@ -808,6 +818,7 @@ class ConvexPolygons(ConvexSet):
         return self.broadcast_to(shape), other.broadcast_to(shape)
 
     def _flat(self) -> tuple[Floats, Integers]:
+        """Return the arrays of all polygons in one axis, as kernels take them."""
         vertices = self.vertices.reshape(self.counts.size, self.vertices.shape[-2], 2)
         return _plain(vertices), _plain(self.counts.reshape(-1))
 

@@ -13,11 +13,10 @@ from infoset.limits import shown
 
 
 class ConvexSet:
-    """What `ConvexPolygons`, `Polytope` and `Zonotope` share: operators and equality in terms of
-    their methods.
+    """Operators and equality of `ConvexPolygons`, `Polytope` and `Zonotope`.
 
-    An operation of sets of two classes is that of `Polytope` for both: each class has the method
-    `polytope`.
+    They are written in terms of the methods of these classes. An operation of two sets of different
+    classes converts both by their method `polytope`.
     """
 
     __array_ufunc__ = None  # so that NumPy leaves `array + set` and `array @ set` to the set
@@ -36,8 +35,9 @@ class ConvexSet:
         return int(self.vertices.shape[-1])
 
     def equals(self, other: ConvexSet, tolerance: float = 0.0) -> Any:
-        """Return whether each set is a subset of the other one, with the tolerance of
-        `is_subset`.
+        """Return whether each set is a subset of the other one.
+
+        `tolerance` is the tolerance of `is_subset`.
         """
         return self.is_subset(other, tolerance) & other.is_subset(self, tolerance)
 
@@ -53,8 +53,8 @@ class ConvexSet:
         )
         return moved
 
-    # The second signatures are those of sets of two classes: mypy looks only at this class, where
-    # `Self` is any set.
+    # The second signatures are for sets of two classes: mypy looks only at this class, where `Self`
+    # is any set.
     @overload
     def __and__(self, other: Self) -> Self: ...
     @overload

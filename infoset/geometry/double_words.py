@@ -1,5 +1,6 @@
-"""Sums and products with their rounding errors, compiled: one float more holds what was rounded
-away.
+"""Compiled sums and products with their rounding errors.
+
+The exact result is the sum of two floats.
 """
 
 from __future__ import annotations
@@ -17,10 +18,17 @@ from infoset.kernels import Kernels
 
 _kernels = Kernels()  # without fast-math: reordered sums would lose the errors
 
+TERM_ROUNDING = 8.0 * EPS
+"""Rounding of a scalar product, relative to its terms: enough for sums of up to 16 coordinates.
+
+A height that is lower by more than this is not the highest.
+"""
+
 
 def _multiply_add(_: Any, _a: Any, _b: Any, _c: Any) -> Any:
-    """Return the type and the code of a b + c, rounded once: an instruction of processors, which
-    Numba lacks.
+    """Return the type and the code of a b + c, rounded once.
+
+    Processors have an instruction for it, which Numba does not offer.
     """
 
     def code(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
@@ -49,8 +57,11 @@ def two_product(a: float, b: float) -> tuple[float, float]:
 
 @_kernels.allocation_free
 def precise_dot(a: Floats, b: Floats, start: float) -> tuple[float, float]:
-    """Return start + a . b as the sum of two numbers, as exact as with doubled digits (Ogita, Rump
-    and Oishi).
+    """Return start + a . b as the sum of two numbers, as exact as with doubled digits.
+
+    References
+    ----------
+    T. Ogita, S. M. Rump and S. Oishi, Accurate sum and dot product, SIAM J. Sci. Comput. 26 (2005).
     """
     high = start
     low = 0.0
@@ -63,8 +74,9 @@ def precise_dot(a: Floats, b: Floats, start: float) -> tuple[float, float]:
 
 @_kernels.compiled
 def affine_image(points: Floats, matrix: Floats, shift: Floats) -> tuple[Floats, Floats]:
-    """Return matrix x + shift of points, shape (k, m), rounded once, and the maximum rounding
-    errors, shape (m,).
+    """Return matrix x + shift of points, shape (k, m), and the maximum errors, shape (m,).
+
+    Each coordinate is rounded once.
     """
     image = np.empty((len(points), len(matrix)))
     errors = np.zeros(len(matrix))
@@ -77,18 +89,23 @@ def affine_image(points: Floats, matrix: Floats, shift: Floats) -> tuple[Floats,
 
 @_kernels.compiled
 def supports(points: Floats, normals: Floats) -> Floats:
-    """Return max normal . point of each normal, shape (f,), rounded up from nearly exact
-    products.
+    """Return max normal . point of each normal, shape (f,), rounded up.
+
+    The products are nearly exact.
     """
     result = np.full(len(normals), -np.inf)
     for f in range(len(normals)):
         for i in range(len(points)):
-            height, terms = 0.0, 0.0
+            height = 0.0
+            terms = 0.0
             for j in range(points.shape[1]):
                 height += normals[f, j] * points[i, j]
                 terms += abs(normals[f, j] * points[i, j])
+
             # Only points that may be highest are worth the precise product.
-            if height + 8.0 * EPS * terms >= result[f]:
+            if height + TERM_ROUNDING * terms >= result[f]:
                 high, low = precise_dot(normals[f], points[i], 0.0)
-                result[f] = max(result[f], math.nextafter(high, math.inf) if low > 0.0 else high)
+                if low > 0.0:
+                    high = math.nextafter(high, math.inf)
+                result[f] = max(result[f], high)
     return result

@@ -1,5 +1,6 @@
-"""Drawing of convex sets of the plane and of space on axes of matplotlib, which is imported only
-for them.
+"""Drawing of convex sets of the plane and of space on axes of matplotlib.
+
+matplotlib is imported only by the functions that draw.
 """
 
 from __future__ import annotations
@@ -14,8 +15,9 @@ from infoset.arrays import Floats, Integers
 from infoset.limits import shown
 
 FACE_OPACITY = 0.3
-"""Opacity of the facets of a set of space, unless the style has another: the edges behind them stay
-visible.
+"""Opacity of the facets of a set of space, unless the style has another.
+
+Chosen by eye: the edges behind two facets stay visible.
 """
 EDGE_NAMES = {"edgecolor", "ec", "color"}
 """Names of matplotlib for the colour of the edges of patches."""
@@ -31,8 +33,9 @@ OF_PATCHES = {"closed", "fill"}
 
 
 def draw_polygons(ax: Any, rings: Sequence[Floats], style: dict[str, Any]) -> list[Any]:
-    """Draw polygons with rings of vertices, shape (k, 2), on 2-D axes; return an artist for each
-    that has vertices.
+    """Draw polygons with rings of vertices, shape (k, 2), on 2-D axes.
+
+    Return an artist for each ring that has vertices.
 
     The edges have the colour of the face, unless the style has another, so that a segment and a set
     that is thinner than a pixel are visible; a point is a dot. `style` has the options of
@@ -52,12 +55,13 @@ def draw_polygons(ax: Any, rings: Sequence[Floats], style: dict[str, Any]) -> li
 
 
 def draw_facets(ax: Any, rings: Sequence[Floats], style: dict[str, Any]) -> list[Any]:
-    """Draw polygons with rings of vertices, shape (k, 3), on 3-D axes; return one artist, or none
-    without polygons.
+    """Draw polygons with rings of vertices, shape (k, 3), on 3-D axes.
+
+    Return one artist, or none without polygons.
 
     A ring may be a segment; a single ring of one vertex is a dot. `style` has the options of
-    matplotlib's `Poly3DCollection`. `color`, or the next colour of the axes, is that of the edges
-    and of transparent faces, unless `alpha`, `facecolor` or `edgecolor` are given.
+    matplotlib's `Poly3DCollection`. The edges and the transparent faces have the colour `color`, or
+    the next colour of the axes, unless `alpha`, `facecolor` or `edgecolor` are given.
     """
     axes = axes_of(ax, 3)
     if not rings:
@@ -83,9 +87,7 @@ def draw_facets(ax: Any, rings: Sequence[Floats], style: dict[str, Any]) -> list
 
 
 def limits_of(axes: Any, dimensions: int) -> tuple[Floats, Floats]:
-    """Return the minimum and the maximum coordinates of axes, each of shape (2,) or (3,), and keep
-    them as they are.
-    """
+    """Fix the limits of axes; return the minimum and the maximum coordinates, (2,) or (3,) each."""
     lower = np.empty(dimensions)
     upper = np.empty(dimensions)
     for k, axis in enumerate("xyz"[:dimensions]):
@@ -96,21 +98,23 @@ def limits_of(axes: Any, dimensions: int) -> tuple[Floats, Floats]:
 
 
 def ring_order(points: Floats) -> Integers:
-    """Return the order around it of the vertices, shape (k, n), of a convex polygon, a segment or a
-    point of R^n.
+    """Return the order of the vertices, shape (k, n), around a convex polygon of R^n.
+
+    The polygon may be a segment or a point.
     """
     if len(points) < 3:
         return np.arange(len(points))
-    # In these coordinates the polygon is as wide as it is long; the order is the same under any
-    # affine map.
+
+    # In these coordinates the polygon is as wide as it is long; an affine map keeps the order.
     steps = points - points.mean(axis=0)
     coordinates = np.linalg.svd(steps, full_matrices=False)[0]
     return np.argsort(np.arctan2(coordinates[:, 1], coordinates[:, 0]))
 
 
 def _colour_edges_as_face(patch: Any) -> None:
-    """Give the edges of a patch the colour of its face, but not its hatching, which has that of the
-    edges.
+    """Give the edges of a patch the colour of its face.
+
+    The hatching, which matplotlib gives the colour of the edges, keeps its own.
     """
     hatching = patch.get_hatchcolor()
     patch.set_edgecolor(patch.get_facecolor())
@@ -133,13 +137,14 @@ def _next_colour(axes: Any) -> Any:
 
 
 def axes_of(ax: Any, space: int) -> Any:
-    """Return axes for sets of R^2 or R^3: those given, the present ones of pyplot, or new ones if
-    these do not fit.
+    """Return axes for sets of R^2 or R^3.
+
+    They are `ax` if it is given, else the present axes of pyplot, or new ones if these do not fit.
 
     Raises
     ------
     TypeError, ValueError
-        If the given ones are no axes, or have another number of dimensions.
+        If `ax` is not axes, or has another number of dimensions.
     """
     if ax is not None:
         if not isinstance(ax, import_module("matplotlib.axes").Axes):
@@ -152,9 +157,9 @@ def axes_of(ax: Any, space: int) -> Any:
 
     pyplot = import_module("matplotlib.pyplot")
     figure = pyplot.gcf()
-    if figure.axes and _dimensions(figure.gca()) == space:
-        return figure.gca()
     if figure.axes:
+        if _dimensions(figure.gca()) == space:
+            return figure.gca()
         figure = pyplot.figure()
     return figure.add_subplot(projection="3d" if space == 3 else None)
 

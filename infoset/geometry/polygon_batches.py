@@ -1,8 +1,8 @@
-"""Compiled loops over batches of polygons: arrays `vertices`, shape (B, V, 2), and `counts`, shape
-(B,).
+"""Compiled loops over batches of polygons.
 
-Kernels that make polygons write to `out` and `made`; kernels that measure write up to three numbers
-for each polygon.
+A batch is the arrays `vertices`, shape (B, V, 2), and `counts`, shape (B,). Kernels that make
+polygons write to `out` and `made`; kernels that measure write up to three numbers for each polygon
+to `out`.
 """
 
 from __future__ import annotations
@@ -21,6 +21,11 @@ from infoset.geometry import (
     polygon_reduction,
     polygon_sum,
 )
+from infoset.geometry.polygon import Point, Points, vertex
+from infoset.geometry.tolerances import EPS
+
+LEAST_LENGTH = 1e-300
+"""Divisor in place of the length of a side that underflows: vertices of a tidy polygon differ."""
 
 
 @compiled
@@ -54,18 +59,15 @@ def cut(
     bounds: Floats,
     slack: float,
 ) -> None:
-    """Cuts by bands with `bounds` of shape (B, 2), widened by `slack` units of rounding of the
-    vertices' heights.
-    """
+    """Cuts by bands with `bounds` of shape (B, 2), wider by `slack` ulp of the vertices' terms."""
     for i in range(counts.size):
         polygon.copy(vertices[i], counts[i], out[i])
         wider = 0.0
         if slack > 0.0:
             for j in range(counts[i]):
-                wider = max(
-                    wider, abs(normal[i, 0] * out[i, j, 0]) + abs(normal[i, 1] * out[i, j, 1])
-                )
-            wider *= slack * 2.0**-52
+                terms = abs(normal[i, 0] * out[i, j, 0]) + abs(normal[i, 1] * out[i, j, 1])
+                wider = max(wider, terms)
+            wider *= slack * EPS
         made[i], _ = polygon.clip_to_band(
             out[i],
             counts[i],
@@ -91,20 +93,22 @@ def linear_map(
 @compiled
 def invert(matrix: Floats, out: Floats) -> None:
     """Inverse matrices, shape (B, 2, 2); zero for a singular matrix."""
+    origin = Point(0.0, 0.0)
     for i in range(len(matrix)):
         m = matrix[i]
-        determinant = polygon_exact.orientation(0.0, 0.0, m[0, 0], m[0, 1], m[1, 0], m[1, 1])
+        determinant = polygon_exact.orientation(origin, vertex(m, 0), vertex(m, 1))
         if determinant != 0.0:
-            out[i, 0, 0], out[i, 0, 1] = m[1, 1] / determinant, -m[0, 1] / determinant
-            out[i, 1, 0], out[i, 1, 1] = -m[1, 0] / determinant, m[0, 0] / determinant
+            out[i, 0, 0] = m[1, 1] / determinant
+            out[i, 0, 1] = -m[0, 1] / determinant
+            out[i, 1, 0] = -m[1, 0] / determinant
+            out[i, 1, 1] = m[0, 0] / determinant
 
 
 @compiled
 def range_meets(
     vertices: Floats, counts: Integers, out: Floats, matrix: Floats, offset: Floats
 ) -> None:
-    """Whether {m p + o}, with singular matrices m and offsets o, meets the polygons, exactly
-    decided: 1 or 0.
+    """Whether {m p + o}, with singular matrices m, meets the polygons, decided exactly: 1 or 0.
 
     The range is the line through o along the longer column of m, or o itself if m is zero.
     """
@@ -114,23 +118,23 @@ def range_meets(
         along = first if np.abs(first).max() >= np.abs(second).max() else second
         if along[0] == 0.0 and along[1] == 0.0:
             points, n = polygon_exact.tidy(vertices[i], counts[i])
-            out[i, 0] = polygon_exact.holds(points, n, offset[i, 0], offset[i, 1])
+            out[i, 0] = polygon_exact.holds(points, n, vertex(offset, i))
             continue
-        left, right = False, False
+
+        is_left = False
+        is_right = False
         for k in range(counts[i]):
             height = polygon_lines.height_over_line(along, offset[i], vertices[i, k])
-            left |= height >= 0.0
-            right |= height <= 0.0
-        out[i, 0] = left and right
+            is_left |= height >= 0.0
+            is_right |= height <= 0.0
+        out[i, 0] = is_left and is_right
 
 
 @compiled
 def add_segments(
     vertices: Floats, counts: Integers, out: Floats, made: Integers, halves: Floats
 ) -> None:
-    """Minkowski sums with segments from -half to +half, any number for each polygon: `halves` has
-    shape (B, g, 2).
-    """
+    """Minkowski sums with g segments from -half to +half for each polygon: halves (B, g, 2)."""
     for i in range(counts.size):
         polygon.copy(vertices[i], counts[i], out[i])
         made[i] = counts[i]
@@ -187,9 +191,7 @@ def intersect(
 def intersect_lines(
     vertices: Floats, counts: Integers, out: Floats, made: Integers, lines: Floats
 ) -> None:
-    """Intersections of half-planes, shape (B, k, 3, 1), of any number in place of these
-    polygons.
-    """
+    """Intersections of k half-planes, shape (B, k, 3, 1); the polygons give only their number."""
     for i in range(counts.size):
         made[i] = polygon_lines.intersect_lines(lines[i], out[i])
 
@@ -206,33 +208,44 @@ def reduce_outward(
 
 @compiled
 def constraints(vertices: Floats, counts: Integers, normals: Floats, offsets: Floats) -> None:
-    """Half-planes with unit normals, shape (B, k, 2): one for each side; four for a segment and a
-    point.
+    """Half-planes with unit normals, shape (B, k, 2).
+
+    There is one for each side, four for a segment and a point; an empty set is 0 p <= -1.
     """
     for i in range(counts.size):
         points, n = polygon_exact.tidy(vertices[i], counts[i])
         if n == 0:
             offsets[i, 0] = -1.0
-        for j in range(n if n > 2 else min(4 * n, 4)):
-            x, y = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[j] if n < 3 else (0.0, 0.0)
-            if n > 1:
-                first = points[j if n > 2 else 0]
-                last = points[(j + 1) % n if n > 2 else 1]
-                along_x = last[0] - first[0]
-                along_y = last[1] - first[1]
-                length = math.hypot(along_x, along_y)
-                # Vertices of a tidy polygon differ, but their distance may underflow.
-                along_x = along_x / max(length, 1e-300)
-                along_y = along_y / max(length, 1e-300)
-                x, y = (
-                    (along_y, -along_x)
-                    if n > 2
-                    else (x * along_y + y * along_x, y * along_y - x * along_x)
-                )
-            normals[i, j, 0] = x
-            normals[i, j, 1] = y
-            at = polygon.support_index(points, n, x, y)
-            offsets[i, j] = x * points[at, 0] + y * points[at, 1]
+            continue
+        for j in range(n if n > 2 else 4):
+            normal = outward_normal(points, n, j)
+            normals[i, j, 0] = normal.x
+            normals[i, j, 1] = normal.y
+            at = polygon.support_index(points, n, normal.x, normal.y)
+            offsets[i, j] = polygon.height(points, at, normal.x, normal.y)
+
+
+@compiled
+def outward_normal(points: Points, n: int, j: int) -> Point:
+    """Return the unit normal of side j; a segment and a point have four, across each other."""
+    if n > 2:
+        along = unit_vector(vertex(points, j), vertex(points, polygon.following(j, n)))
+        return Point(along.y, -along.x)
+
+    x, y = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[j]
+    if n == 1:
+        return Point(x, y)
+    along = unit_vector(vertex(points, 0), vertex(points, 1))
+    return Point(x * along.y + y * along.x, y * along.y - x * along.x)
+
+
+@compiled
+def unit_vector(start: Point, end: Point) -> Point:
+    """Return the unit vector from one point to another."""
+    x = end.x - start.x
+    y = end.y - start.y
+    length = max(math.hypot(x, y), LEAST_LENGTH)
+    return Point(x / length, y / length)
 
 
 @compiled
@@ -242,8 +255,10 @@ def excess(
     """Maximum distances of a vertex from the other polygons, 0 only for subsets."""
     for i in range(counts.size):
         points, count = polygon_exact.tidy(other[i], other_counts[i])
-        for x, y in vertices[i, : counts[i]]:
-            away = polygon_distance.nearest(points, count, x, y)[2] if count > 0 else np.inf
+        for k in range(counts[i]):
+            away = np.inf
+            if count > 0:
+                away = polygon_distance.nearest(points, count, vertex(vertices[i], k)).distance
             out[i, 0] = max(out[i, 0], away)
 
 
@@ -256,14 +271,18 @@ def gap(
     for i in range(counts.size):
         if polygon_exact.intersect(vertices[i], counts[i], other[i], other_counts[i], common) > 0:
             continue
+
+        # Polygons apart are nearest at a vertex of one of them.
         out[i, 0] = np.inf
         if counts[i] > 0 and other_counts[i] > 0:
             a, n = polygon_exact.tidy(vertices[i], counts[i])
             b, m = polygon_exact.tidy(other[i], other_counts[i])
             for j in range(n):
-                out[i, 0] = min(out[i, 0], polygon_distance.nearest(b, m, a[j, 0], a[j, 1])[2])
+                away = polygon_distance.nearest(b, m, vertex(a, j)).distance
+                out[i, 0] = min(out[i, 0], away)
             for j in range(m):
-                out[i, 0] = min(out[i, 0], polygon_distance.nearest(a, n, b[j, 0], b[j, 1])[2])
+                away = polygon_distance.nearest(a, n, vertex(b, j)).distance
+                out[i, 0] = min(out[i, 0], away)
 
 
 @compiled
@@ -273,9 +292,10 @@ def nearest(vertices: Floats, counts: Integers, out: Floats, point: Floats) -> N
         out[i, 2] = np.inf
         if counts[i] > 0:
             points, count = polygon_exact.tidy(vertices[i], counts[i])
-            out[i, 0], out[i, 1], out[i, 2] = polygon_distance.nearest(
-                points, count, point[i, 0], point[i, 1]
-            )
+            near = polygon_distance.nearest(points, count, vertex(point, i))
+            out[i, 0] = near.x
+            out[i, 1] = near.y
+            out[i, 2] = near.distance
 
 
 @compiled
@@ -304,14 +324,17 @@ def moments(vertices: Floats, counts: Integers, out: Floats) -> None:
     """Areas and centroids."""
     for i in range(counts.size):
         if counts[i] > 0:
-            out[i, 0], out[i, 1], out[i, 2] = polygon.moments(vertices[i], counts[i])
+            found = polygon.moments(vertices[i], counts[i])
+            out[i, 0] = found.area
+            out[i, 1] = found.x
+            out[i, 2] = found.y
 
 
 @compiled
 def diameter(vertices: Floats, counts: Integers, out: Floats) -> None:
     """Maximum distances between two vertices."""
     for i in range(counts.size):
-        out[i, 0] = polygon.farthest_pair(vertices[i], counts[i])[0]
+        out[i, 0] = polygon.farthest_pair(vertices[i], counts[i]).distance
 
 
 @compiled
@@ -319,7 +342,10 @@ def max_disc(vertices: Floats, counts: Integers, out: Floats) -> None:
     """Centres and radii of largest discs."""
     for i in range(counts.size):
         if counts[i] > 0:
-            out[i, 0], out[i, 1], out[i, 2] = polygon_distance.max_disc(vertices[i], counts[i])
+            disc = polygon_distance.max_disc(vertices[i], counts[i])
+            out[i, 0] = disc.x
+            out[i, 1] = disc.y
+            out[i, 2] = disc.radius
 
 
 @compiled
@@ -330,19 +356,27 @@ def sample(vertices: Floats, counts: Integers, uniform: Floats, out: Floats) -> 
         points = vertices[i]
         if n == 0:
             continue
-        whole = 2.0 * polygon.moments(points, n)[0]
+
+        area = 2.0 * polygon.moments(points, n).area
         for j in range(uniform.shape[1]):
-            rest = uniform[i, j, 0] * whole
-            one = uniform[i, j, 1]
-            two = uniform[i, j, 2]
+            # The first number chooses a triangle of the fan from vertex 0, with k and k + 1.
+            rest = uniform[i, j, 0] * area
             k = 1
             while k < n - 2 and rest > polygon.fan_area(points, k):
                 rest -= polygon.fan_area(points, k)
                 k += 1
+
+            # The others are shares of its two sides; a parallelogram is folded to the triangle.
+            one = uniform[i, j, 1]
+            two = uniform[i, j, 2]
             if one + two > 1.0 and n > 2:
                 one = 1.0 - one
                 two = 1.0 - two
             for axis in range(2):
                 start = points[0, axis]
-                out[i, j, axis] = start + (one * (points[k, axis] - start) if n > 1 else 0.0)
-                out[i, j, axis] += two * (points[k + 1, axis] - start) if n > 2 else 0.0
+                value = start
+                if n > 1:
+                    value += one * (points[k, axis] - start)
+                if n > 2:
+                    value += two * (points[k + 1, axis] - start)
+                out[i, j, axis] = value

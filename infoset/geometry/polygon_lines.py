@@ -1,4 +1,8 @@
-"""Compiled intersections of half-planes."""
+"""Compiled intersections of half-planes, decided exactly.
+
+A line is (a, b, c), for the half-plane a x + b y <= c. Each coefficient is the sum of L numbers
+without rounding: `lines` has the shape (k, 3, L), and `values`, shape (k, 3), are the sums rounded.
+"""
 
 from __future__ import annotations
 
@@ -7,24 +11,42 @@ import math
 import numpy as np
 
 from infoset._compile import compiled, inlined
-from infoset.arrays import Floats
+from infoset.arrays import Floats, Integers
 from infoset.geometry.double_words import two_product, two_sum
-from infoset.geometry.polygon import Points, put
+from infoset.geometry.polygon import Point, Points, following, preceding, put, vertex
 from infoset.geometry.polygon_exact import exact_sum, hull, tidy
 
 FAR = 1e70
-"""Coordinates of a box that contains all sets: a set that reaches it is unbounded."""
+"""Half-width of a box that contains all bounded sets of coefficients up to 1e60.
+
+A set that reaches the box is unbounded. Products of three coefficients do not overflow.
+"""
+BOX_SIDES = 4
+"""Number of lines of this box, the first ones of all."""
 UNBOUNDED = -1
 """Number of vertices of an unbounded set."""
 LONGEST = 16
-"""Most terms of a coefficient of a side of a difference."""
+"""Maximum number of terms of a coefficient of a side of a difference.
+
+An offset is two products of sums of two numbers, and a product of two numbers has two terms.
+"""
+DETERMINANT_ROUNDING = 1e-14
+"""Share of the products in a determinant from which its sign is certain.
+
+Each of three factors and five operations errs by a few units of rounding, 1.1e-16: in all by less
+than a third of this.
+"""
+HEIGHT_ROUNDING = 2e-15
+"""Share of two products from which the sign of the difference of two heights is certain.
+
+The coefficient, the difference of coordinates and the product are rounded by 1.1e-16 each, and the
+sum once: in all less than a quarter of this.
+"""
 
 
 @inlined
 def add_products(one: Floats, two: Floats, sign: float, sums: Floats, made: int) -> int:
-    """Append the terms of the product of two sums, each with its rounding error; return the new
-    number of terms.
-    """
+    """Append the terms of the product of two sums, with the rounding errors; return the count."""
     for a in one:
         for b in two:
             if a != 0.0 and b != 0.0:
@@ -35,21 +57,18 @@ def add_products(one: Floats, two: Floats, sign: float, sums: Floats, made: int)
 
 @compiled
 def minor_terms(one: Floats, two: Floats, i: int, j: int) -> Floats:
-    """Return one[i] two[j] - one[j] two[i] of two lines, shape (3, L), as numbers whose sum is
-    exact.
-    """
+    """Return one[i] two[j] - one[j] two[i] of two lines as numbers whose sum is exact."""
     sums = np.empty(4 * one.shape[1] * two.shape[1])
     made = add_products(one[i], two[j], 1.0, sums, 0)
     made = add_products(one[j], two[i], -1.0, sums, made)
+    # The terms no longer overlap: many are zero, and take no further product.
     exact_sum(sums[:made])
     return sums[:made]
 
 
 @compiled
 def height_over_line(along: Floats, start: Floats, point: Floats) -> float:
-    """Return the cross product of `along` and point - start, all of shape (2,); its sign is
-    exact.
-    """
+    """Return the cross product of `along` and point - start, shape (2,) each; its sign is exact."""
     sums = np.empty(8)
     made = add_products(along[:1], point[1:], 1.0, sums, 0)
     made = add_products(along[:1], start[1:], -1.0, sums, made)
@@ -60,17 +79,17 @@ def height_over_line(along: Floats, start: Floats, point: Floats) -> float:
 
 @compiled
 def beyond(values: Floats, lines: Floats, i: int, j: int, k: int) -> float:
-    """Return a number that is positive if the point where the lines i and j meet violates line k;
-    its sign is exact.
+    """Return a number that is positive if the point where lines i and j meet violates line k.
 
-    A line is (a, b, c) with a x + b y <= c. The directions of the first two must turn left, by less
-    than half a turn. `lines` has the shape (k, 3, L): each coefficient is the sum of L numbers.
-    `values`, shape (k, 3), are the sums rounded.
+    Its sign is exact. The lines meet at (x / w, y / w) with x = c_i b_j - b_i c_j,
+    y = a_i c_j - c_i a_j and w = a_i b_j - b_i a_j, so that the number is a_k x + b_k y - c_k w:
+    the directions of the lines i and j must turn left by less than half a turn, that is, w > 0.
     """
     one = values[i]
     two = values[j]
     row = values[k]
-    total = size = 0.0
+    total = 0.0
+    size = 0.0
     for m in range(3):
         n = (m + 1) % 3
         p = (m + 2) % 3
@@ -78,109 +97,140 @@ def beyond(values: Floats, lines: Floats, i: int, j: int, k: int) -> float:
         right = one[n] * two[p]
         total += row[m] * (left - right)
         size += abs(row[m]) * (abs(left) + abs(right))
-    # The values have errors of a few ulp, and each operation one of half an ulp.
-    if abs(total) > 1e-14 * size:
+    if abs(total) > DETERMINANT_ROUNDING * size:
         return float(total)
+
     x = minor_terms(lines[i], lines[j], 2, 1)
     y = minor_terms(lines[i], lines[j], 0, 2)
-    w = minor_terms(lines[i], lines[j], 1, 0)
-    sums = np.empty(2 * lines.shape[2] * (x.size + y.size + w.size))
+    minus_w = minor_terms(lines[i], lines[j], 1, 0)
+    sums = np.empty(2 * lines.shape[2] * (x.size + y.size + minus_w.size))
     made = add_products(lines[k, 0], x, 1.0, sums, 0)
     made = add_products(lines[k, 1], y, 1.0, sums, made)
-    made = add_products(lines[k, 2], w, 1.0, sums, made)
+    made = add_products(lines[k, 2], minus_w, 1.0, sums, made)
     return exact_sum(sums[:made])
 
 
 @compiled
 def intersect_lines(rows: Floats, out: Points) -> int:
-    """Write the polygon {p: a x + b y <= c for all rows (a, b, c)}; return its number of vertices,
-    or `UNBOUNDED`.
+    """Write the polygon {p: a x + b y <= c for all rows}; return its size, or `UNBOUNDED`.
 
-    `rows` has the shape (k, 3, L): each coefficient is the sum of L numbers; `out` (>= k + 4, 2).
-    An infinite c is no limit; a = b = 0 is no limit either if c >= 0, and the empty set otherwise.
-    O(k^2). Borders are inserted one by one. A vertex is kept as the pair of its borders, and an
-    exact determinant decides whether it satisfies a row, so that rounding decides nothing; each
-    coordinate is within a few ulp of itself.
+    `rows` has the shape (k, 3, L), and `out` at least (k + 4, 2). An infinite c is no limit;
+    a = b = 0 is no limit either if c >= 0, and the empty set otherwise. O(k^2).
+
+    The borders are inserted one by one into a large box. A vertex is kept as the pair of its
+    borders, and an exact determinant decides whether it satisfies a row, so that rounding decides
+    nothing; each coordinate is within a few ulp of itself.
     """
-    count = len(rows)
-    lines = np.zeros((count + 4, 3, rows.shape[2]))
-    values = np.empty((count + 4, 3))
-    for i in range(4):
-        lines[i, 0, 0], lines[i, 1, 0], lines[i, 2, 0] = (
-            (1.0, 0.0, -1.0, 0.0)[i],
-            (0.0, 1.0, 0.0, -1.0)[i],
-            FAR,
-        )
-    lines[4:] = rows
-    for i in range(count + 4):
+    lines = lines_in_box(rows)
+    count = len(lines)
+    values = np.empty((count, 3))
+    for i in range(count):
         for m in range(3):
             values[i, m] = exact_sum(lines[i, m])
-    chain = np.arange(count + 8)
-    outside = np.empty(count + 8, dtype=np.bool_)
-    size = 4
-    for k in range(4, count + 4):
+
+    # The numbers of the borders in their order around the set, which begins as the box.
+    chain = np.arange(count + 4)
+    size = BOX_SIDES
+    for k in range(BOX_SIDES, count):
         a, b, c = values[k]
-        if c == np.inf or (a == 0.0 and b == 0.0 and c >= 0.0):
+        has_direction = a != 0.0 or b != 0.0
+        if c == np.inf or (not has_direction and c >= 0.0):
             continue
-        if c == -np.inf or (a == 0.0 and b == 0.0):
+        if c == -np.inf or not has_direction:
             return 0
-        violated = 0
-        for i in range(size):
-            outside[i] = (
-                beyond(values, lines, chain[i], chain[i + 1 if i + 1 < size else 0], k) > 0.0
-            )
-            violated += outside[i]
-        if violated == size:
+        size = insert_border(values, lines, chain, size, k)
+        if size == 0:
             return 0
-        if violated == 0:
-            continue
-        # The vertices first .. first + violated - 1 are outside; vertex i is between borders i and
-        # i + 1.
-        first = 0
-        while not outside[first] or outside[first - 1 if first > 0 else size - 1]:
-            first += 1
-        kept = np.empty(size - violated + 2, dtype=np.int64)
-        for i in range(size - violated + 1):
-            kept[i] = chain[(first + violated + i) % size]
-        size = size - violated + 2
-        kept[size - 1] = k
-        chain[:size] = kept
+
+    if (chain[:size] < BOX_SIDES).any():
+        return UNBOUNDED
+    return write_corners(values, lines, chain, size, out)
+
+
+@compiled
+def lines_in_box(rows: Floats) -> Floats:
+    """Return the lines of a large box, counter-clockwise, and the rows after them."""
+    lines = np.zeros((BOX_SIDES + len(rows), 3, rows.shape[2]))
+    lines[0, 0, 0] = 1.0
+    lines[1, 1, 0] = 1.0
+    lines[2, 0, 0] = -1.0
+    lines[3, 1, 0] = -1.0
+    lines[:BOX_SIDES, 2, 0] = FAR
+    lines[BOX_SIDES:] = rows
+    return lines
+
+
+@compiled
+def insert_border(values: Floats, lines: Floats, chain: Integers, size: int, k: int) -> int:
+    """Cut a set by line k, in place: `chain` has the numbers of its borders. Return its new size.
+
+    Vertex i is between the borders i and i + 1; the size of the empty set is 0.
+    """
+    outside = np.empty(size, dtype=np.bool_)
+    violated = 0
+    for i in range(size):
+        outside[i] = beyond(values, lines, chain[i], chain[following(i, size)], k) > 0.0
+        violated += outside[i]
+    if violated == size:
+        return 0
+    if violated == 0:
+        return size
+
+    # The vertices from `first` to first + violated - 1 are outside: line k replaces the borders
+    # between them.
+    first = 0
+    while not outside[first] or outside[preceding(first, size)]:
+        first += 1
+    remaining = size - violated + 1
+    kept = np.empty(remaining, dtype=np.int64)
+    for i in range(remaining):
+        kept[i] = chain[(first + violated + i) % size]
+    chain[:remaining] = kept
+    chain[remaining] = k
+    return remaining + 1
+
+
+@compiled
+def write_corners(values: Floats, lines: Floats, chain: Integers, size: int, out: Points) -> int:
+    """Write the vertices between the borders of a set that is not empty; return their number."""
     points = np.empty((size, 2))
     made = 0
     for i in range(size):
-        if chain[i] < 4:
-            return UNBOUNDED
-        j = chain[i + 1 if i + 1 < size else 0]
+        j = following(i, size)
         # Vertices that coincide are written once: they may be rounded to different points.
-        if beyond(values, lines, chain[i], j, chain[(i + 2) % size]) == 0.0 and (
-            made > 0 or i + 1 < size
-        ):
+        coincides = beyond(values, lines, chain[i], chain[j], chain[following(j, size)]) == 0.0
+        if coincides and (made > 0 or i + 1 < size):
             continue
-        a = lines[chain[i]]
-        b = lines[j]
-        w = exact_sum(minor_terms(a, b, 0, 1))
-        x = exact_sum(minor_terms(a, b, 2, 1)) / w
-        y = exact_sum(minor_terms(a, b, 0, 2)) / w
-        for line in (values[chain[i]], values[j]):
-            if line[1] == 0.0:
-                x = line[2] / line[0]
-            elif line[0] == 0.0:
-                y = line[2] / line[1]
-        put(points, made, x + 0.0, y + 0.0)
+        corner = meeting_of_lines(values, lines, chain[i], chain[j])
+        put(points, made, corner.x, corner.y)
         made += 1
     return hull(points, made, out)
 
 
 @compiled
-def difference(points: Points, count: int, other: Points, other_count: int, out: Points) -> int:
-    """Write the Minkowski (Pontryagin) difference {p: p + q in the polygon for all q in the other
-    one}, neither empty.
+def meeting_of_lines(values: Floats, lines: Floats, i: int, j: int) -> Point:
+    """Return the point where two lines meet; each coordinate is within a few ulp of itself."""
+    w = exact_sum(minor_terms(lines[i], lines[j], 0, 1))
+    x = exact_sum(minor_terms(lines[i], lines[j], 2, 1)) / w
+    y = exact_sum(minor_terms(lines[i], lines[j], 0, 2)) / w
 
-    O(count * (count + other_count)). Each side moves inward until it meets the lowest vertex of the
-    other polygon, the vertex that is chosen exactly. Its normal and its offset are sums of numbers
-    without rounding, so that the intersection is exact. The sides of the bounding box close the
-    difference of a segment or a point. The coordinates are divided by powers of two, so that
-    products neither overflow nor underflow.
+    # A line along an axis has its coordinate, rounded once.
+    for a, b, c in (values[i], values[j]):
+        if b == 0.0:
+            x = c / a
+        elif a == 0.0:
+            y = c / b
+    return Point(x, y)
+
+
+@compiled
+def difference(points: Points, count: int, other: Points, other_count: int, out: Points) -> int:
+    """Write the Minkowski (Pontryagin) difference {p: p + q in the polygon for all q in the other}.
+
+    Neither is empty. O(count * (count + other_count)). Each side moves inward until it meets the
+    vertex of the other polygon that is farthest along its normal, which is chosen exactly. Its
+    normal and its offset are sums of numbers without rounding, so that the intersection is exact.
+    The coordinates are divided by powers of two, so that products neither overflow nor underflow.
     """
     a, n = tidy(points, count)
     a = a[:n].copy()
@@ -191,56 +241,72 @@ def difference(points: Points, count: int, other: Points, other_count: int, out:
         unit[axis] = math.ldexp(1.0, math.frexp(largest)[1])
         a[:, axis] /= unit[axis]
         b[:, axis] /= unit[axis]
-    rows = np.zeros((n + 4, 3, LONGEST))
-    made = 0
-    for axis in range(2):
-        for sign in (1.0, -1.0):
-            rows[made, axis, 0] = sign
-            most = (sign * a[:, axis]).max()
-            reach = (sign * b[:, axis]).max()
-            rows[made, 2, 0], rows[made, 2, 1] = two_sum(most, -reach)
-            made += 1
+
+    rows = np.zeros((BOX_SIDES + n, 3, LONGEST))
+    write_box_rows(a, b, rows)
+    made = BOX_SIDES
     for i in range(n):
-        j = i + 1 if i + 1 < n else 0
-        side = rows[made]
-        side[0, 0], side[0, 1] = two_sum(a[j, 1], -a[i, 1])
-        side[1, 0], side[1, 1] = two_sum(a[i, 0], -a[j, 0])
-        if side[0, 0] == 0.0 or side[1, 0] == 0.0:  # a side of the box, or a point
-            side[:] = 0.0
-            continue
-        to = farthest_along(side, b)
-        from_x = np.empty(2)
-        from_y = np.empty(2)
-        from_x[0], from_x[1] = two_sum(a[i, 0], -b[to, 0])
-        from_y[0], from_y[1] = two_sum(a[i, 1], -b[to, 1])
-        terms = add_products(side[0, :2], from_x, 1.0, side[2], 0)
-        add_products(side[1, :2], from_y, 1.0, side[2], terms)
-        made += 1
-    work = np.empty((made + 4, 2))
-    made = intersect_lines(rows[:made], work)
+        made += write_side_row(vertex(a, i), vertex(a, following(i, n)), b, rows[made])
+
+    corners = np.empty((made + BOX_SIDES, 2))
+    made = intersect_lines(rows[:made], corners)
     for i in range(made):
-        put(out, i, work[i, 0] * unit[0], work[i, 1] * unit[1])
+        put(out, i, corners[i, 0] * unit[0], corners[i, 1] * unit[1])
     return made
 
 
 @compiled
-def farthest_along(side: Floats, points: Points) -> int:
-    """Return the number of the point that is farthest along the normal of a line, exactly
-    decided.
+def write_box_rows(a: Points, b: Points, rows: Floats) -> None:
+    """Write the sides of the bounding box of a, moved inward by the extent of b.
+
+    They close the difference if a is a segment or a point.
     """
+    made = 0
+    for axis in range(2):
+        for sign in (1.0, -1.0):
+            most = (sign * a[:, axis]).max()
+            reach = (sign * b[:, axis]).max()
+            rows[made, axis, 0] = sign
+            rows[made, 2, 0], rows[made, 2, 1] = two_sum(most, -reach)
+            made += 1
+
+
+@compiled
+def write_side_row(start: Point, end: Point, b: Points, row: Floats) -> int:
+    """Write the side from start to end, moved inward by the extent of b; return the rows written.
+
+    It is none for a side along an axis, which is a side of the bounding box, and for a point.
+    """
+    row[0, 0], row[0, 1] = two_sum(end.y, -start.y)
+    row[1, 0], row[1, 1] = two_sum(start.x, -end.x)
+    if row[0, 0] == 0.0 or row[1, 0] == 0.0:
+        row[:] = 0.0
+        return 0
+
+    farthest = vertex(b, farthest_along(row, b))
+    from_x = np.empty(2)
+    from_y = np.empty(2)
+    from_x[0], from_x[1] = two_sum(start.x, -farthest.x)
+    from_y[0], from_y[1] = two_sum(start.y, -farthest.y)
+    terms = add_products(row[0, :2], from_x, 1.0, row[2], 0)
+    add_products(row[1, :2], from_y, 1.0, row[2], terms)
+    return 1
+
+
+@compiled
+def farthest_along(line: Floats, points: Points) -> int:
+    """Return the index of the point farthest along the normal of a line, decided exactly."""
     best = 0
     sums = np.empty(LONGEST)
     for i in range(1, len(points)):
-        x = side[0, 0] * (points[i, 0] - points[best, 0])
-        y = side[1, 0] * (points[i, 1] - points[best, 1])
+        x = line[0, 0] * (points[i, 0] - points[best, 0])
+        y = line[1, 0] * (points[i, 1] - points[best, 1])
         farther = x + y
-        # The coefficients and the differences are rounded, each by half an ulp, as are the
-        # products.
-        if abs(farther) <= 2e-15 * (abs(x) + abs(y)):
-            made = add_products(side[0, :2], points[i, :1], 1.0, sums, 0)
-            made = add_products(side[0, :2], points[best, :1], -1.0, sums, made)
-            made = add_products(side[1, :2], points[i, 1:], 1.0, sums, made)
-            made = add_products(side[1, :2], points[best, 1:], -1.0, sums, made)
+        if abs(farther) <= HEIGHT_ROUNDING * (abs(x) + abs(y)):
+            made = add_products(line[0, :2], points[i, :1], 1.0, sums, 0)
+            made = add_products(line[0, :2], points[best, :1], -1.0, sums, made)
+            made = add_products(line[1, :2], points[i, 1:], 1.0, sums, made)
+            made = add_products(line[1, :2], points[best, 1:], -1.0, sums, made)
             farther = exact_sum(sums[:made])
         if farther > 0.0:
             best = i

@@ -1,30 +1,48 @@
-"""Compiled outer approximations of polygons and of paths by fewer vertices, stored as in
-`polygon`.
-"""
+"""Compiled outer approximations of polygons (see `polygon`) and of paths by fewer vertices."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 from infoset._compile import allocation_free, compiled, inlined
 from infoset.arrays import Floats
 from infoset.geometry.polygon import (
-    ROUNDING,
+    HEIGHT_ROUNDING,
     Points,
     append,
     close,
     cross,
     farthest_pair,
+    following,
     move,
     put,
 )
 from infoset.geometry.polygon_exact import hull
 
 
+class Removal(NamedTuple):
+    """Twice the area that the removal of an edge adds, and the point where its neighbours meet."""
+
+    added: float
+    x: float
+    y: float
+
+
+class CheapestEdge(NamedTuple):
+    """The first vertex of an edge, and the point where its neighbours meet."""
+
+    index: int
+    x: float
+    y: float
+
+
 @allocation_free
 def drop_turned(out: Points, made: int, x: float, y: float) -> int:
-    """Remove last vertices, down to one, at which the path to (x, y) does not turn left; return the
-    new count.
+    """Remove last vertices, down to one, at which the path to (x, y) does not turn left.
+
+    Return the new count.
     """
     while made > 1:
         along_x = out[made - 1, 0] - out[made - 2, 0]
@@ -37,21 +55,20 @@ def drop_turned(out: Points, made: int, x: float, y: float) -> int:
 
 @compiled
 def reduce_outward(points: Points, count: int, cap: int) -> int:
-    """Remove edges, in place, until at most `cap` vertices are left; the result contains the
-    polygon; return its size.
+    """Remove edges, in place, until at most `cap` vertices are left; return the new count.
 
-    The cap is at least 4, because a convex polygon of five vertices always has an edge that can be
-    removed. An edge is removed by extending its neighbours to their intersection; the edge that
-    adds the minimum area is removed first, at O(count) per edge. If rounding has given an edge a
-    wrong direction, the hull is taken first; a rectangle replaces a hull that is too thin.
+    The result contains the polygon. The cap is at least 4, because a convex polygon of five
+    vertices always has an edge that can be removed. An edge is removed by extending its neighbours
+    to their intersection; the edge that adds the minimum area is removed first, at O(count) per
+    edge. If rounding has given an edge a wrong direction, the hull is taken first; a rectangle
+    replaces a hull that is too thin.
     """
     is_hull = False
     while count > cap:
-        chosen, x, y = cheapest_edge(points, count)
-        if chosen >= 0:
-            put(points, chosen, x, y)
-            gone = chosen + 1 if chosen + 1 < count else 0
-            for i in range(gone, count - 1):
+        edge = cheapest_edge(points, count)
+        if edge.index >= 0:
+            put(points, edge.index, edge.x, edge.y)
+            for i in range(following(edge.index, count), count - 1):
                 move(points, i + 1, i)
             count -= 1
             is_hull = False
@@ -64,36 +81,32 @@ def reduce_outward(points: Points, count: int, cap: int) -> int:
 
 
 @allocation_free
-def cheapest_edge(points: Points, count: int) -> tuple[int, float, float]:
-    """Return the edge whose removal adds the minimum area, and where its neighbours meet; -1 if not
-    convex.
+def cheapest_edge(points: Points, count: int) -> CheapestEdge:
+    """Return the edge whose removal adds the minimum area; its index is -1 if there is none.
+
+    A polygon that is not convex has none, and a thin one may have none.
     """
     minimum = np.inf
-    chosen = -1
-    chosen_x = chosen_y = 0.0
+    cheapest = CheapestEdge(-1, 0.0, 0.0)
     before = count - 1
     for i in range(count):
-        j = i + 1 if i + 1 < count else 0
-        added, x, y = removed_edge(points, before, i, j, j + 1 if j + 1 < count else 0)
+        j = following(i, count)
+        removal = removed_edge(points, before, i, j, following(j, count))
         before = i
-        if added < 0.0:
-            return -1, 0.0, 0.0
-        if added < minimum:
-            minimum = added
-            chosen = i
-            chosen_x = x
-            chosen_y = y
-    return chosen, chosen_x, chosen_y
+        if removal.added < 0.0:
+            return CheapestEdge(-1, 0.0, 0.0)
+        if removal.added < minimum:
+            minimum = removal.added
+            cheapest = CheapestEdge(i, removal.x, removal.y)
+    return cheapest
 
 
 @inlined
-def removed_edge(
-    points: Points, before: int, i: int, j: int, after: int
-) -> tuple[float, float, float]:
-    """Return twice the area that the removal of the edge from vertex i to j adds, and where its
-    neighbours meet.
+def removed_edge(points: Points, before: int, i: int, j: int, after: int) -> Removal:
+    """Return the area that the removal of the edge from vertex i to j adds, twice.
 
-    The area is infinite if the edge cannot be removed, and -1 if the path is not convex there.
+    It is infinite if the edge cannot be removed, and -1 if the path is not convex there. `before`
+    and `after` are the vertices next to the edge.
     """
     from_x = points[i, 0] - points[before, 0]
     from_y = points[i, 1] - points[before, 1]
@@ -103,29 +116,33 @@ def removed_edge(
     to_y = points[after, 1] - points[j, 1]
     bend = cross(from_x, from_y, edge_x, edge_y)
     if bend <= 0.0:
-        return -1.0, 0.0, 0.0
+        return Removal(-1.0, 0.0, 0.0)
+
+    # Neighbours that turn by half a revolution or more do not meet.
     turn = cross(from_x, from_y, to_x, to_y)
-    if turn <= ROUNDING * (abs(from_x * to_y) + abs(from_y * to_x)):
-        return np.inf, 0.0, 0.0
+    if turn <= HEIGHT_ROUNDING * (abs(from_x * to_y) + abs(from_y * to_x)):
+        return Removal(np.inf, 0.0, 0.0)
+
     reach = cross(edge_x, edge_y, to_x, to_y) / turn
     x = points[i, 0] + reach * from_x
     y = points[i, 1] + reach * from_y
     # The new vertex must not be before the far end of the edge: that would cut off a sharp tip.
-    beyond = (points[j, 0] - x) * to_x + (points[j, 1] - y) * to_y >= 0.0
-    return reach * bend if beyond else np.inf, x, y
+    is_beyond = (points[j, 0] - x) * to_x + (points[j, 1] - y) * to_y >= 0.0
+    return Removal(reach * bend if is_beyond else np.inf, x, y)
 
 
 @allocation_free
 def drop_inner_edges(points: Points, count: int, fewest: int, work: Points) -> tuple[int, bool]:
-    """Remove edges inside a path, in place, until `fewest` vertices are left; the path moves
-    outward only.
+    """Remove edges inside a path, in place, until `fewest` vertices are left.
 
-    The edge that adds the minimum area is removed first, of equal ones the first. Return the new
-    number of vertices, and False if no edge can be removed before that. O(count + removed
-    log(count)). `work` is a working array of twice as many rows as the minimum power of two from
-    `count`. Its first column is a tree: the leaves are the areas that the removal of the edge after
-    each vertex adds, the other nodes are the lesser of two children. Its second column has the
-    numbers of the next and, from `leaves`, of the previous vertex.
+    The path moves outward only. The edge that adds the minimum area is removed first, of equal ones
+    the first. Return the new number of vertices, and False if no edge can be removed before that.
+    O(count + removed log(count)).
+
+    `work` is a working array of twice as many rows as the minimum power of two from `count`. Its
+    first column is a tree: the leaves are the areas that the removal of the edge after each vertex
+    adds, the other nodes are the lesser of two children, and the root is node 1. Its second column
+    has the numbers of the next and, from `leaves`, of the previous vertex.
     """
     leaves = 1
     while leaves < count:
@@ -134,38 +151,58 @@ def drop_inner_edges(points: Points, count: int, fewest: int, work: Points) -> t
     links = work[:, 1]
     last = count - 1
     for i in range(leaves):
-        links[i], links[leaves + i] = min(i + 1, last), max(i - 1, 0)
+        links[i] = min(i + 1, last)
+        links[leaves + i] = max(i - 1, 0)
+        # The first and the last edge of the path stay.
+        is_inner = 0 < i < last - 1
         tree[leaves + i] = (
-            removed_edge(points, i - 1, i, i + 1, i + 2)[0] if 0 < i < last - 1 else np.inf
+            removed_edge(points, i - 1, i, i + 1, i + 2).added if is_inner else np.inf
         )
     update_nodes(tree, leaves, 2 * leaves - 1)
+
     while count > fewest and 0.0 <= tree[1] < np.inf:
-        at = 1
-        while at < leaves:
-            at = 2 * at + (tree[2 * at] > tree[1])
-        i = at - leaves
+        i = first_lowest_leaf(tree, leaves)
         before = int(links[leaves + i])
         j = int(links[i])
         after = int(links[j])
-        _, points[i, 0], points[i, 1] = removed_edge(points, before, i, j, after)
-        links[i], links[leaves + after], tree[leaves + j] = after, i, np.inf
+        removal = removed_edge(points, before, i, j, after)
+        put(points, i, removal.x, removal.y)
+        links[i] = after
+        links[leaves + after] = i
+        tree[leaves + j] = np.inf
         count -= 1
-        # The removal changes the areas of four edges.
-        first = i = int(links[leaves + before])
+
+        # The removal changes the areas of four edges: they begin at the two vertices before the new
+        # one, at it, and after it.
+        first = int(links[leaves + before])
+        i = first
+        at = first
         for _ in range(4):
             before = int(links[leaves + i])
-            at = i
             j = int(links[i])
             after = int(links[j])
-            inside = before < i < j < after
-            tree[leaves + i] = removed_edge(points, before, i, j, after)[0] if inside else np.inf
+            is_inner = before < i < j < after
+            tree[leaves + i] = (
+                removed_edge(points, before, i, j, after).added if is_inner else np.inf
+            )
+            at = i
             i = j
         update_nodes(tree, leaves + first, leaves + at)
+
     i = 0
     for made in range(count):
-        points[made, 0], points[made, 1] = points[i, 0], points[i, 1]
+        move(points, i, made)
         i = int(links[i])
     return count, count <= fewest
+
+
+@inlined
+def first_lowest_leaf(tree: Floats, leaves: int) -> int:
+    """Return the number of the lowest leaf of a tree of minima; of equal ones the first."""
+    at = 1
+    while at < leaves:
+        at = 2 * at + (tree[2 * at] > tree[1])
+    return at - leaves
 
 
 @inlined
@@ -180,10 +217,10 @@ def update_nodes(tree: Floats, first: int, last: int) -> None:
 
 @allocation_free
 def box_around(points: Points, count: int, sign: float, slope: float) -> int:
-    """Replace a path by three sides of a box, in place: from its ends along a slope to its
-    outermost vertex.
+    """Replace a path by three sides of a box, in place; return the new count, 4.
 
-    `sign` is 1 if greater x is outward, else -1.
+    They go from its ends along a slope to its outermost vertex. `sign` is 1 if greater x is
+    outward, else -1.
     """
     first_x = points[0, 0]
     first_y = points[0, 1]
@@ -192,32 +229,36 @@ def box_around(points: Points, count: int, sign: float, slope: float) -> int:
     outermost = sign * first_x
     for i in range(count):
         outermost = max(outermost, sign * points[i, 0])
+
     out = sign * (outermost - min(sign * first_x, sign * last_x))
-    points[1, 0], points[1, 1] = first_x + out, first_y + out * slope
-    points[2, 0], points[2, 1] = last_x + out, last_y + out * slope
-    points[3, 0] = last_x
-    points[3, 1] = last_y
+    put(points, 1, first_x + out, first_y + out * slope)
+    put(points, 2, last_x + out, last_y + out * slope)
+    put(points, 3, last_x, last_y)
     return 4
 
 
 @compiled
 def make_rectangle(points: Points, count: int) -> int:
     """Replace a polygon by its bounding rectangle along its diameter, in place. O(count^2)."""
-    length, i, j = farthest_pair(points, count)
-    x, y = 1.0, 0.0
-    if length > 0.0:
-        x = (points[i, 0] - points[j, 0]) / length
-        y = (points[i, 1] - points[j, 1]) / length
+    diameter = farthest_pair(points, count)
+    x = 1.0
+    y = 0.0
+    if diameter.distance > 0.0:
+        x = (points[diameter.first, 0] - points[diameter.last, 0]) / diameter.distance
+        y = (points[diameter.first, 1] - points[diameter.last, 1]) / diameter.distance
+
+    # Coordinates along and across the diameter, from the first vertex.
     origin_x = points[0, 0]
     origin_y = points[0, 1]
     from_x = points[:count, 0] - origin_x
     from_y = points[:count, 1] - origin_y
     along = x * from_x + y * from_y
-    height = x * from_y - y * from_x
+    across = x * from_y - y * from_x
     left = along.min()
     right = along.max()
-    low = height.min()
-    high = height.max()
+    low = across.min()
+    high = across.max()
+
     made = 0
     for a, h in ((left, low), (right, low), (right, high), (left, high)):
         made = append(points, made, origin_x + a * x - h * y, origin_y + a * y + h * x)

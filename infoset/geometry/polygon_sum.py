@@ -1,6 +1,4 @@
-"""Compiled Minkowski sums of convex polygons, stored as in `polygon`, with segments and with
-polygons.
-"""
+"""Compiled Minkowski sums of polygons, stored as in `polygon`, with segments and with polygons."""
 
 from __future__ import annotations
 
@@ -8,29 +6,31 @@ import numpy as np
 
 from infoset._compile import compiled, inlined
 from infoset.geometry.polygon import (
-    ROUNDING,
+    HEIGHT_ROUNDING,
     Points,
     append,
     close,
     copy,
     cross,
     extremes,
+    following,
+    preceding,
     put,
     unsigned,
+    vertex,
 )
 from infoset.geometry.polygon_exact import tidy
 
 
 @compiled
 def add_segment(points: Points, count: int, half_x: float, half_y: float) -> int:
-    """Minkowski sum with the segment from -half to +half, in place; return the number of vertices,
-    at most count + 2.
+    """Add the segment from -half to +half (Minkowski sum), in place; return the new count.
 
-    O(count), in two passes. The boundary is divided at its extremes across the segment; the part to
-    the right of the segment's direction moves by +half, the rest by -half. A division at extremes,
-    and not at sign changes of edges, is correct for tiny edges with a wrong direction. If rounding
-    could hide an extreme (an edge along the segment, a set thin across it, a point), the edges are
-    merged as in `add_polygon`.
+    It is at most count + 2. O(count), in two passes. The boundary is divided at its extremes across
+    the segment; the part to the right of the segment's direction moves by +half, the rest by -half.
+    A division at extremes, and not at sign changes of edges, is correct for tiny edges with a wrong
+    direction. If rounding could hide an extreme (an edge along the segment, a set thin across it, a
+    point), the edges are merged as in `add_polygon`.
     """
     if count == 0 or (half_x == 0.0 and half_y == 0.0):
         return count
@@ -46,6 +46,9 @@ def add_segment(points: Points, count: int, half_x: float, half_y: float) -> int
         made = add_polygon(points, count, segment, 2, out)
         copy(out, made, points)
         return made
+
+    # From the last vertex to the first, so that no vertex is overwritten before it is read; the
+    # direction changes at the two extremes, which are written twice.
     if bottom < top:
         half_x = -half_x
         half_y = -half_y
@@ -70,16 +73,14 @@ def add_segment(points: Points, count: int, half_x: float, half_y: float) -> int
 @inlined
 def is_lowest(points: Points, count: int, i: int, x: float, y: float) -> bool:
     """Whether a vertex is lower, across (x, y), than its neighbours by more than rounding."""
-    before = i - 1 if i > 0 else count - 1
-    after = i + 1 if i + 1 < count else 0
-    height = cross(x, y, points[i, 0], points[i, 1])
-    rise = min(
-        cross(x, y, points[before, 0], points[before, 1]),
-        cross(x, y, points[after, 0], points[after, 1]),
-    )
-    reach_x = max(abs(points[i, 0]), abs(points[before, 0]), abs(points[after, 0]))
-    reach_y = max(abs(points[i, 1]), abs(points[before, 1]), abs(points[after, 1]))
-    return bool(rise - height > ROUNDING * (abs(x) * reach_y + abs(y) * reach_x))
+    here = vertex(points, i)
+    before = vertex(points, preceding(i, count))
+    after = vertex(points, following(i, count))
+    height = cross(x, y, here.x, here.y)
+    rise = min(cross(x, y, before.x, before.y), cross(x, y, after.x, after.y))
+    reach_x = max(abs(here.x), abs(before.x), abs(after.x))
+    reach_y = max(abs(here.y), abs(before.y), abs(after.y))
+    return bool(rise - height > HEIGHT_ROUNDING * (abs(x) * reach_y + abs(y) * reach_x))
 
 
 @compiled
@@ -87,37 +88,36 @@ def lowest_index(points: Points, count: int) -> int:
     """Index of the lowest vertex; of equally low ones the leftmost."""
     best = 0
     for i in range(1, count):
-        if points[i, 1] < points[best, 1] or (
-            points[i, 1] == points[best, 1] and points[i, 0] < points[best, 0]
-        ):
+        is_level = points[i, 1] == points[best, 1]
+        if points[i, 1] < points[best, 1] or (is_level and points[i, 0] < points[best, 0]):
             best = i
     return best
 
 
 @compiled
 def add_polygon(points: Points, count: int, other: Points, other_count: int, out: Points) -> int:
-    """Write the Minkowski sum of two convex polygons by merging their edges in order of direction;
-    return its size.
+    """Write the Minkowski sum of two convex polygons; return its number of vertices.
 
-    The result has at most count + other_count vertices; none if either polygon is empty. O(count +
-    other_count). If rounding has given an edge a wrong direction, the hull is taken first, which
-    costs more: the merge needs edges in order. Each vertex of the sum is one addition of two
-    vertices, so that rounding errors do not accumulate. Rounding may exchange two edges that are
-    nearly parallel, which moves a vertex by less than that.
+    It is at most count + other_count; none if either polygon is empty. O(count + other_count). The
+    edges of both are merged in order of direction, which gives vertices that are one addition each:
+    rounding errors do not accumulate. If rounding has given an edge a wrong direction, the hull is
+    taken first, which costs more: the merge needs edges in order. Rounding may exchange two edges
+    that are nearly parallel, which moves a vertex by less than that.
     """
     if count == 0 or other_count == 0:
         return 0
-    first, first_count = tidy(points, count)
-    second, second_count = tidy(other, other_count)
-    i = lowest_index(first, first_count)
-    j = lowest_index(second, second_count)
-    steps_i = first_count if first_count > 1 else 0
-    steps_j = second_count if second_count > 1 else 0
+    first, n = tidy(points, count)
+    second, m = tidy(other, other_count)
+    i = lowest_index(first, n)
+    j = lowest_index(second, m)
+    steps_i = n if n > 1 else 0
+    steps_j = m if m > 1 else 0
     made = 0
     while True:
         made = append(out, made, first[i, 0] + second[j, 0], first[i, 1] + second[j, 1])
-        next_i = i + 1 if i + 1 < first_count else 0
-        next_j = j + 1 if j + 1 < second_count else 0
+
+        next_i = following(i, n)
+        next_j = following(j, m)
         order = direction_order(
             first[next_i, 0] - first[i, 0],
             first[next_i, 1] - first[i, 1],
@@ -138,12 +138,11 @@ def add_polygon(points: Points, count: int, other: Points, other_count: int, out
 
 @compiled
 def direction_order(ax: float, ay: float, bx: float, by: float) -> int:
-    """Return 1 if direction a is before b, counter-clockwise from +x, -1 if it is after, and 0 if
-    they are equal.
-    """
-    a_returns = ay < 0.0 or (ay == 0.0 and ax < 0.0)
-    b_returns = by < 0.0 or (by == 0.0 and bx < 0.0)
-    if a_returns != b_returns:
-        return -1 if a_returns else 1
+    """Return 1 if direction a is before b, counter-clockwise from +x, -1 if after, 0 if equal."""
+    # Directions from half a turn on come after the others.
+    a_is_late = ay < 0.0 or (ay == 0.0 and ax < 0.0)
+    b_is_late = by < 0.0 or (by == 0.0 and bx < 0.0)
+    if a_is_late != b_is_late:
+        return -1 if a_is_late else 1
     turn = cross(ax, ay, bx, by)
     return int(turn > 0.0) - int(turn < 0.0)

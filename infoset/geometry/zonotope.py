@@ -1,6 +1,4 @@
-"""Zonotopes: boxes, disturbances and initial sets of observers, and sets whose generators are
-carried.
-"""
+"""Zonotopes: boxes, disturbances, initial sets of observers, and sets kept as generators."""
 
 from __future__ import annotations
 
@@ -32,17 +30,17 @@ from infoset.geometry.zonotope_outer import corrected_by_strips, fewer_generator
 from infoset.limits import Limits, real_values
 
 _MAX_SUBSETS = 1_000_000
-"""Number of determinants up to which `volume` is their sum: about a second."""
+"""Maximum number of determinants of which `volume` is the sum: they take about a second."""
 _SUBSETS_AT_ONCE = 20_000
-"""Number of determinants that are computed together: a few MB."""
+"""Number of determinants that are computed together: they take a few MB."""
 
 
 class Zonotope(ZonotopeArrays, ConvexSet):
     """The set of centre + t_1 g_1 + ... + t_m g_m with all -1 <= t_i <= 1.
 
-    The generators are the set: sums and maps take O(m n) steps in any dimension, where a `Polytope`
-    has O(m^(n - 1)) facets. It is also an argument of `LinearObserver`. It may be flat, a segment
-    or a point, and is never empty.
+    Sums and maps take O(m n) steps in any dimension, where a `Polytope` has O(m^(n - 1)) facets. A
+    zonotope is also an argument of `LinearObserver`. It may be flat, a segment or a point, and is
+    never empty.
 
     Parameters
     ----------
@@ -58,12 +56,12 @@ class Zonotope(ZonotopeArrays, ConvexSet):
 
     Notes
     -----
-    Operations return new objects and have the names of those of `Polytope`. Sums, maps, projections
-    and multiples of zonotopes are zonotopes, whose centre and generators are rounded once, to
-    nearest. `reduce_outward`, `cut` and `bounding_box` are rounded outward: they contain the set of
-    the stored numbers, or its part. What is not a zonotope is computed by `polytope()`, which is
-    rounded outward too, and may take long in more than three dimensions: intersection, hull,
-    difference, `margin`, `is_subset` and `equals`. Then the other set is a zonotope or a polytope.
+    Operations return new objects and have the same names as the operations of `Polytope`. Sums,
+    maps, projections and multiples of zonotopes are zonotopes, whose centre and generators are
+    rounded once, to nearest. `reduce_outward`, `cut` and `bounding_box` are rounded outward: they
+    contain the set of the stored numbers, or its part. Intersection, hull, difference, `margin`,
+    `is_subset` and `equals` are computed by `polytope()`, which is rounded outward too, and may
+    take long in more than three dimensions; the other set is then a zonotope or a polytope.
 
     Operators: `Z + Y` (Minkowski sum), `Z + vector` (translation), `A @ Z` (linear map), `2 * Z`,
     `-Z`, `point in Z`, `Z & Y` (a `Polytope`), `Z <= Y` (subset, to rounding). `Z == Y` compares
@@ -74,22 +72,23 @@ class Zonotope(ZonotopeArrays, ConvexSet):
     # ----------------------------------------------------------------------------------------------
 
     def affine_map(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> Zonotope:
-        """Return {matrix x + offset}, with a matrix of shape (k, n), singular or not, and an offset
-        of shape (k,) or 0.
+        """Return {matrix x + offset}.
+
+        The matrix has the shape (k, n), singular or not, and the offset the shape (k,), or is 0.
 
         O(m n k); centre and generators are rounded once.
         """
-        rows = finite_values(
-            "matrix", matrix, "m", self.space
-        ).copy()  # kernels are compiled once, for such arrays
+        # Copies are contiguous and writeable: kernels are compiled once, for such arrays.
+        rows = finite_values("matrix", matrix, "m", self.space).copy()
         moved = offset_values(offset, len(rows)).copy()
         centre, _ = affine_image(self.centre[None].copy(), rows, moved)
         generators, _ = affine_image(self.generators.copy(), rows, np.zeros(len(rows)))
         return Zonotope(centre[0], generators)
 
     def minkowski_sum(self, other: ConvexSet) -> Any:
-        """Return {x + y: x in the set, y in the other}: a zonotope with all generators of both, O(m
-        n).
+        """Return {x + y: x in the set, y in the other}.
+
+        The sum of two zonotopes is the zonotope with all generators of both, O(m n).
 
         With a set of another class it is a `Polytope`, by `polytope()`.
 
@@ -105,8 +104,9 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         return Zonotope(self.centre + other.centre, np.vstack([self.generators, other.generators]))
 
     def add_segment(self, half: ArrayLike) -> Zonotope:
-        """Return the Minkowski sum with the segment from -half to +half, shape (n,): one more
-        generator. Exact.
+        """Return the sum with the segment from -half to +half, shape (n,). Exact.
+
+        The result has one more generator.
         """
         along = finite_values("half", half, self.space)
         if not along.any():
@@ -124,10 +124,9 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         return Zonotope(self.centre, np.vstack([self.generators, box_generators(margin)]))
 
     def project(self, axes: ArrayLike) -> Zonotope:
-        """Return the projection on `axes`, an integer or a sequence of integers, as a set of as
-        many dimensions.
+        """Return the projection on `axes`, an integer or a sequence of integers.
 
-        Exact; generators that become zero go.
+        It is a set of as many dimensions. Exact; generators that become zero go.
         """
         numbers = axis_numbers(axes, self.space, self.space)
         rows = self.generators[:, numbers]
@@ -156,24 +155,22 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         *,
         slack_ulp: float = 0.0,
     ) -> Zonotope:
-        """Return an outer set: a zonotope that contains the part in strips lower <= normals x <=
-        upper.
+        """Return a zonotope that contains the part in strips lower <= normals x <= upper.
 
-        The part itself, which is no zonotope, is that of `polytope().cut`. The result need not be
-        inside the strips, nor inside this set; it is the one with the smallest sum of squares of
-        the generators that a linear correction by the strips gives. It is this set if the strips
-        contain it.
+        The exact part, which is not a zonotope, is `polytope().cut`. The result need not be inside
+        the strips, nor inside this set: of all linear corrections by the strips it has the smallest
+        sum of squares of the generators. It is this set if the strips contain it.
 
         `normals`, shape (n,) or (k, n), have any length. The bounds have the shape () or (k,);
         infinite ones give half-spaces. Each strip is wider on both sides by `slack_ulp` ulp of the
-        products in normals x. A strip has one more generator, and rounding up to n: see
-        `reduce_outward`. O((m + n) n k + k^3) for k strips.
+        products in normals x. Each strip adds one generator, and rounding up to n: `reduce_outward`
+        removes generators. O((m + n) n k + k^3) for k strips.
 
         Raises
         ------
         EmptyPolytopeError
-            If a strip is empty or certainly misses the set. Of several strips that only together
-            miss it, nothing is known.
+            If a strip is empty or certainly misses the set. If only several strips together miss
+            it, the error is not raised.
 
         Notes
         -----
@@ -187,42 +184,45 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         Automatica 41 (2005). C. Combastel, Zonotopes and Kalman observers, Automatica 55 (2015).
         """
         rows = real_values("normals", normals)
-        rows = np.atleast_2d(finite_values("normals", rows, *["m"] * (rows.ndim > 1), self.space))
+        shape = ("m", self.space) if rows.ndim > 1 else (self.space,)
+        rows = np.atleast_2d(finite_values("normals", rows, *shape))
         minimum = bound_values("lower", lower, (), (len(rows),))
-        most = bound_values("upper", upper, (), (len(rows),))
+        maximum = bound_values("upper", upper, (), (len(rows),))
 
+        # Ends of the set along the normals, rounded outward; no bound is farther out.
         terms = np.abs(rows) @ (np.abs(self.centre) + np.abs(self.generators).sum(axis=0))
         wider = not_negative("slack_ulp", slack_ulp) * EPS * terms
-        # Ends of the set along the normals, farther out than rounding.
         rounding = self._operations * EPS * terms
         middles = rows @ self.centre
         reach = np.abs(rows @ self.generators.T).sum(axis=1) + rounding
         low = np.maximum(minimum - wider, middles - reach)
-        high = np.minimum(most + wider, middles + reach)
+        high = np.minimum(maximum + wider, middles + reach)
         if (low > high).any():
             worst = int(np.argmax(low - high))
-            least, greatest = (
-                np.broadcast_to(bound, len(rows))[worst] for bound in (minimum, most)
-            )
+            least = np.broadcast_to(minimum, len(rows))[worst]
+            greatest = np.broadcast_to(maximum, len(rows))[worst]
             raise EmptyPolytopeError(
                 f"no point of the zonotope is in strip {worst}, from {least:g} to {greatest:g}"
             )
+
         is_cut = (low > middles - reach) | (high < middles + reach)
         if not is_cut.any():
             return self
-        return Zonotope(
-            *corrected_by_strips(
-                self.centre, self.generators, rows[is_cut], low[is_cut], high[is_cut]
-            )
+        outer = corrected_by_strips(
+            self.centre, self.generators, rows[is_cut], low[is_cut], high[is_cut]
         )
+        return Zonotope(outer.centre, outer.generators)
 
     @property
     def _operations(self) -> int:
-        """Number of roundings in a sum over generators of scalar products, at most."""
+        """Maximum number of roundings of a sum over generators of scalar products.
+
+        They are m + n, and eight more for the centre, a bound and the rounding itself.
+        """
         return sum(self.generators.shape) + 8
 
     def polytope(self) -> Polytope:
-        """Return the set as a `Polytope`, by `Polytope.from_zonotope`; it is kept."""
+        """Return the set as a `Polytope`, by `Polytope.from_zonotope`; it is computed once."""
         return self._polytope
 
     @cached_property
@@ -240,18 +240,17 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         return self if self.dimension == self.space else self.project(self._span.own)
 
     def intersection(self, *others: ConvexSet) -> Polytope:
-        """Return the intersection with one or more sets of any class, by `polytope()`."""
+        """Return the intersection with one or more sets, by `polytope()`."""
         return self.polytope().intersection(*others)
 
     def convex_hull(self, *others: ConvexSet) -> Polytope:
-        """Return the convex hull of the union with one or more sets of any class, by
-        `polytope()`.
-        """
+        """Return the convex hull of the union with one or more sets, by `polytope()`."""
         return self.polytope().convex_hull(*others)
 
     def minkowski_difference(self, other: ConvexSet) -> Polytope:
-        """Return the Pontryagin difference {x: x + y in the set for all y in the other}, by
-        `polytope()`.
+        """Return {x: x + y in the set for all y in the other}, by `polytope()`.
+
+        This is the Pontryagin difference.
         """
         return self.polytope().minkowski_difference(other)
 
@@ -282,53 +281,52 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         """Return a vertex farthest along a `direction`, both of shape (n,). O(m n)."""
         row = finite_values("direction", direction, self.space)
         heights = self.generators @ row
-        # A generator across the direction counts by its first coordinate that is not zero: the
-        # point is a vertex.
+        # A generator across the direction has the sign of its first coordinate that is not zero, so
+        # that the point is a vertex.
         first = (self.generators != 0.0).argmax(axis=1)
         leading = np.take_along_axis(self.generators, first[:, None], axis=1)[:, 0]
         signs = np.sign(np.where(heights != 0.0, heights, leading))
         return np.asarray(self.centre + signs @ self.generators)
 
     def bounding_box(self) -> tuple[Floats, Floats]:
-        """Return the minimum and the maximum coordinates, each of shape (n,), rounded outward. O(m
-        n).
-        """
+        """Return the minimum and the maximum coordinates, each (n,), rounded outward. O(m n)."""
         ones = np.ones((1, len(self.generators)))
         rows = np.ascontiguousarray(np.abs(self.generators).T)
-        upper, high = affine_image(ones, rows, self.centre.copy())
-        lower, low = affine_image(ones, -rows, self.centre.copy())
+        lower, below = affine_image(ones, -rows, self.centre.copy())
+        upper, above = affine_image(ones, rows, self.centre.copy())
         return (
-            np.where(low > 0.0, np.nextafter(lower[0], -np.inf), lower[0]),
-            np.where(high > 0.0, np.nextafter(upper[0], np.inf), upper[0]),
+            np.where(below > 0.0, np.nextafter(lower[0], -np.inf), lower[0]),
+            np.where(above > 0.0, np.nextafter(upper[0], np.inf), upper[0]),
         )
 
     def margin(self, points: ArrayLike) -> Floats:
-        """Return the minimum distance of `points`, shape (..., n), from the facets;
-        `Polytope.margin` of `polytope()`.
+        """Return the minimum distance of `points`, shape (..., n), from the facets.
 
-        `contains` needs no facets.
+        It is `Polytope.margin` of `polytope()`. `contains` needs no facets.
         """
         return self.polytope().margin(points)
 
     def contains(self, points: ArrayLike, tolerance: float = 0.0) -> Flags:
-        """Return whether `points`, shape (..., n), are in the set, to rounding, or within a
-        `tolerance` on each axis.
+        """Return whether `points`, shape (..., n), are in the set, to rounding.
 
-        In the plane it is decided by the sides. In more dimensions, a point that is not decided by
-        the bounding box or by coefficients of least squares needs a linear program (HiGHS, about 2
-        ms). It only proposes coefficients, or a plane between the point and the set; a point is
+        With a `tolerance`, they may be outside by so much on each axis.
+
+        In the plane the sides decide. In more dimensions, a point that is not decided by the
+        bounding box or by coefficients of least squares needs a linear program (HiGHS, about 2 ms).
+        The program only proposes coefficients, or a plane between the point and the set; a point is
         outside if the plane holds to rounding. The facets are not needed.
         """
         x = finite_values("points", points, "...", self.space)
         if not_negative("tolerance", tolerance):
             return self.enlarged(np.full(self.space, float(tolerance))).contains(x)
+
         span = self._span
         listed = x.reshape(-1, self.space)
         away = (listed - self.centre) / span.scale
         terms = np.abs(listed) + np.abs(self.centre) + np.abs(self.generators).sum(axis=0)
         rounding = self._operations * EPS * terms / span.scale
 
-        # In the affine hull of a flat set, or as near to it as its own points may be.
+        # Points in the affine hull of a flat set, or as near to it as points of the set may be.
         inner = away[:, span.own]
         missing = np.abs(away[:, span.others] - inner @ span.slopes.T)
         allowed = rounding[:, span.others] + rounding[:, span.own] @ np.abs(span.slopes).T + SNAP
@@ -344,16 +342,17 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         return np.asarray(found.reshape(x.shape[:-1]))
 
     def is_subset(self, other: ConvexSet, tolerance: float = 0.0) -> bool:
-        """Return whether all vertices are in the other set, to rounding, or within a `tolerance` of
-        its facets.
+        """Return whether all vertices are in the other set, to rounding.
+
+        With a `tolerance`, they may be within this distance of its facets.
         """
         return self.polytope().is_subset(other, tolerance)
 
     def volume(self) -> float:
         """Return the volume within the affine hull, of its dimension d; 1 for a point.
 
-        It is 2^d times the sum of the determinants, without signs, of all d generators out of m; of
-        the polytope if these are over 1e6.
+        It is 2^d times the sum of the determinants, without signs, of all d generators out of m. If
+        these are more than 1e6, it is the volume of the polytope.
         """
         span = self._span
         space = self.dimension
@@ -361,6 +360,7 @@ class Zonotope(ZonotopeArrays, ConvexSet):
             return 1.0
         if comb(len(self.generators), space) > _MAX_SUBSETS:
             return self.polytope().volume()
+
         # In coordinates along the basis a determinant is exact to rounding of the volume, also of a
         # thin set.
         total = 0.0
@@ -372,8 +372,9 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         return float(2.0**space * total * exact_determinant(span.base) * stretch)
 
     def area(self) -> float:
-        """Return the area of a set of R^2; 0 for a segment or a point. `volume` is for any
-        space.
+        """Return the area of a set of R^2; 0 for a segment or a point.
+
+        `volume` is for any space.
         """
         return self.polytope().area()
 
@@ -382,8 +383,9 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         return self.centre.copy()
 
     def plot(self, ax: Any = None, **style: Any) -> list[Any]:
-        """Draw a set of R^2 or R^3 on matplotlib axes, and return the artists: `Polytope.plot` of
-        `polytope()`.
+        """Draw a set of R^2 or R^3 on matplotlib axes, and return the artists.
+
+        It is `Polytope.plot` of `polytope()`.
         """
         return self.polytope().plot(ax, **style)
 

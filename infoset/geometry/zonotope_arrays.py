@@ -46,8 +46,9 @@ class ZonotopeArrays:
 
 
 def box_generators(half: Floats) -> Floats:
-    """Return the generators of a box with half-widths, shape (n,): one for each that is not
-    zero.
+    """Return the generators of a box with half-widths, shape (n,).
+
+    There is one for each half-width that is not zero.
     """
     return np.asarray(np.diag(half)[half > 0.0])
 

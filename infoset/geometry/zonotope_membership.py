@@ -1,4 +1,4 @@
-"""Whether points are in a zonotope: a linear program proposes, sums of products decide."""
+"""Membership of points in a zonotope: a linear program proposes, sums of products decide."""
 
 from __future__ import annotations
 
@@ -11,26 +11,28 @@ from infoset.geometry.polytope.errors import SolverError
 from infoset.geometry.tolerances import EPS
 
 _REACH = 2.0
-"""Multiple of a point up to which the program searches: all beyond one are inside, and two is
-clearly beyond.
+"""Maximum multiple of a point for which the program searches.
+
+A point is inside if a multiple from one on is; two is clearly beyond one.
 """
 _DEPENDENT = 1e-6
-"""Distance of a unit vector from a span, below which it gives no new direction: far above rounding,
-and rare.
+"""Distance of a unit vector from a span below which it gives no new direction.
+
+It is far above rounding, and random generators are rarely so near to a span.
 """
 
 
 def are_inside(points: Floats, generators: Floats, basis: Integers, rounding: Floats) -> Flags:
-    """Return which points, shape (k, d), are in the zonotope of generators, shape (m, d), around
-    zero, or near it.
+    """Return which points, shape (k, d), are in or near the zonotope of generators around zero.
 
     A point counts as inside if a box of the half-widths `rounding`, shape (k, d), around it meets
-    the zonotope. The generators with the numbers `basis`, shape (d,), are the unit vectors, or
-    opposite ones. Most points are decided by the bounding box, or by coefficients of least squares;
-    each of the others needs a linear program.
+    the zonotope. Of the generators, shape (m, d), the ones with the numbers `basis`, shape (d,),
+    are unit vectors along the axes, or their opposites. Most points are decided by the bounding
+    box, or by coefficients of least squares; each of the others needs a linear program.
     """
     radius = np.abs(generators).sum(axis=0)
     found = (np.abs(points) <= radius + rounding).all(axis=1)
+
     coefficients = points @ np.linalg.pinv(generators)
     sure = np.abs(coefficients).max(axis=1) <= 1.0
     sure &= (np.abs(points - coefficients @ generators) <= rounding).all(axis=1)
@@ -40,11 +42,11 @@ def are_inside(points: Floats, generators: Floats, basis: Integers, rounding: Fl
 
 
 def _is_inside(point: Floats, generators: Floats, basis: Integers, rounding: Floats) -> bool:
-    """Return whether a point is in the zonotope, from the largest multiple of it that is.
+    """Return whether a point is in the zonotope, from its largest multiple that is.
 
-    Coefficients up to one that give the point prove that it is inside, a plane between the point
-    and the zonotope that it is not. If the solver finds neither, the point is closer to the
-    boundary than its tolerance, 1e-10 of the size; it counts as inside.
+    Coefficients up to one that give the point prove that it is inside. A plane between the point
+    and the zonotope proves that it is outside. If the solver finds neither, the point is closer to
+    the boundary than its tolerance, 1e-10 of the size; it counts as inside.
     """
     count, space = generators.shape
     cost = np.zeros(count + 1)
@@ -60,20 +62,19 @@ def _is_inside(point: Floats, generators: Floats, basis: Integers, rounding: Flo
     multiple = float(optimum.x[-1])
     if multiple > 1.0:
         coefficients = np.clip(optimum.x[:-1], -1.0, 1.0) / multiple
-        # What the solver's coefficients miss is made up for by those of the basis.
+        # The coefficients of the basis correct the error of the solver.
         missing = np.abs(point - coefficients @ generators)
         coefficients[basis] = np.abs(coefficients[basis]) + missing
         if np.abs(coefficients).max() <= 1.0:
             return True
+
     normal = np.asarray(optimum.eqlin.marginals)
     proposals = (normal, _sharpened(normal, generators))
     return not any(_separates(one, point, generators, rounding) for one in proposals)
 
 
 def _separates(normal: Floats, point: Floats, generators: Floats, rounding: Floats) -> bool:
-    """Return whether a plane with some normal divides a point, with its rounding, from the
-    zonotope.
-    """
+    """Return whether a plane with this normal is between a point, rounded, and the zonotope."""
     reach = np.abs(generators @ normal).sum()
     terms = np.abs(normal) @ (np.abs(generators).sum(axis=0) + np.abs(point))
     unsure = np.abs(normal) @ rounding + (sum(generators.shape) + 4) * EPS * terms
@@ -81,14 +82,15 @@ def _separates(normal: Floats, point: Floats, generators: Floats, rounding: Floa
 
 
 def _sharpened(normal: Floats, generators: Floats) -> Floats:
-    """Return the normal of the facet that a solver's normal is near: orthogonal to d - 1 of the
-    generators.
+    """Return the normal of the facet that is near a normal found by the solver.
 
-    They are those that are the most orthogonal to it, and independent.
+    It is orthogonal to the d - 1 independent generators that are most orthogonal to the given
+    normal.
     """
     length = np.linalg.norm(normal)
     if not length:
         return normal
+
     sharp = normal / length
     lengths = np.linalg.norm(generators, axis=1)
     rows = generators[lengths > 0.0] / lengths[lengths > 0.0, None]
@@ -96,11 +98,13 @@ def _sharpened(normal: Floats, generators: Floats) -> Floats:
     for row in rows[np.argsort(np.abs(rows @ sharp), kind="stable")]:
         if len(plane) == len(normal) - 1:
             break
+        # Gram-Schmidt, twice against rounding.
         rest = row - (plane @ row) @ plane
         rest = rest - (plane @ rest) @ plane
         size = np.linalg.norm(rest)
         if size > _DEPENDENT:
             plane = np.vstack([plane, rest / size])
+
     for _ in range(2):  # the second pass corrects rounding
         sharp = sharp - (plane @ sharp) @ plane
     return sharp

@@ -12,7 +12,10 @@ from infoset.geometry.tolerances import EPS, ON
 from infoset.geometry.zonotope_arrays import box_generators
 
 _SINGULAR = ON
-"""Share of the largest eigenvalue below which strips count as dependent; any gain is sound."""
+"""Share of the largest eigenvalue below which strips count as dependent.
+
+Any value gives a zonotope that contains the part: it holds for every gain.
+"""
 
 
 class CentreAndGenerators(NamedTuple):
@@ -23,11 +26,10 @@ class CentreAndGenerators(NamedTuple):
 
 
 def fewer_generators(generators: Floats, count: int) -> Floats:
-    """Return at most `count` >= n generators, whose zonotope contains the one of the given ones,
-    shape (m, n).
+    """Return at most `count` >= n generators of a zonotope that contains a given one.
 
-    The longest generators stay. The others, those with the least |g|_1 - |g|_inf in units of the
-    widths of the set, become a box around their sum. O(m n).
+    The generators have the shape (m, n). The longest ones stay. The others, with the least |g|_1 -
+    |g|_inf in units of the widths of the set, become a box around their sum. O(m n).
 
     References
     ----------
@@ -48,15 +50,15 @@ def fewer_generators(generators: Floats, count: int) -> Floats:
 def corrected_by_strips(
     centre: Floats, generators: Floats, rows: Floats, low: Floats, high: Floats
 ) -> CentreAndGenerators:
-    """Return a zonotope that contains the part of another one in strips low <= rows x <= high,
-    shape (k, n).
+    """Return a zonotope that contains the part of another one in strips low <= rows x <= high.
 
-    x = x + K (y - C x - v) holds for each x of the part, with y the middles of the strips and |v|
-    at most half of their widths, and for every matrix K. The gain that is used has the smallest sum
-    of squares of the generators (`Zonotope.cut`). Rounding is added as a box. O((m + n) n k + k^3).
+    The rows C have the shape (k, n). x = x + K (y - C x - v) holds for each x of the part, with y
+    the middles of the strips and |v| at most half of their widths, and for every matrix K. The gain
+    K that is used gives the smallest sum of squares of the generators (`Zonotope.cut`). Rounding is
+    added as a box. O((m + n) n k + k^3).
     """
-    y = 0.5 * low + 0.5 * high
     # Rounding of the middle must not lose an end.
+    y = 0.5 * low + 0.5 * high
     half = np.nextafter(np.maximum(high - y, y - low), np.inf)
 
     # In units of the widths of the strips' normals the matrix to invert has ones on its diagonal.
@@ -64,18 +66,19 @@ def corrected_by_strips(
     covariance = images.T @ images + np.diag(half**2)
     units = np.sqrt(np.diag(covariance))
     units = np.where(units > 0.0, units, 1.0)
-    gain = generators.T @ (images / units) @ _inverse(covariance / units / units[:, None]) / units
+    inverse = _inverse(covariance / units / units[:, None])
+    gain = generators.T @ (images / units) @ inverse / units
 
     corrected = np.vstack([generators - images @ gain.T, half[:, None] * gain.T])
+    corrected = corrected[corrected.any(axis=1)]
 
-    # Each number is a sum of at most so many products, of these sizes.
+    # Rounding: each number is a sum of at most so many products, of these sizes.
     operations = sum(generators.shape) + 8 + len(rows)
     sizes = np.abs(centre) + np.abs(generators).sum(axis=0)
     terms = sizes + np.abs(gain) @ (np.abs(rows) @ sizes + np.abs(y) + half)
     box = box_generators(operations * EPS * terms)
-    return CentreAndGenerators(
-        centre + gain @ (y - rows @ centre), np.vstack([corrected[corrected.any(axis=1)], box])
-    )
+
+    return CentreAndGenerators(centre + gain @ (y - rows @ centre), np.vstack([corrected, box]))
 
 
 def _inverse(matrix: Floats) -> Floats:
@@ -87,7 +90,6 @@ def _inverse(matrix: Floats) -> Floats:
 
 def _sums_up(sizes: Floats) -> Floats:
     """Return the sums of nonnegative numbers in each column, rounded up."""
-    sums, lost = affine_image(
-        np.ones((1, len(sizes))), np.ascontiguousarray(sizes.T), np.zeros(sizes.shape[1])
-    )
+    ones = np.ones((1, len(sizes)))
+    sums, lost = affine_image(ones, np.ascontiguousarray(sizes.T), np.zeros(sizes.shape[1]))
     return np.asarray(np.where(lost > 0.0, np.nextafter(sums[0], np.inf), sums[0]))
