@@ -11,7 +11,7 @@ from typing import Annotated
 import numpy as np
 
 from infoset.arrays import Floats, some
-from infoset.clock import ROUNDING, steps_between
+from infoset.clock import STEP_ROUNDING, steps_between
 from infoset.limits import POSITIVE, Limits, NotNegative, Part, Positive, check_fields
 
 MAX_IMPULSES = 100_000
@@ -169,7 +169,7 @@ class Thruster:
 
     def _periodic_steps(self, period_s: float, arrival_s: float, step_s: float) -> list[int]:
         """Return the steps of impulses every period, counted back from the cut-off."""
-        if period_s < step_s * (1.0 - ROUNDING):
+        if period_s < step_s * (1.0 - STEP_ROUNDING):
             raise ValueError(
                 f"thruster.impulse_period_s must be at least a step, {step_s:g} s: got {period_s!r}"
             )

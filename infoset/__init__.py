@@ -138,7 +138,7 @@ class CheckoutFinder:
     def find_spec(
         cls, name: str, _path: object = None, _target: object = None
     ) -> ModuleSpec | None:
-        """Return where a package is; None for every name but those of the packages."""
+        """Return the location of a package; None for all other names."""
         parent, _, package = name.rpartition(".")
         if parent != __name__ or package not in PACKAGES:
             return None

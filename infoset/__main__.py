@@ -6,8 +6,9 @@ import sys
 
 
 def main() -> None:
-    """Run the command `infoset`; an interrupt while its modules are loaded ends it with code 130
-    too.
+    """Run the command `infoset`.
+
+    An interrupt while its modules are loaded ends it with code 130 too.
     """
     try:
         from infoset.experiments.cli import main as run

@@ -1,4 +1,4 @@
-"""The decorators of this package's kernels, and what only kernels need."""
+"""The decorators of this package's kernels, and types and numbers that only kernels need."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ pasted = _kernels.pasted
 
 @cache
 def record_of(fields: type) -> np.dtype[Any]:
-    """Return the type of array elements with the fields of a class; kernels take the address of
-    such a record.
+    """Return the type of array elements with the fields of a class.
+
+    Kernels take the address of such a record.
     """
     kinds = {float: np.float64, int: np.int64, bool: np.bool_}
-    # Next to a pair of types NumPy ignores `align`.
-    aligned = np.dtype(
-        [(name, kinds[kind]) for name, kind in get_type_hints(fields).items()], align=True
-    )
+    columns = [(name, kinds[kind]) for name, kind in get_type_hints(fields).items()]
+    # In a call with a pair of types NumPy ignores `align`.
+    aligned = np.dtype(columns, align=True)
     return np.dtype((np.record, aligned))
 
 
@@ -41,5 +41,6 @@ def constants(number: int) -> tuple[int, ...]:
 (ZERO,) = constants(1)
 """Start of a count that is passed from kernel to kernel."""
 FALSE = cast(bool, np.bool_(False))
+"""A flag for arguments of kernels, for the same reason."""
 TRUE = cast(bool, np.bool_(True))
-"""The same for flags."""
+"""A flag for arguments of kernels, for the same reason."""

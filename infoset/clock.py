@@ -1,30 +1,30 @@
-"""The rule for times before the nominal arrival on a grid of steps: a time means the nearest
-step.
-"""
+"""Times before the nominal arrival on a grid of steps: a time means the nearest step."""
 
 from __future__ import annotations
 
 import math
 
-ROUNDING = 1e-9
-"""Part of a step by which a computed number of steps may be wrong: a flight has at most 1e5 steps,
-and a subtraction and a division round their number by at most 4e-11. Times of a file are decimals
-with far fewer digits."""
+STEP_ROUNDING = 1e-9
+"""Part of a step by which a computed number of steps may be wrong.
+
+A flight has at most 1e5 steps, and a subtraction and a division round their number by at most
+4e-11. Times of a file are decimals with far fewer digits.
+"""
 
 
 def steps_between(start_s: float, time_s: float, step_s: float) -> int:
     """Return the number of steps from a time to the step nearest to another time.
 
-    Of two steps that are equally near it is the earlier one. No step is at or after the nominal
+    If two steps are equally near, it is the earlier one. No step is at or after the nominal
     arrival. The number is negative if the nearest step is before the start.
 
     Parameters
     ----------
     start_s, time_s : float
-        Times before the nominal arrival, s; `start_s` is that of a step.
+        Times before the nominal arrival, s; `start_s` is the time of a step.
     step_s : float
         Time between two steps, s.
     """
-    nearest = math.ceil((start_s - time_s) / step_s - 0.5 - ROUNDING)
-    last = math.ceil(start_s / step_s - ROUNDING) - 1
+    nearest = math.ceil((start_s - time_s) / step_s - 0.5 - STEP_ROUNDING)
+    last = math.ceil(start_s / step_s - STEP_ROUNDING) - 1
     return min(nearest, last)

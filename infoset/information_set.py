@@ -1,4 +1,4 @@
-"""The public classes: the information set, and its read-only view for strategies and noises."""
+"""The information set, and its read-only view for strategies and noises."""
 
 from __future__ import annotations
 
@@ -26,8 +26,9 @@ class InformationSetView(SetQueries):
 
 
 class InformationSet(InformationSetView):
-    """All states (alpha, omega, x) that agree with the measurements and impulses so far, for a
-    batch of engagements.
+    """All states (alpha, omega, x) that agree with the measurements and impulses so far.
+
+    It is a batch of such sets, one for each engagement.
 
     Parameters
     ----------
@@ -44,9 +45,12 @@ class InformationSet(InformationSetView):
     Examples
     --------
     >>> from infoset import AngleSensor, InformationSet, SetModel, StateBox
-    >>> known = StateBox(z_m=(-10e3, 10e3), x_m=(5.3e6, 6.3e6), vz_m_s=(-100.0, 100.0), vx_m_s=(-59e3, -57e3))
+    >>> known = StateBox(
+    ...     z_m=(-10e3, 10e3), x_m=(5.3e6, 6.3e6), vz_m_s=(-100.0, 100.0), vx_m_s=(-59e3, -57e3)
+    ... )
     >>> sensor = AngleSensor(0.5, 0.00015, 0.00023, nominal_range_m=5.8e6)
-    >>> information = InformationSet(SetModel(58e3, 0.5, known, sensor, disturbance_m_s2=0.005, sections=5))
+    >>> model = SetModel(58e3, 0.5, known, sensor, disturbance_m_s2=0.005, sections=5)
+    >>> information = InformationSet(model)
     >>> information
     <InformationSet of 1 at t = 0 s>
     >>> information.measure_angle(0.0004)
@@ -68,8 +72,9 @@ class InformationSet(InformationSetView):
         super().__init__(SetState(model, batch, guarantee))
 
     def guaranteed_miss(self) -> tuple[Floats, Flags]:
-        """Return the guaranteed miss Phi: an upper bound of the true miss if all errors are within
-        their bounds.
+        """Return the guaranteed miss Phi, an upper bound of the true miss.
+
+        It holds if all errors are within their bounds.
 
         Returns
         -------
@@ -81,8 +86,8 @@ class InformationSet(InformationSetView):
 
         Notes
         -----
-        Phi bounds the miss of the labels below the threshold. The label of the true state is one of
-        them at arrival.
+        Phi bounds the miss of the labels below the threshold. At arrival the label of the true
+        state is below it.
         """
         state = self._state
         if state.phi is None:
@@ -102,8 +107,7 @@ class InformationSet(InformationSetView):
         *,
         alpha_rad: ArrayLike | None = None,
     ) -> None:
-        """Remove the ranges that contradict a range measurement: keep x_m/(1 + b) <= x <= x_m/(1 -
-        b).
+        """Keep the ranges that agree with a measurement: x_m/(1 + b) <= x <= x_m/(1 - b).
 
         Parameters
         ----------
@@ -132,6 +136,7 @@ class InformationSet(InformationSetView):
         measured = real_array("range_m", range_m, (self.batch,))
         if some(measured < 0.0):
             raise ValueError(f"range_m must not be negative: got {shown(range_m)}")
+
         state = self._state
         active = self._active(where)
         travelled = self.model.closing_speed_m_s * self.time_s
@@ -140,6 +145,7 @@ class InformationSet(InformationSetView):
         nearer = self._min_cosine(alpha_rad) if self.model.is_guaranteed else 1.0
         lower = measured * nearer / ((1.0 + relative_error) * (1.0 + eta)) + travelled - slack
         upper = measured / ((1.0 - relative_error) * (1.0 - eta)) + travelled + slack
+
         before = state.lower_label.copy(), state.upper_label.copy()
         state.lower_label[active] = np.maximum(state.lower_label, lower)[active]
         state.upper_label[active] = np.minimum(state.upper_label, upper)[active]
@@ -149,8 +155,9 @@ class InformationSet(InformationSetView):
             self._recover(emptied, None, *before)
 
     def _min_cosine(self, measured_rad: ArrayLike | None) -> Floats:
-        """Lower bound of x over the distance, shape (B,): from measured angles, or from the maximum
-        velocity.
+        """Return a lower bound of x over the distance, shape (B,).
+
+        It follows from measured angles, or from the maximum velocity.
         """
         state = self._state
         travelled = self.model.closing_speed_m_s * self.time_s
@@ -161,14 +168,14 @@ class InformationSet(InformationSetView):
                 alpha, state.law.label_max - travelled, state.table, steepest
             )
             return np.asarray(np.cos(steepest[0]) * np.cos(steepest[1]))
+
         box = self.model.bounds
-        impulses = self._state.history.total_impulse() * (1.0 + self.model.execution_error_relative)
+        impulses = state.history.total_impulse() * (1.0 + self.model.execution_error_relative)
         disturbance = float(np.hypot.reduce([law.disturbance for law in state.laws]))
         fastest = impulses + box.lateral_speed_m_s + disturbance * self.time_s
         offset = box.offset_m + fastest * self.time_s
-        nearest = np.maximum(
-            (self._state.lower_label - travelled) * (1.0 - self.model.speed_error), 0.0
-        )
+        min_range = (state.lower_label - travelled) * (1.0 - self.model.speed_error)
+        nearest = np.maximum(min_range, 0.0)
         return np.asarray(np.cos(np.arctan2(offset, nearest)))
 
     def measure_angle(self, alpha_rad: ArrayLike, where: ArrayLike = True) -> None:
@@ -182,6 +189,7 @@ class InformationSet(InformationSetView):
             Engagements with a measurement.
         """
         measured = self._lateral("alpha_rad", alpha_rad)
+
         state = self._state
         active = self._active(where)
         event = state.history.record(ANGLE, measured, active)
@@ -215,6 +223,7 @@ class InformationSet(InformationSetView):
         """
         NOT_NEGATIVE.need("error_rad_s", error_rad_s)
         measured = self._lateral("omega_rad_s", omega_rad_s)
+
         state = self._state
         active = self._active(where)
         error = error_rad_s * (1.0 + BOUND_SLACK)
@@ -253,6 +262,7 @@ class InformationSet(InformationSetView):
         active = self.tracking
         min_label = self._min_label_next()
         computes_phi = self._computes_phi
+
         if state.phi is not None:
             state.phi.leave(
                 computes_phi, state.lower_label, state.upper_label, state.sections, state.history
@@ -262,6 +272,7 @@ class InformationSet(InformationSetView):
             # whether Phi is computed.
             state.some_left |= active & (state.lower_label < min_label)
         np.maximum(state.lower_label, min_label, out=state.lower_label, where=computes_phi)
+
         if state.min_label >= min_label:
             return np.zeros(state.labels.shape, dtype=bool)
         left, removed = state.keep_labels(active)
@@ -285,8 +296,8 @@ class InformationSet(InformationSetView):
     def predict(self) -> None:
         """Predict the set over one step, for all disturbances within the bound.
 
-        The exact set of disturbances is a thin lens in (V, z). As in the paper, the segment between
-        its ends is used.
+        The exact set of disturbances is a thin lens in (V, z). As in the paper, it is replaced by
+        the segment between its ends.
         """
         self._state.predict(self.tracking)
 
@@ -308,8 +319,9 @@ class InformationSet(InformationSetView):
         return np.asarray(self.tracking & flags("where", where, (self.batch,)))
 
     def _refine_if_few(self, active: Flags, emptied: SetStatus) -> Flags:
-        """Make a new grid where too few sections are left. Set the status of empty sets; return
-        where to recover.
+        """Make a new grid where too few sections are left; return where to recover.
+
+        The status of sets that are empty is set.
         """
         empty = active & (self.section_counts < self.model.fewest_sections)
         if not some(empty):

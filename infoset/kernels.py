@@ -1,9 +1,8 @@
-"""Decorators that compile kernels with Numba, the folder of the machine code, and the notice about
-compiling.
+"""Decorators that compile kernels with Numba, and the notice about compiling.
 
-The name of the folder contains a hash of the sources that a kernel is compiled from, so stale
-machine code is never loaded. Numba itself compares only the file that defines a kernel, not the
-files of the functions that it calls.
+The machine code is stored in a folder. The name of the folder contains a hash of the sources that a
+kernel is compiled from, so stale machine code is never loaded. Numba itself compares only the file
+that defines a kernel, not the files of the functions that it calls.
 """
 
 from __future__ import annotations
@@ -29,11 +28,13 @@ JIT: Any = njit
 CONFIG: Any = config
 """Numba's decorator and configuration, with the options that their types leave out."""
 HERE = Path(__file__).parent
+"""Folder of the package."""
 BESIDE = ("guidance", "sim", "rendezvous", "experiments")
 """Packages of the project whose folders are beside this one in a checkout, and inside it in an
 installation.
 """
 VARIABLE = "NUMBA_CACHE_DIR"
+"""Numba's variable for the folder of the machine code."""
 LOGGER = logging.getLogger("infoset.kernels")
 """Logger of the notice; without any configuration of logging it is printed on stderr."""
 
@@ -41,41 +42,40 @@ _IMPORT = re.compile(r"^\s*from (infoset(?:\.\w+)*) import (\([^)]*\)|.*)", re.M
 
 
 class Kernels:
-    """Decorators that compile the kernels of a package: without the GIL, divisions unchecked as in
-    C.
+    """Decorators that compile the kernels of a package.
 
-    `fastmath` has the liberties that LLVM may take with floating-point numbers.
+    Kernels run without the GIL, and divide by zero without an error, as in C. `fastmath` has the
+    liberties that LLVM may take with floating-point numbers.
     """
 
     def __init__(self, *fastmath: str) -> None:
         # Nothing needs the function that Numba writes to call a kernel from C.
-        options = {
+        self._options = {
             "nogil": True,
             "error_model": "numpy",
             "fastmath": set(fastmath),
             "no_cfunc_wrapper": True,
         }
-        self._options = options
-        self._inner_options = {**options, "_nrt": False, "no_cpython_wrapper": True}
+        self._inner_options = {**self._options, "_nrt": False, "no_cpython_wrapper": True}
 
     def compiled(self, function: F) -> F:
         """Compile a kernel that may allocate arrays; its machine code is stored on disk."""
         return self._stored(function)
 
     def entry(self, function: F) -> F:
-        """Compile a kernel that allocates no array, nor does anything it calls; its machine code is
-        stored on disk.
+        """Compile a kernel that allocates no array, nor does anything it calls.
 
-        Without Numba's atomic reference counts, which may cost more than the work.
+        Its machine code is stored on disk. Without Numba's atomic reference counts, which may cost
+        more than the work.
         """
         return self._stored(function, _nrt=False)
 
     def allocation_free(self, function: F) -> F:
-        """Compile a kernel that allocates no array and that only kernels call; it is stored with
-        them.
+        """Compile a kernel that allocates no array and that only kernels call.
 
-        Numba writes no function to call it from Python, which would be a quarter of the time to
-        compile: a call from Python crashes the process. Tests call it through `tests.kernels`.
+        It is stored with these kernels. Numba writes no function to call it from Python, which
+        would be a quarter of the time to compile: a call from Python crashes the process. Tests
+        call it through `tests.kernels`.
         """
         kernel: F = JIT(**self._inner_options)(function)
         return kernel
@@ -117,10 +117,8 @@ def cache_folder(kernel: Callable[..., object]) -> Path | None:
         root = Path(os.environ.get(VARIABLE) or _user_folder())
         folder = root / f"{module}-{_hash_of_sources(file)}"
         folder.mkdir(parents=True, exist_ok=True)
-    except (
-        OSError,
-        RuntimeError,
-    ):  # a read-only folder, a user without a home, code without a file
+    except (OSError, RuntimeError):
+        # A read-only folder, a user without a home, code without a file.
         return None
     return folder if os.access(folder, os.W_OK) else None
 
@@ -130,11 +128,10 @@ def _user_folder() -> Path:
 
 
 def _hash_of_sources(file: Path) -> str:
-    """Return a hash of a source file and of all files of the project that it imports, directly or
-    not.
+    """Return a hash of a source file and of all files that it imports, directly or not.
 
-    The texts are in the order of their contents, so that it does not depend on the folder of the
-    project.
+    Only files of the project count. The texts are in the order of their contents, so that it does
+    not depend on the folder of the project.
     """
     files = [file]
     for source in files:
@@ -145,29 +142,27 @@ def _hash_of_sources(file: Path) -> str:
 @cache
 def _imports(file: Path) -> tuple[Path, ...]:
     """Return the files of the project that a source file imports."""
-    return tuple(
-        dict.fromkeys(
-            path
-            for package, names in _IMPORT.findall(_text(file))
-            for path in _modules(_path_of(package), names)
-        )
-    )
+    imports = _IMPORT.findall(_text(file))
+    paths = [path for package, names in imports for path in _modules(_path_of(package), names)]
+    return tuple(dict.fromkeys(paths))
 
 
 def _path_of(module: str) -> Path:
     """Return the folder of a package, or the file of a module without its suffix."""
     _, *names = module.split(".")
-    beside = bool(names) and names[0] in BESIDE and not (HERE / names[0]).is_dir()
-    return (HERE.parent if beside else HERE).joinpath(*names)
+    is_beside = bool(names) and names[0] in BESIDE and not (HERE / names[0]).is_dir()
+    root = HERE.parent if is_beside else HERE
+    return root.joinpath(*names)
 
 
 def _modules(package: Path, names: str) -> Iterator[Path]:
-    """Yield the files of what is imported from a module or a package."""
-    if package.is_dir():
-        modules = [package / f"{name}.py" for name in re.findall(r"\w+", names)]
-        yield from (path if path.exists() else package / "__init__.py" for path in modules)
-    else:
+    """Yield the files that define names which are imported from a module or a package."""
+    if not package.is_dir():
         yield package.with_suffix(".py")
+        return
+    for name in re.findall(r"\w+", names):
+        module = package / f"{name}.py"
+        yield module if module.exists() else package / "__init__.py"
 
 
 @cache
@@ -185,16 +180,18 @@ class _Compiled:
     def text(self, of_what: str) -> str:
         """Return one line about them."""
         count = len(self.modules)
+        kernels = "kernel" if count == 1 else "kernels"
         packages = sorted({".".join(module.split(".")[:2]) for module in self.modules})
-        kernels = f"{count} kernel{'' if count == 1 else 's'}{of_what}"
-        return f"compiled {kernels} in {self.elapsed_s:.1f} s ({', '.join(packages)})"
+        listed = ", ".join(packages)
+        return f"compiled {count} {kernels}{of_what} in {self.elapsed_s:.1f} s ({listed})"
 
 
 class CompileNotice(event.Listener):
-    """The notice about compiling: one line at the first kernel of a command or a process, one at
-    the end of a command.
+    """The notice about compiling, and the summary after it.
 
-    Numba holds a lock while it compiles a kernel and, within it, those that it calls.
+    The notice is one line at the first kernel of a command or a process, the summary one line at
+    the end of a command. Numba holds a lock while it compiles a kernel and, within it, those that
+    it calls.
     """
 
     def __init__(self) -> None:
@@ -216,8 +213,9 @@ class CompileNotice(event.Listener):
             self._announce(cache_folder(function))
 
     def on_end(self, event: Any) -> None:
-        """Add the time of a kernel that Python called; it contains that of the kernels within
-        it.
+        """Add the time of a kernel that Python called.
+
+        It contains the time of the kernels within it.
         """
         function = event.data["dispatcher"].py_func
         if not function.__module__.startswith("infoset."):
@@ -228,8 +226,9 @@ class CompileNotice(event.Listener):
 
     @contextlib.contextmanager
     def of(self, purpose: str) -> Iterator[None]:
-        """Name what the kernels are for; at the end of the context, say which were compiled and how
-        long it took.
+        """Name the purpose of the kernels that are compiled within the context.
+
+        At the end, a summary says which were compiled and how long it took.
         """
         self.purpose = purpose
         self._compiled = _Compiled()

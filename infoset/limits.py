@@ -1,5 +1,6 @@
-"""Limits of numbers: declared once, at the field of a dataclass, for its constructor and for file
-readers.
+"""Limits of numbers, declared once, at the field of a dataclass.
+
+Its constructor and the readers of files check them.
 """
 
 from __future__ import annotations
@@ -22,29 +23,28 @@ MINIMUM = 1e-110
 
 
 class _Rule(ABC):
-    """What values of a field must be; readers of files check it too."""
+    """A condition on the values of a field; constructors and readers of files check it."""
 
     @abstractmethod
     def problem(self, value: Any) -> str | None:
         """Return why a value is refused, or None."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
-        """Return the schema of a field for readers of files: its type, and this rule for each of
-        its values.
+        """Return the schema of a field for readers of files: its type, and this rule.
+
+        Each value of a tuple is checked.
         """
         from pydantic_core import core_schema
 
         is_pair = source == tuple[float, float]
 
         def checked(value: Any) -> Any:
-            problem = next(
-                filter(None, map(self.problem, value if isinstance(value, tuple) else (value,))),
-                None,
-            )
-            if problem is None and is_pair and value[0] > value[1]:
-                problem = "must be a pair [minimum, maximum], and is reversed"
-            if problem is not None:
-                raise ValueError(problem)
+            for one in value if isinstance(value, tuple) else (value,):
+                problem = self.problem(one)
+                if problem is not None:
+                    raise ValueError(problem)
+            if is_pair and value[0] > value[1]:
+                raise ValueError("must be a pair [minimum, maximum], and is reversed")
             return value
 
         return core_schema.no_info_after_validator_function(checked, handler(source))
@@ -73,12 +73,20 @@ class Limits(_Rule):
         number: Any = value
         if not (self.whole or -MAXIMUM <= number <= MAXIMUM):  # NaN is neither
             return f"must be finite, at most {MAXIMUM:g} in size"
+        return self._problem_below(number) or self._problem_above(number)
+
+    def _problem_below(self, number: Any) -> str | None:
+        """Return why a number is below the interval, or None."""
         if self.above is not None and not number > self.above:
             return f"must be greater than {self.above:g}"
         if self.above == 0.0 and number < MINIMUM:
             return f"must be at least {MINIMUM:g}"
         if self.minimum is not None and number < self.minimum:
             return f"must be at least {self.minimum:g}"
+        return None
+
+    def _problem_above(self, number: Any) -> str | None:
+        """Return why a number is above the interval, or None."""
         if self.below is not None and number >= self.below:
             return f"must be less than {self.below:g}"
         if self.maximum is not None and number > self.maximum:
@@ -91,12 +99,14 @@ class Limits(_Rule):
         TypeError for a value that is not a float or an integer, or not an integer where it must be
         one (a bool is neither), ValueError for one outside the limits.
         """
-        kinds = (
-            (int, np.integer) if self.whole else (int, float, np.integer)
-        )  # single precision would round
+        kinds: tuple[type, ...] = (int, np.integer)
+        wanted = "an integer"
+        if not self.whole:
+            kinds = (float, *kinds)  # not np.float32: single precision would round
+            wanted = "a real number, a float or an integer"
         if isinstance(value, bool) or not isinstance(value, kinds):
-            wanted = "an integer" if self.whole else "a real number, a float or an integer"
             raise TypeError(f"{name} must be {wanted}: got {shown(value)}")
+
         problem = self.problem(value)
         if problem is not None:
             raise ValueError(f"{name} {problem}: got {shown(value)}")
@@ -110,7 +120,16 @@ PART = Limits(minimum=0.0, below=1.0)
 WHOLE = Limits(minimum=0, whole=True)
 COUNT = Limits(minimum=1, whole=True)
 
-LONGEST_NAME, LONGEST_DESCRIPTION = 100, 300
+LONGEST_NAME = 100
+"""Maximum length of a name: files named after it stay below 255 characters, their limit."""
+LONGEST_DESCRIPTION = 300
+"""Maximum length of a description: three lines of a screen."""
+NO_FIRST = ("", "-", ".", " ")
+"""Beginnings that the name of a file must not have: an option, a hidden file, nothing to see."""
+NOT_IN_NAMES = set('/\\:*?"<>|$')
+"""Characters that file systems or shells refuse or interpret in names of files."""
+LONGEST_SHOWN = 80
+"""Maximum length of a value in a message: a line of a terminal."""
 
 
 @dataclass(frozen=True)
@@ -126,10 +145,11 @@ class Line(_Rule):
             return f"must have at most {self.longest} characters"
         if not value.isprintable():
             return "must be one line without control characters"
-        if self.names_files and (
-            value[:1] in ("", "-", ".", " ") or set('/\\:*?"<>|$') & set(value)
-        ):
-            return 'must begin with a letter or a digit, without any of / \\ : * ? " < > | $, because files have this name'
+        if self.names_files and (value[:1] in NO_FIRST or NOT_IN_NAMES & set(value)):
+            return (
+                'must begin with a letter or a digit, without any of / \\ : * ? " < > | $, because '
+                "files have this name"
+            )
         return None
 
 
@@ -143,11 +163,12 @@ Part = Annotated[float, PART]
 
 
 def check_fields(owner: object) -> None:
-    """Check the values of a dataclass against the annotations of its fields; raise TypeError or
-    ValueError.
+    """Check the values of a dataclass against the annotations of its fields.
 
-    Numbers are annotated with `Limits`, intervals are pairs (minimum, maximum) of such numbers,
-    ``tuple[float, ...]`` is any number of them; enumerations, other dataclasses and text are
+    A TypeError or a ValueError is raised for a value that they do not allow.
+
+    Numbers are annotated with `Limits`, intervals are pairs (minimum, maximum) of such numbers, and
+    ``tuple[float, ...]`` is any number of them. Enumerations, other dataclasses and text are
     checked by type. The message has the name of the field, the value, and what is allowed.
 
     NumPy's numbers are replaced by Python's, so that equal dataclasses are written to files as
@@ -163,8 +184,9 @@ def check_fields(owner: object) -> None:
 
 
 def plain_number(value: Any) -> Any:
-    """Return a number of NumPy, or a tuple with such numbers, as Python's numbers; other values as
-    they are.
+    """Return a number of NumPy, or a tuple with such numbers, as Python's numbers.
+
+    Other values are returned unchanged.
     """
     if isinstance(value, np.generic):
         return value.item()
@@ -176,9 +198,7 @@ def plain_number(value: Any) -> Any:
 
 
 class Checked:
-    """A dataclass whose constructor refuses values of wrong types and outside the limits of their
-    fields.
-    """
+    """A dataclass whose constructor checks the types and the limits of its fields."""
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -186,25 +206,36 @@ class Checked:
 
 @cache
 def _hints(owner: type) -> dict[str, Any]:
+    """Return the annotations of the fields of a dataclass."""
     hints = get_type_hints(owner, include_extras=True)
     return {field.name: hints[field.name] for field in fields(owner)}
 
 
 def _check(name: str, value: Any, hint: Any) -> None:
+    """Raise an error if a value does not fit the annotation of a field."""
     if get_origin(hint) in (Union, types.UnionType):
         if value is None:
             return
         (hint,) = (kind for kind in get_args(hint) if kind is not types.NoneType)
-    inner, *notes = get_args(hint) if get_origin(hint) is Annotated else (hint,)
-    limits = next((note for note in notes if isinstance(note, Limits)), None)
+
+    kind = hint
+    limits = None
+    if get_origin(hint) is Annotated:
+        kind, *notes = get_args(hint)
+        limits = next((note for note in notes if isinstance(note, Limits)), None)
+
     if limits is None:
-        if isinstance(inner, type) and not isinstance(value, inner):
-            raise TypeError(f"{name} must be of the type {inner.__name__}: got {shown(value)}")
-        return
-    if get_origin(inner) is not tuple:
+        if isinstance(kind, type) and not isinstance(value, kind):
+            raise TypeError(f"{name} must be of the type {kind.__name__}: got {shown(value)}")
+    elif get_origin(kind) is tuple:
+        is_pair = get_args(kind)[1:] != (...,)
+        _check_tuple(name, value, limits, is_pair)
+    else:
         limits.need(name, value)
-        return
-    is_pair = get_args(inner)[1:] != (...,)
+
+
+def _check_tuple(name: str, value: Any, limits: Limits, is_pair: bool) -> None:
+    """Raise an error if a value is not a tuple of numbers within limits, or not a pair."""
     if not isinstance(value, tuple) or (is_pair and len(value) != 2):
         wanted = "pair (minimum, maximum)" if is_pair else "tuple of numbers"
         raise TypeError(f"{name} must be a {wanted}: got {shown(value)}")
@@ -219,8 +250,8 @@ def _check(name: str, value: Any, hint: Any) -> None:
 def real_values(name: str, value: ArrayLike) -> Floats:
     """Return an array of real numbers, finite or not, of any shape; `name` is for the message.
 
-    A TypeError is raised if it is masked, complex, or does not hold numbers, a ValueError if its
-    rows have different lengths.
+    A TypeError is raised if the array is masked, complex, or has other elements than numbers, a
+    ValueError if its rows have different lengths.
     """
     try:
         values = value if isinstance(value, np.ndarray) else np.asarray(value)
@@ -238,11 +269,12 @@ def real_values(name: str, value: ArrayLike) -> Floats:
 
 
 def real_array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
-    """Return finite real numbers as an array of a shape, from such an array or from one number for
-    all elements.
+    """Return finite real numbers as an array of a shape.
 
-    A TypeError is raised as by `real_values`, a ValueError if a number is not finite, or the shape
-    is different.
+    `value` is such an array, or one number for all elements.
+
+    A TypeError is raised as by `real_values`, a ValueError if a number is not finite, or if the
+    shape is different.
     """
     values = real_values(name, value)
     if values.shape not in ((), shape):
@@ -251,13 +283,15 @@ def real_array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
         )
     if not np.isfinite(values).all():
         raise ValueError(f"{name} must be finite: got {shown(value)}")
-    return values if values.shape == shape else np.ascontiguousarray(np.broadcast_to(values, shape))
+    if values.shape == shape:
+        return values
+    return np.ascontiguousarray(np.broadcast_to(values, shape))
 
 
 def flags(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Flags:
     """Return flags as an array of a shape, or a single flag for all elements.
 
-    A TypeError is raised if they are not of the type bool, or masked, a ValueError if the shape is
+    A TypeError is raised if they are masked or not of the type bool, a ValueError if the shape is
     different.
     """
     values = np.asarray(value)
@@ -273,4 +307,6 @@ def flags(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Flags:
 def shown(value: object) -> str:
     """Return a value as text on one line, for a message; long texts are truncated."""
     text = " ".join(repr(value).split())
-    return text if len(text) <= 80 else f"{text[:77]}..."
+    if len(text) <= LONGEST_SHOWN:
+        return text
+    return f"{text[: LONGEST_SHOWN - 3]}..."

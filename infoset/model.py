@@ -14,25 +14,29 @@ from infoset.sensors import BearingSensor, Sensor
 Interval = tuple[float, float]
 
 MAX_SECTIONS = 10_000
+"""Maximum number of sections: a few hundred are enough (default 29), more only take memory."""
 CENTROID_ERRORS_AT_THRESHOLD = 10.0
-"""Minimum range threshold in centroid errors of the camera; at shorter ranges its error bound is
-not a small angle.
+"""Minimum range threshold in centroid errors of the camera.
+
+At shorter ranges its error bound is greater than 0.1 rad, which is not a small angle.
+"""
+WHOLE_STEPS_TOLERANCE = 1e-9
+"""Relative error of the number of steps between two measurements.
+
+A file may have a period and a step as rounded decimals; a quotient of floats is far more exact.
+"""
+MIN_RANGE = 1e-9
+"""Minimum range as a share of the maximum label; at a range of zero there is no angle.
+
+It is far above the rounding of a range, 1e-16 of the label, and far below a range that matters.
 """
 
 _APPROACH = Limits(below=0.0)
 _SECTIONS = Limits(minimum=1, maximum=MAX_SECTIONS, whole=True)
 
 
-WHOLE_STEPS_TOLERANCE = 1e-9
-"""Relative error of the number of steps between two measurements, for periods that are rounded
-decimals.
-"""
-MIN_RANGE = 1e-9
-"""Minimum range as a share of the maximum label; at a range of zero there is no angle."""
-
-
 class Model(Enum):
-    """What the set allows for.
+    """Uncertainties that the set allows for.
 
     PAPER is the published procedure, whose set may lose the true state. GUARANTEED allows for
     errors of the closing speed, gravity, manoeuvres, errors of the engine and rounding, and its set
@@ -55,7 +59,7 @@ class InitialSet(Enum):
 
 
 class Recovery(Enum):
-    """What happens to a set that a measurement leaves empty, because it contradicts the model.
+    """Treatment of a set that a measurement leaves empty, because it contradicts the model.
 
     WIDENED ignores the measurement and enlarges the last consistent set by a disturbance. NONE
     leaves the set empty, as in the published procedure.
@@ -111,8 +115,9 @@ class StateBox:
         """Return the planar box of x and one lateral axis, "y" or "z", which is z in it."""
         if self.y_m is None or self.vy_m_s is None:
             return self
-        z_m, vz_m_s = (self.y_m, self.vy_m_s) if name == "y" else (self.z_m, self.vz_m_s)
-        return StateBox(z_m, self.x_m, vz_m_s, self.vx_m_s)
+        if name == "y":
+            return StateBox(self.y_m, self.x_m, self.vy_m_s, self.vx_m_s)
+        return StateBox(self.z_m, self.x_m, self.vz_m_s, self.vx_m_s)
 
     @property
     def offset_m(self) -> float:
@@ -131,12 +136,11 @@ class StateBox:
         Without impulses the distance is a convex function of time: it is largest at the start or at
         the end.
         """
-        offset = self.offset_m
-        maximum = self.x_m[1]
-        return max(
-            math.hypot(maximum, offset),
-            offset + self.lateral_speed_m_s * (maximum / -self.vx_m_s[1]),
-        )
+        max_range = self.x_m[1]
+        max_duration = max_range / -self.vx_m_s[1]
+        at_start = math.hypot(max_range, self.offset_m)
+        at_end = self.offset_m + self.lateral_speed_m_s * max_duration
+        return max(at_start, at_end)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,30 +150,30 @@ class SetSettings:
     Parameters
     ----------
     model : Model
-        What the set allows for.
+        Uncertainties that the set allows for.
     initial_set : InitialSet or None
-        Shape of a section at the start; None is RECTANGLE in the paper's model and BOX in the
-        guaranteed one, whose only shape it is.
+        Shape of a section at the start; None is RECTANGLE in the paper's model. The guaranteed
+        model allows only BOX.
     sections : int
         Number of x-sections at the start, on a uniform grid over the possible ranges, ends
         included.
     fewest_sections : int
         If fewer sections are left, replay makes a new grid of 2 fewest_sections + 1.
     recovery : Recovery
-        What happens to a set that a measurement leaves empty.
+        Treatment of a set that a measurement leaves empty.
     range_threshold_m : float
         Hypotheses whose range is about to fall below this value eps leave the set, m.
     disturbance_m_s2 : float
-        Bound of the acceleration along z, m/s^2: nu of the fictitious one in the paper's model,
-        that of the target's manoeuvres in the guaranteed model.
+        Bound of the acceleration along z, m/s^2: of the fictitious acceleration, nu, in the paper's
+        model, and of the target's manoeuvres in the guaranteed model.
     disturbance_y_m_s2 : float or None
         The same bound along y; None is the value along z. For space only.
 
     Raises
     ------
     TypeError, ValueError
-            If a value is not within its limits, `sections` is less than `fewest_sections`, or a set
-            of the guaranteed model starts in the paper's rectangle.
+        If a value is not within its limits, `sections` is less than `fewest_sections`, or a set of
+        the guaranteed model starts in the paper's rectangle.
     """
 
     model: Model = Model.GUARANTEED
@@ -192,13 +196,14 @@ class SetSettings:
             # The rectangle takes angles for their tangents: x arctan(z/x) is less than z, and a
             # corner of the box of the starts is outside.
             raise ValueError(
-                'initial_set = "rectangle" belongs to model = "paper": the rectangle does not contain all possible '
-                'starts, as model = "guaranteed" must; leave initial_set out, or write model = "paper"'
+                'initial_set = "rectangle" belongs to model = "paper": the rectangle does not '
+                'contain all possible starts, as model = "guaranteed" must; leave initial_set out, '
+                'or write model = "paper"'
             )
 
     @property
     def is_guaranteed(self) -> bool:
-        """Whether the model is the guaranteed one, whose set keeps the true state."""
+        """Whether the model is `Model.GUARANTEED`, whose set contains the true state."""
         return self.model is Model.GUARANTEED
 
     @property
@@ -259,17 +264,7 @@ class SetModel(SetSettings):
     def __post_init__(self) -> None:
         super().__post_init__()
         if len(self.axes) == 1:
-            for name, is_set in (
-                (self.angle_sensor.table, self.angle_sensor.is_spatial),
-                ("disturbance_y_m_s2", self.disturbance_y_m_s2 is not None),
-                ("gravity_y_m_s2", self.gravity_y_m_s2 is not None),
-                ("pointing_error_rad", self.pointing_error_rad > 0.0),
-            ):
-                if is_set:
-                    raise ValueError(
-                        f"SetModel: {name} holds a value of an engagement in space, and bounds "
-                        "have no y_m and vy_m_s: set them, or leave the value out"
-                    )
+            self._check_planar()
         self.check_period(self.angle_sensor)
         self.check_start("bounds", self.bounds)
         nearest_m = CENTROID_ERRORS_AT_THRESHOLD * self.angle_sensor.centroid_error_m
@@ -280,6 +275,21 @@ class SetModel(SetSettings):
                 f"{self.range_threshold_m!r}"
             )
 
+    def _check_planar(self) -> None:
+        """Refuse values for an engagement in space."""
+        spatial = {
+            self.angle_sensor.table: self.angle_sensor.is_spatial,
+            "disturbance_y_m_s2": self.disturbance_y_m_s2 is not None,
+            "gravity_y_m_s2": self.gravity_y_m_s2 is not None,
+            "pointing_error_rad": self.pointing_error_rad > 0.0,
+        }
+        for name, is_set in spatial.items():
+            if is_set:
+                raise ValueError(
+                    f"SetModel: {name} holds a value of an engagement in space, and bounds have no "
+                    "y_m and vy_m_s: set them, or leave the value out"
+                )
+
     @property
     def axes(self) -> tuple[str, ...]:
         """Lateral axes: ("z",) in a plane, ("y", "z") in space."""
@@ -288,31 +298,35 @@ class SetModel(SetSettings):
     def axis(self, name: str) -> SetModel:
         """Return the planar model of x and one lateral axis, "y" or "z", which is z in it.
 
-        It has no error of pointing: `section_laws` adds what couples the two axes.
+        It has no pointing error, which couples the two axes: `section_laws` adds it.
         """
         return self if len(self.axes) == 1 else self._planar[name]
 
     @cached_property
     def _planar(self) -> dict[str, SetModel]:
         """The planar models of a model in space."""
-        along_y = (
-            _of(self.disturbance_y_m_s2, self.disturbance_m_s2),
-            _of(self.gravity_y_m_s2, self.gravity_m_s2),
-        )
-        along_z = (self.disturbance_m_s2, self.gravity_m_s2)
+        disturbance_y = self.disturbance_y_m_s2
+        gravity_y = self.gravity_y_m_s2
         return {
-            name: replace(
-                self,
-                bounds=self.bounds.axis(name),
-                angle_sensor=self.angle_sensor.axis(name),
-                disturbance_m_s2=disturbance,
-                gravity_m_s2=gravity,
-                disturbance_y_m_s2=None,
-                gravity_y_m_s2=None,
-                pointing_error_rad=0.0,
-            )
-            for name, (disturbance, gravity) in (("y", along_y), ("z", along_z))
+            "y": self._planar_axis(
+                "y",
+                self.disturbance_m_s2 if disturbance_y is None else disturbance_y,
+                self.gravity_m_s2 if gravity_y is None else gravity_y,
+            ),
+            "z": self._planar_axis("z", self.disturbance_m_s2, self.gravity_m_s2),
         }
+
+    def _planar_axis(self, name: str, disturbance_m_s2: float, gravity_m_s2: float) -> SetModel:
+        return replace(
+            self,
+            bounds=self.bounds.axis(name),
+            angle_sensor=self.angle_sensor.axis(name),
+            disturbance_m_s2=disturbance_m_s2,
+            gravity_m_s2=gravity_m_s2,
+            disturbance_y_m_s2=None,
+            gravity_y_m_s2=None,
+            pointing_error_rad=0.0,
+        )
 
     def check_period(self, sensor: Sensor) -> None:
         """Refuse a sensor whose period is not a whole number of steps.
@@ -320,7 +334,7 @@ class SetModel(SetSettings):
         Raises
         ------
         ValueError
-            If the period is another number.
+            If the period is not a whole number of steps.
         """
         steps = sensor.period_s / self.step_s
         whole = self.steps_in(sensor.period_s)
@@ -331,10 +345,10 @@ class SetModel(SetSettings):
             )
 
     def check_start(self, name: str, box: StateBox) -> None:
-        """Refuse starts below the range threshold, or where the error bound of the angle is not
-        positive.
+        """Refuse starts below the range threshold, or without a positive error bound.
 
-        `name` is that of the box, for the message.
+        The error bound is the bound of the angle at the maximum distance. `name` is the name of the
+        box, for the message.
 
         Raises
         ------
@@ -346,7 +360,9 @@ class SetModel(SetSettings):
                 f"range_threshold_m must be less than the minimum range of {name}, {box.x_m[0]:g} "
                 f"m: got {self.range_threshold_m!r}"
             )
-        bound = min(self.angle_sensor.axis(name).error_bound(box.farthest_m) for name in box.axes)
+
+        sensors = [self.angle_sensor.axis(axis) for axis in box.axes]
+        bound = min(sensor.error_bound(box.farthest_m) for sensor in sensors)
         if not bound > 0.0:
             raise ValueError(
                 f"{self.angle_sensor.table}: its error bound must be positive up to the maximum "
@@ -365,7 +381,7 @@ class SetModel(SetSettings):
     def acceleration_m_s2(self) -> float:
         """Bound nu of the acceleration along z in the set, m/s^2.
 
-        In the guaranteed model, lengths and accelerations are the true ones divided by 1 + eta.
+        In the guaranteed model, lengths and accelerations are the true values divided by 1 + eta.
         """
         if not self.is_guaranteed:
             return self.disturbance_m_s2
@@ -377,8 +393,9 @@ class SetModel(SetSettings):
 
     @property
     def min_range_m(self) -> float:
-        """Minimum range of a hypothesis, m: the threshold, and more than the rounding error of
-        zero.
+        """Minimum range of a hypothesis, m.
+
+        It is the threshold, and more than the rounding error of zero.
         """
         return max(self.range_threshold_m, MIN_RANGE * self.label_limits_m[1])
 
@@ -400,7 +417,3 @@ class SetModel(SetSettings):
                 f"closing_speed_m_s, {self.closing_speed_m_s:g} m/s"
             )
         return minimum / (1.0 + eta), maximum / (1.0 - eta)
-
-
-def _of(value: float | None, common: float) -> float:
-    return common if value is None else value

@@ -20,8 +20,9 @@ MaskedFloats = np.ma.MaskedArray[tuple[int], np.dtype[np.float64]]
 MaskedIntegers = np.ma.MaskedArray[tuple[int], np.dtype[np.int64]]
 
 MIN_RANGE_M = 1e-25
-"""Minimum range of a section mapped to (omega, alpha): e/x^2 is within `MAXIMUM` up to the speed of
-light.
+"""Minimum range of a section mapped to (omega, alpha).
+
+e/x^2 is then less than `infoset.limits.MAXIMUM`, 1e60, up to the speed of light.
 """
 
 
@@ -32,7 +33,7 @@ class Section:
     Parameters
     ----------
     label_m, range_m : float
-        Range at t = 0, which is the hypothesis of the section, and range now, m.
+        Range at t = 0, the hypothesis of the section, and range now, m.
     closing_speed_m_s : float
         Nominal closing speed e, m/s.
     polygons : ConvexPolygons, shape (C,)
@@ -47,10 +48,10 @@ class Section:
 
     @property
     def omega_alpha(self) -> ConvexPolygons:
-        """The section in the plane of omega = (V + e z/x)/x, rad/s, and alpha = z/x, rad, of each
-        axis, shape (C,).
+        """The section in the plane of omega and alpha of each axis, shape (C,).
 
-        The range x must be at least `MIN_RANGE_M`.
+        omega = (V + e z/x)/x, rad/s, and alpha = z/x, rad. The range x must be at least
+        `MIN_RANGE_M`.
         """
         x = self.range_m
         e = self.closing_speed_m_s
@@ -103,15 +104,14 @@ class SetQueries:
 
     @property
     def inconsistent(self) -> Flags:
-        """Whether the data contradicted the model, so that the set became empty at some step, shape
-        (B,).
-        """
+        """Whether each set became empty at some step, shape (B,): the data contradict the model."""
         return np.asarray(self._state.lost_step >= 0)
 
     @property
     def inconsistency(self) -> tuple[MaskedIntegers, MaskedFloats]:
-        """Step at which each set first became empty, and its label closest to feasibility, m;
-        masked if it never did.
+        """First step at which each set became empty, and its label closest to the data, m.
+
+        Both are masked for sets that never became empty.
         """
         never = ~self.inconsistent
         return (
@@ -144,8 +144,9 @@ class SetQueries:
         return self._state.section_counts
 
     def stored_range_interval_m(self) -> tuple[Floats, Floats]:
-        """Return the minimum and the maximum range of the feasible sections, m; zeros where there
-        is none.
+        """Return the minimum and the maximum range of the feasible sections, m.
+
+        They are zero where no section is feasible.
         """
         ranges = self.ranges_m
         feasible = self.feasible
@@ -157,8 +158,7 @@ class SetQueries:
         return np.where(tracked, minimum, 0.0), np.where(tracked, maximum, 0.0)
 
     def min_and_max_alpha(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Return the minimum and the maximum line-of-sight angle of the feasible sections, and
-        their ranges.
+        """Return the minimum and the maximum angle of the feasible sections, and their ranges.
 
         Returns
         -------
@@ -181,14 +181,17 @@ class SetQueries:
         Kumkov and Patsko (1997), equations (13) and (14).
         """
         exists, ends = self._state.widest(pending)
-        lower, upper = ([ends[..., end, column] for column in range(4)] for end in (0, 1))
+        # The columns of an end are the predicted miss, and the state that reaches it.
+        lower_m, *lower_state = np.moveaxis(ends[..., 0, :], -1, 0)
+        upper_m, *upper_state = np.moveaxis(ends[..., 1, :], -1, 0)
         return PredictedMiss(
-            exists, lower[0], upper[0], ExtremePoints(*lower[1:]), ExtremePoints(*upper[1:])
+            exists, lower_m, upper_m, ExtremePoints(*lower_state), ExtremePoints(*upper_state)
         )
 
     def predicted_miss_by_section_m(self) -> tuple[Floats, Floats]:
-        """Return minimum and maximum predicted miss of each section, m, each (C, B, S); zeros if it
-        is empty.
+        """Return minimum and maximum predicted miss of each section, m, each (C, B, S).
+
+        They are zero for an empty section.
         """
         summaries = self._state.summaries
         feasible = self.feasible
@@ -199,16 +202,16 @@ class SetQueries:
     def sections(self, engagement: int = 0) -> list[Section]:
         """Return the feasible sections of one engagement in order of increasing range."""
         self._need_engagement(engagement)
+
         state = self._state
         axes = range(len(self.axes))
         labels = state.labels[engagement].tolist()
         ranges = self.ranges_m[engagement].tolist()
-        return [
-            self._section(
-                labels[s], ranges[s], [state.polygon(axis, engagement, s) for axis in axes]
-            )
-            for s in np.flatnonzero(self.feasible[engagement]).tolist()
-        ]
+        sections = []
+        for s in np.flatnonzero(self.feasible[engagement]).tolist():
+            outlines = [state.polygon(axis, engagement, s) for axis in axes]
+            sections.append(self._section(labels[s], ranges[s], outlines))
+        return sections
 
     def _section(self, label_m: float, range_m: float, outlines: list[Floats]) -> Section:
         """Return a section from the vertices along each axis."""
@@ -238,6 +241,7 @@ class SetQueries:
         """
         NUMBER.need("label_m", label_m)
         self._need_engagement(engagement)
+
         state = self._state
         label = float(label_m)
         past = past_of(state.history, state.table)
@@ -246,6 +250,7 @@ class SetQueries:
         if emptied_at == section_life.NEVER_EMPTIED:
             rows = [ROWS * axis + LAST_REPLAY for axis in range(len(self.axes))]
             outlines = [state.outline(past.room.chains, row, label) for row in rows]
+
         x = label - state.law.closing_speed * (state.law.step * state.elapsed)
         return self._section(label, x, outlines)
 

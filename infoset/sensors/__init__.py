@@ -1,6 +1,4 @@
-"""Sensors with bounded errors, of unknown distribution: one class for each kind, and what they have
-in common.
-"""
+"""Sensors with bounded errors of unknown distribution: one class for each kind."""
 
 from infoset.sensors.bearing import AngleSensor, BearingSensor, Bias, Camera, RangeOrRanges
 from infoset.sensors.range_and_rate import RangeSensor, RateSensor

@@ -1,5 +1,6 @@
-"""Sensors of the line-of-sight angles with bounded errors: one with a linear error bound, and a
-camera.
+"""Sensors of the line-of-sight angles with bounded errors.
+
+The error bound of an `AngleSensor` is linear in the range, the bound of a `Camera` falls with it.
 """
 
 from __future__ import annotations
@@ -20,11 +21,14 @@ from infoset.sensors.sensor import Apart, Cuttable, Geometry, Measurements, Sens
 RangeOrRanges = TypeVar("RangeOrRanges", float, Floats)
 
 NEGLIGIBLE_ERROR_RAD = 1e-60
-"""Error bound of an axis that is measured without error."""
+"""Error bound of an axis that is measured without error.
+
+It is not zero, so that errors in units of it exist, and far below the rounding of an angle.
+"""
 
 
 class Bias(Enum):
-    """How the random error of a camera is drawn.
+    """Kinds of random errors of a camera.
 
     RANDOM: a new error within the whole bound for each image. CONSTANT: the centroid part is drawn
     once a run, the pixel part for each image.
@@ -36,19 +40,18 @@ class Bias(Enum):
 
 @dataclass(frozen=True)
 class BearingSensor(Sensor):
-    """A sensor of the line-of-sight angles atan2(z, x) and, in space, atan2(y, x), each with its
-    own error.
+    """A sensor of the line-of-sight angles atan2(z, x) and, in space, atan2(y, x).
 
-    The error bound of an angle is a constant, a part that is linear in the range, and a part that
-    falls with it; a kind of sensor has one of the latter two.
+    Each angle has its own error. The error bound of an angle is a constant, a part that is linear
+    in the range, and a part that falls with it; a kind of sensor has one of the latter two.
 
     Parameters
     ----------
     period_s : float
         Time between measurements, s; the first is at t = 0.
     first_image_s, last_image_s : float
-        Times before the nominal arrival, s; the images nearest to them are the first and the last
-        one. Images begin at the start for None, and continue until the true arrival for 0.
+        Times before the nominal arrival, s; the first and the last image are the nearest to them.
+        Images begin at the start for None, and continue until the true arrival for 0.
     miss_probability : float
         Probability that an image is lost, in [0, 1).
 
@@ -103,16 +106,15 @@ class BearingSensor(Sensor):
         return self != self.axis("z")
 
     def axis(self, name: str) -> BearingSensor:
-        """Return the sensor of one plane angle, "y" or "z"; an error bound of zero becomes
-        negligible.
+        """Return the sensor of one plane angle, "y" or "z".
+
+        An error bound of zero becomes negligible.
         """
         return self
 
     @abstractmethod
     def error_bound(self, range_m: RangeOrRanges) -> RangeOrRanges:
-        """Return the maximum size of the error at a range (m), rad; in space that of the angle of
-        z.
-        """
+        """Return the maximum size of the error at a range (m), rad; in space of the angle of z."""
 
     def error_bounds(self, range_m: Floats) -> Floats:
         """Return the maximum size of the error of each angle, rad, at ranges (m) of shape (..., B).
@@ -138,15 +140,13 @@ class BearingSensor(Sensor):
         Images can be taken every `period_s`. The first and the last one are nearest to
         `first_image_s` and `last_image_s` (`infoset.clock.steps_between`).
         """
-        if (
-            self.first_image_s is not None
-            and steps_between(before_arrival_s, self.first_image_s, self.period_s) > 0
-        ):
-            return False
-        return (
-            self.last_image_s == 0.0
-            or steps_between(before_arrival_s, self.last_image_s, self.period_s) >= 0
-        )
+        if self.first_image_s is not None:
+            steps_to_first = steps_between(before_arrival_s, self.first_image_s, self.period_s)
+            if steps_to_first > 0:
+                return False
+        if self.last_image_s == 0.0:
+            return True
+        return steps_between(before_arrival_s, self.last_image_s, self.period_s) >= 0
 
     def error(self, sight: Geometry, measured: Floats) -> Floats:
         """Return the error of measured angles in units of the bound."""
@@ -170,10 +170,8 @@ class BearingSensor(Sensor):
         """
         angles = np.abs(apart.offset_m) / apart.range_m
         bounds = np.minimum(self.error_bounds(apart.range_m), self.error_bounds(apart.farthest_m))
-        shares = np.where(
-            bounds == 0.0, 0.0, 0.5 * angles / np.maximum(bounds, NEGLIGIBLE_ERROR_RAD)
-        )
-        return np.asarray(shares.max(axis=0))
+        shares = 0.5 * angles / np.maximum(bounds, NEGLIGIBLE_ERROR_RAD)
+        return np.asarray(np.where(bounds == 0.0, 0.0, shares).max(axis=0))
 
 
 @dataclass(frozen=True)
@@ -186,10 +184,10 @@ class AngleSensor(BearingSensor):
         Bound a + h(d) at `nominal_range_m` and at zero range, rad, in (0, 1). The same line
         continues beyond.
     nominal_range_m : float
-        Range at which the first of the two holds, m.
+        Range of the first bound, m.
     error_at_nominal_range_y_rad, error_at_zero_range_y_rad : float or None
-        The same bounds for the angle of the y axis, rad, in [0, 1); None is that of the z axis. For
-        space only.
+        The same bounds for the angle of the y axis, rad, in [0, 1); None is the bound of the z
+        axis. For space only.
     **others
         Fields of `BearingSensor`.
 
@@ -215,13 +213,13 @@ class AngleSensor(BearingSensor):
     @property
     def error_slope_rad_per_m(self) -> float:
         """Change of the error bound with the range, rad/m."""
-        return (
-            self.error_at_nominal_range_rad - self.error_at_zero_range_rad
-        ) / self.nominal_range_m
+        change = self.error_at_nominal_range_rad - self.error_at_zero_range_rad
+        return change / self.nominal_range_m
 
     def axis(self, name: str) -> AngleSensor:
-        """Return the sensor of one plane angle, "y" or "z"; an error bound of zero becomes
-        negligible.
+        """Return the sensor of one plane angle, "y" or "z".
+
+        An error bound of zero becomes negligible.
         """
         return self._planar[name]
 
@@ -239,8 +237,9 @@ class AngleSensor(BearingSensor):
 
     @property
     def _bounds_of_y(self) -> tuple[float, float]:
-        """The bounds of the angle of the y axis at the nominal range and at range zero, rad; they
-        may be zero.
+        """Bounds of the angle of the y axis at the nominal range and at zero, rad.
+
+        They may be zero.
         """
         at_nominal = self.error_at_nominal_range_y_rad
         at_zero = self.error_at_zero_range_y_rad
@@ -250,14 +249,13 @@ class AngleSensor(BearingSensor):
         )
 
     def error_bound(self, range_m: RangeOrRanges) -> RangeOrRanges:
-        """Return the maximum size of the error at a range (m), rad; in space that of the angle of
-        z.
-        """
+        """Return the maximum size of the error at a range (m), rad; in space of the angle of z."""
         return self.error_at_zero_range_rad + self.error_slope_rad_per_m * range_m
 
     def error_bounds(self, range_m: Floats) -> Floats:
-        """Return the maximum size of the error of each angle, rad, at ranges (m) of shape (..., B),
-        as they differ.
+        """Return the maximum size of the error of each angle, rad, at ranges (m) of shape (..., B).
+
+        The result has the shape (2, B) if the two axes differ.
         """
         if self.error_at_nominal_range_y_rad is None and self.error_at_zero_range_y_rad is None:
             return self.error_bound(range_m)
@@ -270,10 +268,9 @@ class AngleSensor(BearingSensor):
 
 @dataclass(frozen=True)
 class Camera(BearingSensor):
-    """A sensor of the line-of-sight angles with the error bound pixel_error_rad + centroid_error_m
-    / d at distance d.
+    """A sensor of the line-of-sight angles with the bound pixel_error_rad + centroid_error_m / d.
 
-    The bound is the same for both axes.
+    d is the distance. The bound is the same for both axes.
 
     Parameters
     ----------
@@ -312,12 +309,13 @@ class Camera(BearingSensor):
         return self.pixel_error_rad + self.centroid_error_m / distance
 
     def with_bias(self, sight: Geometry, error: Floats, bias: Floats) -> Floats:
-        """Return the error in units of the bound, from those of the pixel and of the centroid part.
+        """Return the error in units of the bound, from the errors of its two parts.
 
         Parameters
         ----------
         error, bias : ndarray, shape (..., B)
-            Errors in units of the bounds of the two parts, within [-1, 1].
+            Errors of the pixel part and of the centroid part, in units of their bounds, within
+            [-1, 1].
         """
         share = self.pixel_error_rad / self.error_bound(sight.range_m)
         return share * error + (1.0 - share) * bias

@@ -56,14 +56,13 @@ class RangeSensor(Checked, Sensor):
         )
 
     def band(self, range_m: Floats, closing_speed_m_s: Floats | float, errors: float = 1.0) -> None:
-        """Return None: a range selects labels, and to first order the distance does not depend on z
-        and V.
+        """Return None: a range selects labels.
+
+        To first order the distance does not depend on z and V.
         """
 
     def share(self, apart: Apart) -> Floats:
-        """Return half of the maximum difference of the distances, in units of the bound, shape
-        (n,).
-        """
+        """Return half of the maximum difference of the distances, in units of the bound, (n,)."""
         difference_m = apart.slope * np.hypot.reduce(apart.offset_m) + apart.shift_m
         return np.asarray(difference_m / (2.0 * self.relative_error * apart.range_m))
 

@@ -1,5 +1,6 @@
-"""What a sensor with a bounded error is: the quantity that it measures, its error bound, and its
-cut of a set.
+"""The interface of a sensor with a bounded error.
+
+A sensor has a measured quantity, an error bound, and a cut of sets by a measurement.
 """
 
 from __future__ import annotations
@@ -15,8 +16,9 @@ from numpy.typing import ArrayLike
 from infoset.arrays import Flags, Floats
 
 Measurements = Mapping[str, Floats]
-"""Measured values of a batch by the name of the sensor; a sensor that does not measure in a step is
-left out.
+"""Measured values of a batch by the name of the sensor.
+
+A sensor that does not measure in a step is left out.
 """
 
 
@@ -28,8 +30,9 @@ class Geometry(Protocol):
 
     @property
     def alpha_rad(self) -> Floats:
-        """Line-of-sight angles in the planes of x and each lateral axis, atan2(y, x) and atan2(z,
-        x), rad.
+        """Line-of-sight angles in the planes of x and each lateral axis, rad.
+
+        They are atan2(y, x) and atan2(z, x).
         """
 
     @property
@@ -55,8 +58,8 @@ class Apart:
     range_m, farthest_m : ndarray, shape (n,)
         Their minimum range x and maximum distance, m.
     slope : ndarray, shape (n,)
-        Maximum distance from the x axis, and maximum change of it until x = 0, of both, as a share
-        of x.
+        Maximum distance of both from the x axis, and its maximum change until x = 0, as a share of
+        x.
     closing_speed_m_s : ndarray, shape (n,)
         Their maximum closing speed e.
     """
@@ -95,7 +98,7 @@ class Sensor(ABC):
     table : str
         Its table in files.
     quantity : str
-        What it measures, with the unit: ``measured_<quantity>`` is its column in files.
+        Measured quantity, with the unit: ``measured_<quantity>`` is its column in files.
     stream : int
         Its stream of random numbers: a number below 16 that no other kind and no stream of
         `infoset.sim.draws` has.
@@ -113,14 +116,16 @@ class Sensor(ABC):
 
     @abstractmethod
     def true_value(self, sight: Geometry) -> Floats:
-        """Return the measured quantity without error, shape (C, B), or (B,) if it is not
-        lateral.
+        """Return the measured quantity without error.
+
+        The shape is (C, B), or (B,) if the sensor is not lateral.
         """
 
     @abstractmethod
     def bound(self, sight: Geometry) -> Floats | float:
-        """Return the maximum size of the error, in the unit of the quantity, broadcast against the
-        true value.
+        """Return the maximum size of the error, in the unit of the quantity.
+
+        It is broadcast against the true value.
         """
 
     @abstractmethod
@@ -132,7 +137,7 @@ class Sensor(ABC):
         sets : Cuttable
             Sets of a batch, for example an `InformationSet`.
         measured : mapping of str to ndarray, shape (C, B) or (B,)
-            All measurements of the step (rad, m, rad/s), that of this sensor among them.
+            All measurements of the step (rad, m, rad/s), including the measurement of this sensor.
         where : ndarray of bool, shape (B,)
             Engagements that have measured.
         """
@@ -144,7 +149,7 @@ class Sensor(ABC):
         """Return the band of (V, z) that a measurement leaves, for `infoset.lower_bound`.
 
         The search for two motions uses it. It may neglect terms of second order, because `share`
-        checks what is found.
+        checks the motions that are found.
 
         Parameters
         ----------
@@ -164,12 +169,13 @@ class Sensor(ABC):
 
     @abstractmethod
     def share(self, apart: Apart) -> Floats:
-        """Return half of the maximum difference of the measured values of two motions, in units of
-        the bound.
+        """Return half of the maximum difference of the measured values of two motions.
 
-        Shape (n,). Both can have the same measured value where it is at most 1. The lower bound of
-        the miss is a theorem only if no difference of two motions within `apart` is greater: see
-        Lemma 20 of docs/guarantee.md.
+        It is in units of the bound, shape (n,). Both motions can have the same measured value where
+        it is at most 1.
+
+        The lower bound of the miss is a theorem only if no difference of two motions within `apart`
+        is greater: see Lemma 20 of docs/guarantee.md.
         """
 
     def measures_at(self, before_arrival_s: float) -> bool:

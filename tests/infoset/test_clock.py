@@ -12,9 +12,7 @@ from infoset.clock import steps_between
 
 
 def nearest_step(start_s: Fraction, time_s: Fraction, step_s: Fraction) -> int:
-    """Return the step with the least distance, the earlier of two, among those until the
-    arrival.
-    """
+    """Return the nearest step before the arrival; of two the earlier one."""
     below = math.floor((start_s - time_s) / step_s)
     last = math.ceil(start_s / step_s) - 1
     steps = [step for step in range(below - 1, below + 3) if step <= last] or [last]
@@ -29,7 +27,7 @@ def decimal(draw: random.Random, maximum: int) -> Fraction:
 
 
 @pytest.mark.parametrize("count", [4_000, pytest.param(20_000, marks=pytest.mark.thorough)])
-def test_it_is_the_nearest_step_of_random_times(count: int) -> None:
+def test_step_of_a_random_time_is_the_nearest_one(count: int) -> None:
     draw = random.Random(1)
     for _ in range(count):
         step_s = decimal(draw, 100)
@@ -60,5 +58,7 @@ def test_it_is_the_nearest_step_of_random_times(count: int) -> None:
         (0.3, 0.1, 0.1, 2),  # 0.3 - 0.1 is less than two steps in floating point
     ],
 )
-def test_steps_of_single_times(start_s: float, time_s: float, step_s: float, step: int) -> None:
+def test_step_of_a_time_is_before_the_arrival(
+    start_s: float, time_s: float, step_s: float, step: int
+) -> None:
     assert steps_between(start_s, time_s, step_s) == step

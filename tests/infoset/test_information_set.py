@@ -30,18 +30,14 @@ MODEL = SetModel(
 
 
 def feasible_range_interval_m(information: InformationSet) -> tuple[Floats, Floats]:
-    """Return the minimum and the maximum range that agree with the history, to rounding, m, shape
-    (B,).
-    """
+    """Return the ends of the ranges that agree with the history, to rounding, m, shape (B,)."""
     refined = information.copy()
     refined._state.refine(refined.tracking, 2)
     return refined.stored_range_interval_m()
 
 
 def flown(model: SetModel, steps: int, seed: int = 0, batch: int = 1) -> InformationSet:
-    """A set after some steps of a model motion with random noise and impulses, before the next
-    measurement.
-    """
+    """Return a set after some steps with random noise and impulses, before a measurement."""
     random = np.random.default_rng(seed)
     z = random.uniform(-1e3, 1e3, (1, batch))
     v = random.uniform(-50.0, 50.0, (1, batch))
@@ -58,10 +54,11 @@ def flown(model: SetModel, steps: int, seed: int = 0, batch: int = 1) -> Informa
         information.predict()
         z = z + STEP * v
         x = x - E * STEP
+
     return information
 
 
-def test_a_section_replayed_equals_the_one_carried_from_the_start() -> None:
+def test_section_that_is_replayed_is_equal_to_the_section_carried_from_the_start() -> None:
     information = flown(replace(MODEL, sections=9, fewest_sections=1), 150)
     carried = information.sections()
     assert len(carried) >= 2
@@ -74,7 +71,7 @@ def test_a_section_replayed_equals_the_one_carried_from_the_start() -> None:
 
 
 @pytest.mark.parametrize("rates", range(1, 9))
-def test_rates_of_one_engagement_leave_room_for_the_sections_of_another_one(rates: int) -> None:
+def test_rates_of_one_engagement_leave_room_for_the_sections_of_another(rates: int) -> None:
     model = replace(MODEL, sections=3, fewest_sections=1)
     alone = InformationSet(model)
     both = InformationSet(model, 2)
@@ -84,11 +81,12 @@ def test_rates_of_one_engagement_leave_room_for_the_sections_of_another_one(rate
             both.measure_rate(0.0, 1.0, [True, False])
         for information in (alone, both):
             information.predict()
+
     for one, other in zip(alone.sections(), both.sections(1), strict=True):
         np.testing.assert_array_equal(other.polygons[0].polygon(), one.polygons[0].polygon())
 
 
-def test_in_space_a_value_is_that_of_all_axes_and_engagements_or_one_is_needed_for_each() -> None:
+def test_value_in_space_is_one_number_or_one_for_each_axis_and_engagement() -> None:
     model = replace(MODEL, bounds=replace(KNOWN, y_m=(-8e3, 8e3), vy_m_s=(-80.0, 80.0)))
     for batch in (1, 3):
         one = InformationSet(model, batch)
@@ -113,30 +111,33 @@ def test_in_space_a_value_is_that_of_all_axes_and_engagements_or_one_is_needed_f
         np.testing.assert_array_equal(one.predicted_miss().upper_m, each.predicted_miss().upper_m)
 
 
-def test_regridding_gives_twice_the_fewest_and_one_over_the_feasible_range_ends_included() -> None:
+def test_new_grid_has_twice_the_fewest_sections_and_one_over_the_feasible_range() -> None:
     model = replace(MODEL, sections=5, fewest_sections=5)
     information = InformationSet(model)
     information.measure_range(5801.3e3, 0.05)
     ranges = np.array([section.range_m for section in information.sections()])
+
     assert len(ranges) == 11
     np.testing.assert_allclose(
         ranges, np.linspace(5801.3e3 / 1.05, 5801.3e3 / 0.95, 11), rtol=1e-12
     )
 
 
-def test_a_range_measurement_keeps_exactly_the_ranges_it_allows() -> None:
+def test_range_measurement_keeps_exactly_the_ranges_within_its_bound() -> None:
     information = InformationSet(replace(MODEL, sections=101))
     information.measure_range(5801.3e3, 0.05)
     minimum, maximum = feasible_range_interval_m(information)
+
     assert minimum[0] == pytest.approx(5801.3e3 / 1.05, rel=1e-13)
     assert maximum[0] == pytest.approx(5801.3e3 / 0.95, rel=1e-13)
+
     ranges = [section.range_m for section in information.sections()]
     assert minimum[0] <= min(ranges)
     assert max(ranges) <= maximum[0]
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_the_ends_of_the_range_are_feasible_and_labels_just_beyond_them_are_not(seed: int) -> None:
+def test_ends_of_the_range_are_feasible_and_labels_just_beyond_are_not(seed: int) -> None:
     # A sharp sensor and a large offset make angles tell range, so that the ends are found between
     # stored labels.
     sharp = AngleSensor(0.5, 2e-6, 2e-6, 5801.3e3)
@@ -153,9 +154,12 @@ def test_the_ends_of_the_range_are_feasible_and_labels_just_beyond_them_are_not(
         information.predict()
         z = z + STEP * v
         x = x - E * STEP
+
     assert information.tracking[0]
+
     travelled = E * information.time_s
     minimum, maximum = feasible_range_interval_m(information)
+
     assert maximum[0] - minimum[0] < 0.9 * 1000e3
     for end, outward in ((minimum[0], -1.0), (maximum[0], 1.0)):
         assert not information.section_at(end + travelled).polygons[0].is_empty
@@ -166,24 +170,25 @@ def test_the_ends_of_the_range_are_feasible_and_labels_just_beyond_them_are_not(
         )
 
 
-def test_the_initial_rectangle_is_the_papers() -> None:
+def test_initial_rectangle_is_the_rectangle_of_the_paper() -> None:
     section = InformationSet(replace(MODEL, sections=1, fewest_sections=1)).sections()[0]
     x = section.label_m
     lower, upper = section.omega_alpha[0].bounding_box()
+
     assert lower[1] == pytest.approx(math.atan(-10e3 / x), rel=1e-12)
     assert upper[1] == pytest.approx(math.atan(10e3 / x), rel=1e-12)
     assert lower[0] == pytest.approx((-100.0 * x - -59e3 * -10e3) / x**2, rel=1e-9)
     assert upper[0] == pytest.approx((100.0 * x - -59e3 * 10e3) / x**2, rel=1e-9)
 
 
-def test_the_initial_box_is_the_bounds() -> None:
+def test_initial_box_is_the_box_of_the_bounds() -> None:
     information = InformationSet(replace(MODEL, initial_set=InitialSet.BOX))
     lower, upper = information.sections()[0].polygons[0].bounding_box()
     np.testing.assert_array_equal(lower, (-100.0, -10e3))
     np.testing.assert_array_equal(upper, (100.0, 10e3))
 
 
-def test_one_step_by_hand() -> None:
+def test_one_step_is_equal_to_the_formulas_of_the_theory() -> None:
     """Band, shift, shear and disturbance of a box, from the formulas of the theory."""
     model = replace(
         MODEL, initial_set=InitialSet.BOX, sections=1, fewest_sections=1, disturbance_m_s2=0.02
@@ -193,13 +198,17 @@ def test_one_step_by_hand() -> None:
     bound = SENSOR.error_bound(x)
     information.measure_angle(0.001)
     lower, upper = information.sections()[0].polygons[0].bounding_box()
+
     np.testing.assert_allclose(
         (lower[1], upper[1]), (x * (0.001 - bound), x * (0.001 + bound)), rtol=1e-13
     )
+
     information.shift(4.0)
     information.predict()
     section = information.sections()[0]
+
     assert section.range_m == pytest.approx(x - E * STEP, rel=1e-15)
+
     nu = 0.02
     for direction in ((1.0, 0.0), (0.0, 1.0), (0.3, 1.0), (-1.0, 0.2), (-0.3, -1.0)):
         corners = [
@@ -210,11 +219,12 @@ def test_one_step_by_hand() -> None:
         assert section.polygons[0].support_function(direction) == pytest.approx(expected, rel=1e-13)
 
 
-def test_predicted_miss_by_hand() -> None:
+def test_predicted_miss_of_the_initial_box_is_the_formula_of_the_theory() -> None:
     model = replace(MODEL, initial_set=InitialSet.BOX, sections=2, fewest_sections=1)
     miss = InformationSet(model).predicted_miss()
     time_to_go = 6301.3e3 / E
     expected = 10e3 + 100.0 * time_to_go + 0.5 * 0.005 * time_to_go**2
+
     assert miss.upper_m[0] == pytest.approx(expected, rel=1e-13)
     assert miss.lower_m[0] == pytest.approx(-expected, rel=1e-13)
     assert miss.upper_point.range_m[0] == 6301.3e3
@@ -223,7 +233,7 @@ def test_predicted_miss_by_hand() -> None:
     )
 
 
-def test_the_point_of_an_extreme_edge_is_its_lowest_above_and_its_highest_below() -> None:
+def test_point_of_an_extreme_edge_is_its_lowest_above_and_its_highest_below() -> None:
     """The paper's rectangle has whole edges of extreme omega: the vertex rule of the theory."""
     information = InformationSet(replace(MODEL, sections=1, fewest_sections=1))
     for _ in range(3):
@@ -232,6 +242,7 @@ def test_the_point_of_an_extreme_edge_is_its_lowest_above_and_its_highest_below(
     lower, upper = information.sections()[0].omega_alpha[0].bounding_box()
     points = information.sections()[0].omega_alpha[0].polygon()
     tolerance = 1e-9 * (upper[0] - lower[0])
+
     assert miss.upper_point.alpha_rad[0, 0] == pytest.approx(
         points[points[:, 0] > upper[0] - tolerance, 1].min()
     )
@@ -241,18 +252,19 @@ def test_the_point_of_an_extreme_edge_is_its_lowest_above_and_its_highest_below(
     assert miss.upper_point.alpha_rad[0, 0] < miss.lower_point.alpha_rad[0, 0]
 
 
-def test_inconsistent_measurements_are_told_and_the_set_goes_on_from_the_last_consistent_one() -> (
-    None
-):
+def test_inconsistent_measurement_is_reported_and_the_last_consistent_set_continues() -> None:
     information = InformationSet(MODEL, batch=2)
     information.measure_angle(0.001)
     before = information.copy()
     information.measure_angle([[0.0012, -0.0012]])
+
     assert information.inconsistent.tolist() == [False, True]
+
     step, label = information.inconsistency
     assert step.tolist() == [None, 0]
     assert MODEL.bounds.x_m[0] <= label[1] <= MODEL.bounds.x_m[1]
     assert information.status == [SetStatus.TRACKING, SetStatus.TRACKING]
+
     # As before the measurement, and wider by what one measurement may err: e b in V, which is x b
     # of miss.
     x, slack = 5801.3e3, 1e-9
@@ -260,16 +272,19 @@ def test_inconsistent_measurements_are_told_and_the_set_goes_on_from_the_last_co
     old = before.section_at(x, 1).polygons[0]
     new = information.section_at(x, 1).polygons[0]
     grown = old.minkowski_sum(ConvexPolygons.from_box((-E * bound, 0.0), (E * bound, 0.0)))
+
     for direction in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (1.0, 0.01), (-1.0, 0.02)):
         assert new.support_function(direction) == pytest.approx(
             float(grown.support_function(direction)), rel=slack
         )
+
     information.predict()
     information.shift(1.0)
+
     assert information.predicted_miss().exists.all()
 
 
-def test_a_set_whose_labels_have_all_left_is_finished() -> None:
+def test_set_is_finished_if_all_labels_have_left() -> None:
     information = InformationSet(replace(MODEL, sections=2, fewest_sections=1))
     for _ in range(230):
         information.drop_below_threshold()
@@ -277,10 +292,11 @@ def test_a_set_whose_labels_have_all_left_is_finished() -> None:
     assert information.status == [SetStatus.FINISHED]
 
 
-def test_measuring_some_of_a_batch_leaves_the_others_alone() -> None:
+def test_measurement_of_some_of_a_batch_does_not_change_the_others() -> None:
     information = InformationSet(MODEL, batch=2)
     before = information.sections(1)[3].polygons[0].polygon()
     information.measure_angle(0.0003, where=[True, False])
+
     np.testing.assert_array_equal(information.sections(1)[3].polygons[0].polygon(), before)
     assert (
         information.sections(0)[3].polygons[0].area()
@@ -289,28 +305,28 @@ def test_measuring_some_of_a_batch_leaves_the_others_alone() -> None:
 
 
 @pytest.mark.parametrize("recovery", list(Recovery))
-def test_a_copy_of_a_view_goes_on_as_the_set_does(recovery: Recovery) -> None:
-    """Labels have left, then comes a contradiction: what has left decides what becomes of the
-    set.
-    """
+def test_copy_of_a_view_continues_as_the_set_does(recovery: Recovery) -> None:
+    """Some labels have left before a contradiction: they decide about the status of the set."""
     information = InformationSet(
         replace(MODEL, model=Model.GUARANTEED, initial_set=InitialSet.BOX, recovery=recovery)
     )
     while not information.guaranteed_miss()[1].any():
         information.drop_below_threshold()
         information.predict()
+
     information.measure_angle(0.0)
     copies = information.copy(), information.view().copy()
     for each in copies:
         each.measure_angle(1.2)
     straight, by_view = copies
+
     assert by_view.status == straight.status == [SetStatus.REFUTED]
     assert by_view.inconsistent.tolist() == straight.inconsistent.tolist() == [False]
     np.testing.assert_array_equal(by_view.guaranteed_miss(), straight.guaranteed_miss())
 
 
 @pytest.mark.parametrize(("range_m", "nearest"), [(5.0e6, "minimum"), (6.5e6, "maximum")])
-def test_a_range_that_contradicts_names_the_feasible_label_nearest_to_it(
+def test_label_of_an_inconsistent_range_is_the_nearest_feasible_one(
     range_m: float, nearest: str
 ) -> None:
     information = InformationSet(MODEL)
@@ -318,23 +334,23 @@ def test_a_range_that_contradicts_names_the_feasible_label_nearest_to_it(
     feasible = information.labels_m[information.feasible]
     information.measure_range(range_m, 1e-3)
     (step,), (label,) = information.inconsistency
+
     assert step == 0
+
     # The limits stand a little outside the outermost sections' labels.
     wanted = feasible.min() if nearest == "minimum" else feasible.max()
     assert label == pytest.approx(wanted, rel=1e-3)
 
 
-def test_exact_knowledge_gives_segments_and_points() -> None:
+def test_sections_are_segments_and_points_if_the_start_is_known_exactly() -> None:
     line = replace(MODEL, bounds=replace(KNOWN, z_m=(100.0, 100.0)), initial_set=InitialSet.BOX)
     assert InformationSet(line).sections()[0].polygons[0].counts == 2
     point = replace(line, bounds=replace(line.bounds, vz_m_s=(3.0, 3.0)))
     assert InformationSet(point).sections()[0].polygons[0].polygon().tolist() == [[3.0, 100.0]]
 
 
-def test_many_cuts_in_one_step_keep_the_vertex_cap() -> None:
-    """Each cut may add two vertices: at the cap they are taken off again, and no section outgrows
-    its room.
-    """
+def test_sections_keep_the_vertex_cap_after_many_cuts_in_one_step() -> None:
+    """Each cut may add two vertices: at the cap they are removed again."""
     information = InformationSet(
         replace(MODEL, sections=3, fewest_sections=1, initial_set=InitialSet.BOX)
     )
@@ -345,14 +361,17 @@ def test_many_cuts_in_one_step_keep_the_vertex_cap() -> None:
     minimum, maximum = (
         float(corner[1]) / section.range_m for corner in section.polygons[0].bounding_box()
     )
+
     assert maximum - minimum > 2.0 * bound
+
     for share in np.linspace(0.0, 0.9, 12):
         information.measure_angle(minimum + (1.0 + share) * bound)
         assert all(int(section.polygons[0].counts) <= 256 for section in information.sections())
+
     assert information.tracking[0]
 
 
-def test_the_vertex_cap_is_kept_and_outward() -> None:
+def test_sections_at_the_vertex_cap_contain_the_exact_ones() -> None:
     """Without cuts every step adds two vertices; the reduced section contains the exact one."""
     information = InformationSet(
         replace(MODEL, sections=1, fewest_sections=1, initial_set=InitialSet.BOX)
@@ -364,9 +383,12 @@ def test_the_vertex_cap_is_kept_and_outward() -> None:
         exact = exact.linear_map([[1.0, 0.0], [STEP, 1.0]]).add_segment(
             [nu * STEP, 0.5 * nu * STEP**2]
         )
+
     kept = information.sections()[0].polygons[0]
+
     assert int(kept.counts) <= 256
     assert int(exact.counts) > 256
+
     normals = np.column_stack(
         (np.cos(np.linspace(0, 6.28, 60)), np.sin(np.linspace(0, 6.28, 60)))
     ) * (50.0, 1.0)

@@ -47,7 +47,9 @@ def test_kernels_of_several_modules_give_one_notice_and_one_summary(
         compile_within(notice, "infoset.engine.chains", "infoset.geometry.polygon")
         compile_within(notice, "infoset.sim.kepler")
         compile_within(notice, "numba.core")  # not ours
+
     first, last = caplog.messages
+
     assert first.startswith(
         "compiling the numerical kernels of infoset engage (up to about 25 s), "
     )
@@ -55,7 +57,7 @@ def test_kernels_of_several_modules_give_one_notice_and_one_summary(
     assert last.endswith(" s (infoset.engine, infoset.geometry, infoset.sim)")
 
 
-def test_every_command_names_itself(caplog: pytest.LogCaptureFixture) -> None:
+def test_notice_has_the_purpose_of_each_command(caplog: pytest.LogCaptureFixture) -> None:
     notice = CompileNotice()
     for name in ("infoset engage", "infoset bound"):
         with notice.of(name):
@@ -64,7 +66,7 @@ def test_every_command_names_itself(caplog: pytest.LogCaptureFixture) -> None:
     assert [line.count("infoset bound") for line in caplog.messages] == [0, 0, 1, 1]
 
 
-def test_time_within_nested_kernels_counts_once(
+def test_time_of_nested_kernels_is_counted_once(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     times_s = iter([10.0, 15.0])  # of the outer kernel only
@@ -72,10 +74,11 @@ def test_time_within_nested_kernels_counts_once(
     notice = CompileNotice()
     with notice.of("infoset pareto"):
         compile_within(notice, "infoset.sim.kepler", "infoset.sim.kepler")
+
     assert "compiled 2 kernels of infoset pareto in 5.0 s" in caplog.messages[-1]
 
 
-def test_nothing_is_said_if_nothing_is_compiled_or_the_command_is_quiet(
+def test_notice_is_absent_if_nothing_is_compiled_or_the_command_is_quiet(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     notice = CompileNotice()
@@ -84,10 +87,11 @@ def test_nothing_is_said_if_nothing_is_compiled_or_the_command_is_quiet(
     caplog.set_level(logging.ERROR, "infoset.kernels")  # as of --quiet
     with notice.of("infoset engage"):
         compile_within(notice, "infoset.sim.kepler")
+
     assert caplog.messages == []
 
 
-def test_a_first_command_says_what_it_compiles_and_the_second_says_nothing(tmp_path: Path) -> None:
+def test_first_command_gives_the_notice_and_the_second_does_not(tmp_path: Path) -> None:
     environment = {**os.environ, VARIABLE: str(tmp_path)}
 
     def said() -> list[str]:
@@ -96,6 +100,7 @@ def test_a_first_command_says_what_it_compiles_and_the_second_says_nothing(tmp_p
         return [line for line in done.stderr.splitlines() if "compil" in line]
 
     first, last = said()
+
     assert (
         "compiling the numerical kernels of infoset pareto (up to about 25 s), once; later "
         "runs load "

@@ -1,11 +1,10 @@
-"""Bands of the guaranteed model in space: they contain the truth at every label, and are convex in
-the label.
-"""
+"""Bands of the guaranteed model in space contain the truth, and are convex in the label."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from hypothesis import given, settings
@@ -57,19 +56,40 @@ def bands(
     ]
 
 
+class Motion(NamedTuple):
+    """A true line of sight, its closing speed, and the errors of a measurement."""
+
+    angles: tuple[float, float]
+    speed: float
+    error: tuple[float, float]
+    is_extremal: bool
+
+    @property
+    def errors(self) -> Floats:
+        """Errors in units of the bound; extremal ones are corners of the box."""
+        errors = np.array(self.error)[:, None]
+        return np.where(errors < 0.0, -1.0, 1.0) if self.is_extremal else errors
+
+
+motions = st.builds(
+    Motion, st.tuples(signed, signed), signed, st.tuples(signed, signed), st.booleans()
+)
+
+
 @settings(deadline=None)
 @given(
-    bounds, bounds, st.none() | st.tuples(st.just(0.0) | bounds, st.just(0.0) | bounds),
-    st.tuples(signed, signed), st.tuples(signed, signed), st.booleans(), signed, shares, shares,
-)  # fmt: skip
+    bounds,
+    bounds,
+    st.none() | st.tuples(st.just(0.0) | bounds, st.just(0.0) | bounds),
+    motions,
+    shares,
+    shares,
+)
 def test_bands_contain_the_truth_and_are_convex(
     at_nominal: float,
     at_zero: float,
     of_y: tuple[float, float] | None,
-    angles: tuple[float, float],
-    error: tuple[float, float],
-    extremal: bool,
-    speed: float,
+    motion: Motion,
     label_share: float,
     flown: float,
 ) -> None:
@@ -87,31 +107,34 @@ def test_bands_contain_the_truth_and_are_convex(
     label = minimum + label_share * (maximum - minimum)
     elapsed_m = 0.999 * flown * minimum
     x = label - elapsed_m
-    true = sight(x * (1.0 + speed * model.speed_error), angles)
-    contain_and_are_convex(model, true, errors_of(error, extremal), label, elapsed_m)
+    true = sight(x * (1.0 + motion.speed * model.speed_error), motion.angles)
+    contain_and_are_convex(model, true, motion.errors, label, elapsed_m)
 
 
 @settings(deadline=None, max_examples=100)
 @given(
-    st.floats(-9.0, -1.0), st.floats(-2.0, 5.0), st.floats(0.0, 2.0),
-    st.tuples(signed, signed), st.tuples(signed, signed), st.booleans(), signed, st.floats(0.0, 0.5), shares,
-    st.floats(-3.0, 0.0), shares,
-)  # fmt: skip
+    st.floats(-9.0, -1.0),
+    st.floats(-2.0, 5.0),
+    st.floats(0.0, 2.0),
+    motions,
+    st.floats(0.0, 0.5),
+    shares,
+    st.floats(-3.0, 0.0),
+    shares,
+)
 def test_bands_of_a_camera_contain_the_truth_and_are_convex(
     pixel: float,
     centroid: float,
     threshold: float,
-    angles: tuple[float, float],
-    error: tuple[float, float],
-    extremal: bool,
-    speed: float,
+    motion: Motion,
     speed_error: float,
     label_share: float,
     far: float,
     near: float,
 ) -> None:
-    """At all ranges from ten centroid errors up, with the bounds of both axes reached, and a
-    closing speed of 50 %.
+    """At all ranges from ten centroid errors up, with a closing speed known to 50 %.
+
+    The bounds of both axes are reached.
     """
     sensor = Camera(0.5, 10.0**pixel, 10.0**centroid)
     threshold_m = 10.0 ** (centroid + 1.0 + threshold) * (1.0 + 1e-12)
@@ -131,27 +154,21 @@ def test_bands_of_a_camera_contain_the_truth_and_are_convex(
     label = minimum + label_share * (maximum - minimum)
     # From the threshold to the start, many of them near the threshold.
     x = threshold_m + (label - threshold_m) * (10.0**far if near < 0.5 else 1e-9 * near)
-    true = sight(x * (1.0 + speed * model.speed_error), angles)
-    contain_and_are_convex(model, true, errors_of(error, extremal), label, label - x)
-
-
-def errors_of(error: tuple[float, float], extremal: bool) -> Floats:
-    """Return errors in units of the bound; extremal ones are corners of the box."""
-    errors = np.array(error)[:, None]
-    return np.where(errors < 0.0, -1.0, 1.0) if extremal else errors
+    true = sight(x * (1.0 + motion.speed * model.speed_error), motion.angles)
+    contain_and_are_convex(model, true, motion.errors, label, label - x)
 
 
 def contain_and_are_convex(
     model: SetModel, true: Sight, errors: Floats, label: float, elapsed_m: float
 ) -> None:
-    """Check the bands of a measurement: that of the label contains the truth, those of all labels
-    are convex.
-    """
-    x, (minimum, maximum) = label - elapsed_m, model.label_limits_m
+    """Check that the band at the label contains the truth, and that bands are convex in it."""
+    x = label - elapsed_m
+    minimum, maximum = model.label_limits_m
     band = bands(model, model.angle_sensor.measured(true, errors), elapsed_m)
     for (lower, upper), slope in zip(band(label), np.tan(true.alpha_rad[:, 0]), strict=True):
         rounding = 64.0 * EPS * (1.0 + slope**2) * label / x
         assert lower - rounding <= slope <= upper + rounding
+
     labels = np.linspace(max(minimum, elapsed_m + model.min_range_m), maximum, 7)
     ranges = labels - elapsed_m
     heights = np.array([band(each) for each in labels.tolist()]) * ranges[:, None, None]

@@ -46,7 +46,7 @@ places = st.builds(
 
 
 @given(places, bounds, shares, shares, st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
-def test_the_errors_of_a_measurement_and_the_nearest_one(
+def test_error_of_a_measurement_is_recovered_and_the_nearest_is_possible(
     place: Place, bound: float, right: float, up: float, wanted_y: float, wanted_z: float
 ) -> None:
     sensor = AngleSensor(0.5, bound, bound, 1.0)
@@ -54,35 +54,42 @@ def test_the_errors_of_a_measurement_and_the_nearest_one(
     error = np.array([[right], [up]])
     wanted = np.array([[wanted_y], [wanted_z]])
     measured = sensor.measured(place, error)
+
     np.testing.assert_allclose(sensor.error(place, measured), error, atol=rounding)
+
     nearest = sensor.nearest(place, place.alpha_rad + bound * wanted)
     np.testing.assert_allclose(
         sensor.error(place, nearest), np.clip(wanted, -1.0, 1.0), atol=rounding
     )
+
     assume(np.abs(measured).max() + bound < 1.5)
     slopes = np.array([[place.y_m], [place.z_m]]) / place.x_m
     slack = 64.0 * EPS * (1.0 + slopes**2)
+
     assert (np.tan(measured - bound) - slack <= slopes).all()
     assert (slopes <= np.tan(measured + bound) + slack).all()
 
 
-def test_bounds_that_differ_by_axis() -> None:
+def test_error_bounds_of_the_two_axes_may_differ() -> None:
     one = replace(SENSOR, error_at_nominal_range_y_rad=0.0003, error_at_zero_range_y_rad=0.0)
     place = Place(2e6, 3e3, -4e3)
     expected = [0.0003 * place.range_m / 5801.3e3, SENSOR.error_bound(place.range_m)]
+
     np.testing.assert_allclose(one.bound(place), expected, rtol=1e-12)
+
     by_axis = np.array([[1e6, 2e6], [3e6, 4e6]])
     np.testing.assert_allclose(
         one.error_bounds(by_axis)[0], 0.0003 * by_axis[0] / 5801.3e3, rtol=1e-12
     )
     assert np.array_equal(one.error_bounds(by_axis)[1], SENSOR.error_bound(by_axis[1]))
     assert np.array_equal(SENSOR.error_bounds(by_axis), SENSOR.error_bound(by_axis))
+
     measured = one.measured(place, np.ones((2, 1)))
     assert np.array_equal(measured, place.alpha_rad + one.bound(place))
 
 
 @given(shares, shares)
-def test_an_axis_without_error_is_measured_exactly(right: float, up: float) -> None:
+def test_axis_without_error_is_measured_exactly(right: float, up: float) -> None:
     one = replace(SENSOR, error_at_nominal_range_y_rad=0.0, error_at_zero_range_y_rad=0.0)
     for place in (Place(2e6, 3e3, -4e3), Place(2e6, 0.0, 0.0)):
         measured = one.measured(place, np.array([[right], [up]]))

@@ -1,6 +1,4 @@
-"""Batches: shapes, broadcasting, indexing, errors, what a person sees; polygons from points and
-from shapely.
-"""
+"""Batches of polygons, polygons from points, and conversion from and to shapely."""
 
 from __future__ import annotations
 
@@ -40,7 +38,7 @@ def segment() -> ConvexPolygons:
 
 
 @pytest.mark.parametrize("shape", [(3,), (2, 3)])
-def test_a_batch_gives_what_its_members_give(shape: tuple[int, ...]) -> None:
+def test_batch_has_the_results_of_its_members(shape: tuple[int, ...]) -> None:
     batch = boxes(shape)
     random = np.random.default_rng(1)
     vectors = random.normal(size=(*shape, 2))
@@ -70,13 +68,14 @@ def test_a_batch_gives_what_its_members_give(shape: tuple[int, ...]) -> None:
             np.testing.assert_array_equal(many, alone)
 
 
-def test_members_of_a_batch_may_have_few_vertices_or_none() -> None:
+def test_members_of_a_batch_have_any_number_of_vertices() -> None:
     vertices = np.zeros((4, 4, 2))
     vertices[1, 0] = (1.0, 2.0)
     vertices[2, :2] = segment().polygon()
     vertices[3] = square().polygon()
-    vertices[0] = np.nan  # not used: never looked at
+    vertices[0] = np.nan  # padding
     mixed = ConvexPolygons(vertices, [0, 1, 2, 4])
+
     assert mixed.is_empty.tolist() == [True, False, False, False]
     np.testing.assert_array_equal(mixed.area(), [0.0, 0.0, 0.0, 1.0])
     np.testing.assert_array_equal(mixed.support_function((1.0, 0.0)), [-np.inf, 1.0, 3.0, 1.0])
@@ -88,8 +87,9 @@ def test_members_of_a_batch_may_have_few_vertices_or_none() -> None:
     assert mixed.minkowski_sum(square()).counts.tolist() == [0, 4, 6, 4]
 
 
-def test_indexing_slicing_masking_and_iteration() -> None:
+def test_batch_is_indexed_sliced_masked_and_iterated_over() -> None:
     batch = boxes((2, 3))
+
     assert len(batch) == 2
     assert batch[1].shape == (3,)
     assert batch[1, 2].area() == 6.0
@@ -122,6 +122,7 @@ def test_operations_on_the_empty_set_are_empty(make: Callable[[], ConvexPolygons
         square().minkowski_sum(empty),
         empty.reduce_outward(4),
     ]
+
     assert all(result.is_empty for result in results)
     assert empty.area() == 0.0
     assert empty.support_function((1.0, 0.0)) == -np.inf
@@ -139,23 +140,29 @@ def test_operations_on_the_empty_set_are_empty(make: Callable[[], ConvexPolygons
     ],
     ids=["centroid", "bounding_box", "support_vector"],
 )
-def test_the_empty_set_has_no_points_to_give(measure: Callable[[ConvexPolygons], object]) -> None:
+def test_point_is_refused_for_the_empty_set_and_masked_for_an_empty_member(
+    measure: Callable[[ConvexPolygons], object],
+) -> None:
     with pytest.raises(ValueError, match="the empty set has no"):
         measure(ConvexPolygons.empty())
+
     batch = boxes((3,)).cut((1.0, 0.0), [1.5, 0.0, 0.0], 9.0)
     values: np.ma.MaskedArray[Any, Any] = np.ma.asarray(measure(batch))
     of_last = np.asarray(measure(batch[2]))
+
     assert np.ma.getmaskarray(values)[..., 0, 0].all()
     assert not np.ma.getmaskarray(values)[..., 1:, :].any()
     np.testing.assert_array_equal(values[..., 2, :], of_last)
 
 
-def test_results_of_a_batch_are_arguments_of_it_although_masked_for_empty_polygons() -> None:
+def test_results_masked_for_empty_members_are_taken_as_arguments() -> None:
     batch = boxes((3,)).cut((1.0, 0.0), [1.5, 0.0, 0.0], 9.0)
     middle = batch.centroid()
+
     assert batch.contains(middle).tolist() == [False, True, True]
     assert (batch.margin(middle)[1:] > 0.0).all()
     assert batch.translate(middle).is_empty.tolist() == [True, False, False]
+
     hidden = np.ma.masked_array(np.zeros((3, 2)), [[False] * 2, [True] * 2, [False] * 2])
     with pytest.raises(TypeError, match="masked"):
         batch.contains(hidden)
@@ -196,7 +203,7 @@ STAR = [(math.cos(turn), math.sin(turn)) for turn in 0.8 * math.pi * np.arange(5
         (STAR, 3),
     ],
 )
-def test_a_ring_is_refused_where_it_is_not_convex_and_the_constructor_takes_its_hull(
+def test_ring_is_refused_if_it_is_not_convex_and_the_constructor_takes_its_hull(
     ring: Any, vertex: int
 ) -> None:
     with pytest.raises(ValueError, match=f"the ring is not convex: vertex {vertex},"):
@@ -217,7 +224,7 @@ def test_a_ring_is_refused_where_it_is_not_convex_and_the_constructor_takes_its_
         ([(0.0, 3.0), (0.0, 1.0), (0.0, 2.0)], [(0.0, 1.0), (0.0, 3.0)]),
     ],
 )
-def test_from_points_of_a_degenerate_set(
+def test_hull_of_points_on_a_line_is_a_segment_or_a_point(
     points: list[tuple[float, float]], wanted: list[tuple[float, float]]
 ) -> None:
     hull = ConvexPolygons.from_points(points)
@@ -235,11 +242,15 @@ def test_from_points_of_a_degenerate_set(
         (lambda: ConvexPolygons.from_box((1e9, 0.0), (1e9 + 1.0, 1e-9)), "Polygon"),
     ],
 )
-def test_shapely_round_trip(make: Callable[[], ConvexPolygons], kind: str) -> None:
+def test_polygon_from_its_shapely_geometry_is_the_same(
+    make: Callable[[], ConvexPolygons], kind: str
+) -> None:
     polygon = make()
     geometry = polygon.to_shapely()
+
     assert geometry.geom_type == kind
     assert geometry.is_empty == polygon.is_empty
+
     back = ConvexPolygons.from_shapely(geometry)
     assert back.shape == ()
     assert back.counts == polygon.counts
@@ -248,8 +259,9 @@ def test_shapely_round_trip(make: Callable[[], ConvexPolygons], kind: str) -> No
     assert polygon.area() == pytest.approx(geometry.area)
 
 
-def test_from_shapely_orients_and_refuses() -> None:
+def test_from_shapely_takes_any_orientation_and_refuses_other_sets() -> None:
     clockwise = shapely.Polygon([(0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)])
+
     assert ConvexPolygons.from_shapely(clockwise).area() == 1.0
     with pytest.raises(ValueError, match="not convex"):
         ConvexPolygons.from_shapely(
@@ -266,7 +278,9 @@ def test_from_shapely_orients_and_refuses() -> None:
     "value",
     [[(0.0, 0.0), (1.0, 0.0)], "POINT (1 2)", None, shapely.LinearRing([(0, 0), (1, 0), (0, 1)])],
 )
-def test_from_shapely_names_the_geometries_that_it_takes(kind: Any, value: Any) -> None:
+def test_from_shapely_refuses_other_geometries_with_the_names_of_possible_ones(
+    kind: Any, value: Any
+) -> None:
     with pytest.raises(ValueError, match="a Point, a LineString or a Polygon is needed: got"):
         kind.from_shapely(value)
 
@@ -281,13 +295,13 @@ def meets_range(vertices: Any, matrix: Any, offset: Any) -> bool:
 
 
 def test_preimage_under_a_singular_matrix_is_unbounded_if_its_range_meets_the_polygon() -> None:
-    """Formerly a triangle with coordinates of 2e16, because unit normals are rounded."""
+    """With rounded unit normals it was a triangle with coordinates of 2e16."""
     with pytest.raises(ValueError, match=r"^the preimage is unbounded"):
         ConvexPolygons.from_points([[-1, 2], [0, -1], [1, -1]]).preimage([[3, -1], [6, -2]])
 
 
 def test_preimage_under_a_singular_matrix_is_empty_if_its_range_misses_the_polygon() -> None:
-    """Formerly 'unbounded'."""
+    """With rounded unit normals it was unbounded."""
     assert (
         ConvexPolygons.from_points([[4, -1], [3, 4], [2, -1]]).preimage([[3, -2], [6, -4]]).is_empty
     )
@@ -321,7 +335,7 @@ def test_preimage_of_a_batch_has_empty_members_and_names_an_unbounded_one() -> N
 
 @pytest.mark.parametrize("count", [400, pytest.param(2700, marks=pytest.mark.thorough)])
 def test_preimages_under_singular_matrices_are_decided_exactly(count: int) -> None:
-    """Formerly some of such preimages, about 2 %, were called the other."""
+    """With rounded unit normals about 2 % of such decisions were wrong."""
     for seed in range(count):
         random = np.random.default_rng(seed)
         polygon = ConvexPolygons.from_points(random.integers(-4, 5, (3, 2)))

@@ -76,14 +76,14 @@ def test_batch_is_drawn_member_by_member_without_the_empty_ones() -> None:
 @pytest.mark.parametrize(
     "empty", [ConvexPolygons.empty(), ConvexPolygons.empty((2,)), Polytope.empty(2)]
 )
-def test_empty_set_of_the_plane_has_no_artist(empty: Any) -> None:
+def test_empty_set_of_the_plane_is_drawn_without_artists(empty: Any) -> None:
     ax = axes_of(2)
 
     assert empty.plot(ax) == []
     assert not ax.has_data()
 
 
-def test_empty_set_of_space_has_no_artist() -> None:
+def test_empty_set_of_space_is_drawn_without_artists() -> None:
     ax = axes_of(3)
 
     assert Polytope.empty(3).plot(ax) == []
@@ -104,17 +104,24 @@ def test_empty_set_of_space_has_no_artist() -> None:
         [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)],
     ],
     ids=[
-        "point", "segment", "sliver", "triangle", "point in space", "segment in space", "triangle in space",
-        "square in space", "tetrahedron",
+        "point",
+        "segment",
+        "sliver",
+        "triangle",
+        "point in space",
+        "segment in space",
+        "triangle in space",
+        "square in space",
+        "tetrahedron",
     ],
-)  # fmt: skip
+)
 @pytest.mark.parametrize(
     "style", [{}, {"color": "black"}, {"facecolor": "red"}, {"alpha": 0.5, "linewidth": 2.0}]
 )
 def test_set_of_any_dimension_is_visible(
     points: list[tuple[float, ...]], style: dict[str, Any]
 ) -> None:
-    """Formerly nothing was visible of points, segments and slivers."""
+    """Points, segments and slivers are visible by their edges."""
     space = len(points[0])
     sets: list[Any] = [Polytope.from_vertices(points)]
     if space == 2:
@@ -138,13 +145,14 @@ def test_facets_of_a_cube_are_its_six_squares() -> None:
     rings = cube()._facet_rings()
 
     assert len(artist.get_paths()) == len(rings) == 6
+
     for ring in rings:
         sides = np.linalg.norm(ring - np.roll(ring, 1, axis=0), axis=1)
         np.testing.assert_allclose(sides, 1.0, rtol=1e-15)
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_order_around_a_polygon_in_space_is_that_of_its_angles_in_the_plane(seed: int) -> None:
+def test_order_around_a_polygon_in_space_is_the_order_of_its_angles_in_the_plane(seed: int) -> None:
     random = np.random.default_rng(seed)
     angles = np.sort(random.uniform(0.0, 2.0 * np.pi, 7))
     circle = np.column_stack([np.cos(angles), np.sin(angles)]) * [1.0, 10.0 ** -(seed % 5)]
@@ -153,14 +161,13 @@ def test_order_around_a_polygon_in_space_is_that_of_its_angles_in_the_plane(seed
     order = ring_order((circle @ random.normal(size=(2, 3)))[mixed])
 
     steps = np.diff(np.append(mixed[order], mixed[order][0])) % 7
+
     assert (steps == 1).all() or (steps == 6).all()
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_edges_of_facets_join_vertices_with_two_common_facets(seed: int) -> None:
-    """The order around a facet agrees with the incidence: neighbours in it are on another common
-    facet.
-    """
+    """The order around a facet agrees with the incidence of facets and vertices."""
     random = np.random.default_rng(seed)
     polytope = Zonotope([0, 0, 0], random.normal(size=(4, 3))).polytope()
 
@@ -170,7 +177,7 @@ def test_edges_of_facets_join_vertices_with_two_common_facets(seed: int) -> None
             assert (polytope.incidence[one] & polytope.incidence[other]).sum() == 2
 
 
-def test_faces_in_space_are_transparent_unless_the_style_says_otherwise() -> None:
+def test_faces_in_space_are_transparent_if_the_style_has_no_opacity() -> None:
     ax = axes_of(3)
     (first,) = cube().plot(ax)
     (second,) = cube().plot(ax, color="red")
@@ -218,11 +225,14 @@ def test_present_axes_are_used_if_they_have_as_many_dimensions() -> None:
     plane = plt.figure().add_subplot()
     square().plot()
     square().polytope().plot()
+
     assert len(plane.patches) == 2
 
     cube().plot()
     space = plt.gca()
+
     assert space.figure is not plane.figure
+
     cube().plot()
     assert len(space.collections) == 2
 
@@ -232,7 +242,7 @@ def test_present_axes_are_used_if_they_have_as_many_dimensions() -> None:
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_axes_are_made_in_a_new_figure(dimension: int) -> None:
+def test_axes_are_made_in_a_new_figure_if_there_are_none(dimension: int) -> None:
     Polytope.from_box([0] * dimension, [1] * dimension).plot()
 
     assert len(plt.get_fignums()) == 1
@@ -258,7 +268,7 @@ def test_axes_of_another_dimension_are_refused(make: Callable[[], Any], space: i
 
 
 @pytest.mark.parametrize("make", [square, cube])
-def test_argument_that_is_no_axes_is_refused(make: Callable[[], Any]) -> None:
+def test_argument_other_than_axes_is_refused(make: Callable[[], Any]) -> None:
     each = make()
     with pytest.raises(TypeError, match="ax must be axes of matplotlib: got"):
         each.plot(np.array([axes_of(2), axes_of(2)]))
@@ -272,7 +282,7 @@ def test_argument_that_is_no_axes_is_refused(make: Callable[[], Any]) -> None:
         (6, "project it on two or three axes first"),
     ],
 )
-def test_set_of_another_space_says_what_to_do(space: int, instead: str) -> None:
+def test_set_of_another_space_is_refused_with_the_methods_to_use(space: int, instead: str) -> None:
     with pytest.raises(
         ValueError,
         match=rf"sets of R\^2 and R\^3 are drawn, and this one is of R\^{space}: {instead}",

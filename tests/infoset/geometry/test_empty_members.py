@@ -143,7 +143,7 @@ def test_cases_are_all_public_methods() -> None:
 
 @pytest.mark.parametrize("seed", range(8))
 @pytest.mark.parametrize("name", CASES)
-def test_members_give_what_they_give_alone(name: str, seed: int) -> None:
+def test_members_of_a_batch_have_the_results_of_single_polygons(name: str, seed: int) -> None:
     """Members of the other set may be empty, too."""
     random = np.random.default_rng(seed)
     shape = SHAPES[seed % len(SHAPES)]
@@ -168,7 +168,7 @@ def test_members_give_what_they_give_alone(name: str, seed: int) -> None:
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("share", [0.5, 1.0])
 @pytest.mark.parametrize("name", CASES)
-def test_empty_members_give_what_the_empty_set_gives(
+def test_empty_members_have_the_results_of_the_empty_set(
     name: str, share: float, shape: tuple[int, ...]
 ) -> None:
     random = np.random.default_rng(5)
@@ -180,6 +180,7 @@ def test_empty_members_give_what_the_empty_set_gives(
     whole = operation(batch, arguments)
 
     assert batch.is_empty.any()
+
     for index in np.argwhere(batch.is_empty):
         member = tuple(index)
         if wanted is EMPTY:
@@ -195,15 +196,24 @@ def test_empty_members_give_what_the_empty_set_gives(
 @pytest.mark.parametrize(
     "name",
     [
-        "cut", "affine_map", "preimage", "translate", "add_segment", "support_vector", "closest_point",
-        "support_function", "margin", "distance from points", "contains", "contains within a tolerance", "slice",
+        "cut",
+        "affine_map",
+        "preimage",
+        "translate",
+        "add_segment",
+        "support_vector",
+        "closest_point",
+        "support_function",
+        "margin",
+        "distance from points",
+        "contains",
+        "contains within a tolerance",
+        "slice",
     ],
-)  # fmt: skip
+)
 @pytest.mark.parametrize("shape", SHAPES)
-def test_values_may_be_masked_for_empty_members_as_results_are(
-    name: str, shape: tuple[int, ...]
-) -> None:
-    """Formerly an error of distance, affine_map, preimage and, for its normals, cut."""
+def test_values_masked_for_empty_members_are_taken(name: str, shape: tuple[int, ...]) -> None:
+    """Results of a batch are such values."""
     random = np.random.default_rng(6)
     batch = random_batch(random, shape, 0.5)
     centres = batch.centroid()
@@ -216,6 +226,7 @@ def test_values_may_be_masked_for_empty_members_as_results_are(
     masked = operation(batch, given._replace(vector=centres, number=numbers))
 
     assert np.ma.is_masked(centres)
+
     for index in np.ndindex(shape):
         if not batch.is_empty[index]:
             assert_same(masked, operation(batch[index], given.of(index)), index)
@@ -245,6 +256,7 @@ def test_samples_of_a_batch_are_in_its_members_and_masked_for_empty_ones(
 
     assert points.shape == (*shape, 9, 2)
     np.testing.assert_array_equal(np.ma.getmaskarray(points).all(axis=(-1, -2)), batch.is_empty)
+
     for number in range(9):
         # Each coordinate is a sum of two products of numbers below 2, with less than 5 roundings.
         inside = batch.contains(points[..., number, :], 8.0 * np.finfo(float).eps)
@@ -252,7 +264,7 @@ def test_samples_of_a_batch_are_in_its_members_and_masked_for_empty_ones(
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_constraints_of_a_batch_make_it_again(shape: tuple[int, ...]) -> None:
+def test_constraints_of_a_batch_describe_it(shape: tuple[int, ...]) -> None:
     """Of a flat member rounded directions may leave nothing: such members are left out."""
     batch = random_batch(np.random.default_rng(1), shape, 0.5)
     solid = batch.counts > 2
@@ -263,10 +275,12 @@ def test_constraints_of_a_batch_make_it_again(shape: tuple[int, ...]) -> None:
     assert batch.is_empty.any()
     assert solid.sum() > 1
     assert again.is_empty[batch.is_empty].all()
+
     for index in np.argwhere(solid):
         sides = normals[tuple(index)][: batch.counts[tuple(index)]]
         before = np.roll(sides, 1, axis=0)
         assert np.abs(before[:, 0] * sides[:, 1] - before[:, 1] * sides[:, 0]).min() > 0.2
+
     # Coordinates and offsets below 2 are known to less than 10 roundings, and the crossings of
     # sides to 5 times that.
     assert (again.hausdorff_distance(batch)[solid] < 50.0 * np.finfo(float).eps).all()

@@ -204,7 +204,7 @@ def name_of(number: int) -> str:
 
 
 @pytest.mark.parametrize("number", range(len(CASES)), ids=name_of)
-def test_answer_is_that_of_the_other_project_or_its_difference_is_explained(number: int) -> None:
+def test_answer_is_equal_to_the_other_project_or_its_difference_is_explained(number: int) -> None:
     case = CASES[number]
     sets = [set_of(given) for given in case["sets"]]
     arguments = dict(case.get("arguments", {}))

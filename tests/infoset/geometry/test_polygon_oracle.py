@@ -21,7 +21,7 @@ from tests.rationals import Fraction
 
 U = Fraction(1, 2**53)
 FEW = 8  # roundings of one coordinate in any one operation
-MINIMUM = Fraction(1, 2**1074)  # what underflow may take from a product
+MINIMUM = Fraction(1, 2**1074)  # rounding of a product that underflows
 Exact = tuple[Fraction, Fraction]
 ORIGIN: Exact = (Fraction(0), Fraction(0))
 Vertices = list[tuple[float, float]]
@@ -58,6 +58,7 @@ def hull(points: Sequence[Exact]) -> list[Exact]:
                 chain.pop()
             chain.append(point)
         chains.append(chain[:-1])
+
     return chains[0] + chains[1]
 
 
@@ -221,35 +222,38 @@ SCALE = st.integers(-5, 4).map(lambda k: 10.0**k)  # nine decades
 @st.composite
 def points_of_polygon(draw: st.DrawFn, minimum: int = 1) -> Vertices:
     unit = draw(st.lists(st.tuples(UNIT, UNIT), min_size=minimum, max_size=9))
-    kind = draw(
-        st.sampled_from(["plain", "round", "thin", "tiny", "mixed", "each", "segment", "point"])
-    )
+    kinds = ["plain", "round", "thin", "tiny", "mixed", "each", "segment", "point"]
+    kind = draw(st.sampled_from(kinds))
     if minimum > 2 and kind in ("segment", "point"):
         kind = "plain"
     angle = draw(ANGLE)
     c = math.cos(angle)
     s = math.sin(angle)
+
+    points = unit
     if kind == "round":
         turns = [math.pi * (x + 1.0) for x, _ in unit]
-        return [(3.0 * math.cos(t), 3.0 * math.sin(t) + 1.0) for t in turns]
-    if kind == "thin":
-        return [(c * x - s * 1e-12 * y, s * x + c * 1e-12 * y) for x, y in unit]
-    if kind == "tiny":
+        points = [(3.0 * math.cos(t), 3.0 * math.sin(t) + 1.0) for t in turns]
+    elif kind == "thin":
+        points = [(c * x - s * 1e-12 * y, s * x + c * 1e-12 * y) for x, y in unit]
+    elif kind == "tiny":
         at = draw(st.tuples(UNIT, UNIT))
-        return [(1e4 * at[0] + 1e-9 * x, 1e4 * at[1] + 1e-9 * y) for x, y in unit]
-    if kind == "mixed":
+        points = [(1e4 * at[0] + 1e-9 * x, 1e4 * at[1] + 1e-9 * y) for x, y in unit]
+    elif kind == "mixed":
         across = draw(SCALE)
         up = draw(SCALE)
         away = draw(st.sampled_from([0.0, 1.0, 1e3]))
-        return [(across * (x + away), up * (y - away)) for x, y in unit]
-    if kind == "each":
-        return [(draw(SCALE) * x, draw(SCALE) * y) for x, y in unit]
-    if kind == "segment":
+        points = [(across * (x + away), up * (y - away)) for x, y in unit]
+    elif kind == "each":
+        points = [(draw(SCALE) * x, draw(SCALE) * y) for x, y in unit]
+    elif kind == "segment":
         x, y = unit[0]
         length = draw(SCALE)
         dx, dy = draw(st.sampled_from([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (c, s)]))
-        return [(x, y), (x + length * dx, y + length * dy)]
-    return unit[:1] if kind == "point" else unit
+        points = [(x, y), (x + length * dx, y + length * dy)]
+    elif kind == "point":
+        points = unit[:1]
+    return points
 
 
 CASES = points_of_polygon().map(case_of)
@@ -258,7 +262,10 @@ FAT_CASES = points_of_polygon(minimum=3).map(case_of)
 
 @st.composite
 def directions(draw: st.DrawFn, case: Case) -> tuple[float, float]:
-    """Axis-parallel of several lengths, across an edge, or any, both coordinates weighing alike."""
+    """Directions: axis-parallel of several lengths, across an edge, or any.
+
+    In some of the latter both coordinates have the same weight.
+    """
     kind = draw(st.sampled_from(["axis", "axis", "edge", "any", "weighed"]))
     if kind == "axis":
         length = draw(st.sampled_from([1.0, -1.0, 2.0, -1.0, 0.3]))
@@ -266,17 +273,19 @@ def directions(draw: st.DrawFn, case: Case) -> tuple[float, float]:
     if kind == "edge" and len(case.exact) > 1:
         x, y = draw(st.sampled_from(normals_of(case.exact)))
         return float(x), float(y)
+
     angle = draw(ANGLE)
     if kind == "weighed":
         return math.cos(angle) / float(case.extent[0] or 1), math.sin(angle) / float(
             case.extent[1] or 1
         )
+
     return math.cos(angle), math.sin(angle)
 
 
 @st.composite
 def bands(draw: st.DrawFn, case: Case) -> tuple[tuple[float, float], float, float]:
-    """Through vertices and edges, across, of no width, reversed, infinite, beside the polygon."""
+    """Bands: through vertices and edges, across, of no width, reversed, infinite, apart."""
     normal = draw(directions(case))
     heights = [normal[0] * float(x) + normal[1] * float(y) for x, y in case.exact]
     low = min(heights)
@@ -305,6 +314,7 @@ def bands(draw: st.DrawFn, case: Case) -> tuple[tuple[float, float], float, floa
         )
     elif (lower > upper) != (kind == "reversed"):
         lower, upper = upper, lower
+
     return normal, lower, upper
 
 
@@ -319,8 +329,7 @@ def bound(value: float, by: Fraction) -> Fraction | None:
 @SOME
 @given(CASES, st.data())
 def test_clip_is_the_exact_intersection_up_to_rounding(case: Case, data: st.DataObject) -> None:
-    """A crossing lies on its edge up to a few ulp, at a height that is right up to rounding of
-    normal . p.
+    """A crossing is on its edge up to a few ulp, and on its line up to rounding of normal . p.
 
     Heights of slanted bands are themselves rounded, by up to `slack`; where an edge is nearly
     parallel to the band that moves the crossing far along the edge (the condition of the problem),
@@ -344,6 +353,7 @@ def test_clip_is_the_exact_intersection_up_to_rounding(case: Case, data: st.Data
     if lower > upper:
         assert got.is_empty
         return
+
     narrow = exact_clip(case.exact, direction, bound(lower, slack), bound(upper, -slack))
     if (
         slack
@@ -351,7 +361,9 @@ def test_clip_is_the_exact_intersection_up_to_rounding(case: Case, data: st.Data
         and Fraction(lower) + slack > Fraction(upper) - slack
     ):
         narrow = []
+
     lost = outside_by(narrow, hull(result), box)
+
     assert lost is None, f"lost {[float(c) for c in lost]}"
     assert outside_by(result, case.exact, case.box()) is None
     for point in result:
@@ -369,6 +381,7 @@ def test_axis_parallel_clip_leaves_vertices_exactly_on_its_line(
     level = UNIT.map(lambda f: min(heights) + 0.5 * (f + 1.0) * (max(heights) - min(heights)))
     lower, upper = sorted((data.draw(level), data.draw(level)))
     given_vertices = {tuple(p) for p in case.polygon.polygon()}
+
     for vertex in case.polygon.cut(normal, lower, upper).polygon():
         assert tuple(vertex) in given_vertices or vertex[axis] in (lower / length, upper / length)
 
@@ -399,6 +412,7 @@ def matrices(draw: st.DrawFn) -> list[list[float]]:
         return draw(
             st.sampled_from([[[a, 0.0], [0.0, 0.0]], [[0.0, 0.0], [a, b]], [[0.0, a], [0.0, b]]])
         )
+
     return [[0.0, 0.0], [0.0, 0.0]] if kind == "zero" else [[a, b], [c, d]]
 
 
@@ -414,7 +428,7 @@ def image_box(matrix: list[list[float]], size: Exact, few: int = FEW) -> Exact:
 
 @SOME
 @given(CASES, matrices())
-def test_linear_map(case: Case, matrix: list[list[float]]) -> None:
+def test_linear_map_is_exact_up_to_rounding(case: Case, matrix: list[list[float]]) -> None:
     got = case.polygon.linear_map(matrix)
     assert_same_set(got, exact_image(matrix, case.exact), image_box(matrix, case.size))
     (a, b), (c, d) = matrix
@@ -424,7 +438,7 @@ def test_linear_map(case: Case, matrix: list[list[float]]) -> None:
 
 @FEWER
 @given(CASES, st.tuples(ENTRY, ENTRY))
-def test_translation(case: Case, offset: tuple[float, float]) -> None:
+def test_translation_is_exact_up_to_one_rounding(case: Case, offset: tuple[float, float]) -> None:
     dx = Fraction(offset[0])
     dy = Fraction(offset[1])
     moved = [(x + dx, y + dy) for x, y in case.exact]
@@ -433,7 +447,7 @@ def test_translation(case: Case, offset: tuple[float, float]) -> None:
 
 @st.composite
 def halves(draw: st.DrawFn, case: Case) -> tuple[float, float]:
-    """Of half-segments: parallel to an edge, to an axis, zero, any."""
+    """Half-segments: parallel to an edge, parallel to an axis, zero, any."""
     kind = draw(st.sampled_from(["edge", "axis", "any", "zero"]))
     if kind == "edge" and len(case.exact) > 1:
         x, y = draw(st.sampled_from(normals_of(case.exact)))
@@ -447,8 +461,9 @@ def halves(draw: st.DrawFn, case: Case) -> tuple[float, float]:
 
 @st.composite
 def uneven_polygons(draw: st.DrawFn) -> Case:
-    """As rounding leaves them: vertices repeated, or torn apart by an ulp, with tiny edges that
-    turn the wrong way.
+    """Polygons with vertices that are repeated or moved by an ulp, as rounding leaves them.
+
+    Tiny edges turn the wrong way.
     """
     even = draw(CASES)
     corners = [(float(x), float(y)) for x, y in even.exact]
@@ -460,13 +475,14 @@ def uneven_polygons(draw: st.DrawFn) -> Case:
             vertices.append(
                 tuple(v + s * ulp for v, s, ulp in zip(corner, steps, ulps, strict=True))
             )
+
     polygon = ConvexPolygons.unchecked(np.array(vertices), np.array(len(vertices)))
     return Case(polygon, hull(exact(vertices)))
 
 
 @st.composite
 def moved_polygons(draw: st.DrawFn) -> Case:
-    """Moved or mapped, so that vertices may coincide."""
+    """Polygons that are moved or mapped, so that vertices may coincide."""
     before = draw(CASES).polygon
     after = (
         before.translate(draw(st.tuples(ENTRY, ENTRY)))
@@ -481,11 +497,12 @@ UNEVEN = st.one_of(uneven_polygons(), moved_polygons())
 
 @SOME
 @given(st.one_of(CASES, UNEVEN), st.data())
-def test_sum_with_a_segment(case: Case, data: st.DataObject) -> None:
+def test_sum_with_a_segment_is_exact_up_to_rounding(case: Case, data: st.DataObject) -> None:
     half = data.draw(halves(case))
     hx = Fraction(half[0])
     hy = Fraction(half[1])
     wanted = [(x + sign * hx, y + sign * hy) for x, y in case.exact for sign in (-1, 1)]
+
     assert_same_set(case.polygon.add_segment(half), hull(wanted), case.box((abs(hx), abs(hy))))
 
 
@@ -495,13 +512,13 @@ def exact_sum(first: Sequence[Exact], second: Sequence[Exact]) -> list[Exact]:
 
 @SOME
 @given(st.one_of(CASES, UNEVEN), CASES)
-def test_sum_with_a_polygon(first: Case, second: Case) -> None:
+def test_sum_with_a_polygon_is_exact_up_to_rounding(first: Case, second: Case) -> None:
     got = first.polygon.minkowski_sum(second.polygon)
     assert_same_set(got, exact_sum(first.exact, second.exact), first.box(second.size))
     assert int(got.counts) <= int(first.polygon.counts + second.polygon.counts)
 
 
-def test_sum_of_a_needle_that_turns_the_wrong_way_with_a_segment_along_it() -> None:
+def test_sum_of_a_clockwise_needle_with_a_segment_along_it_keeps_its_ends() -> None:
     """The boundary from (0, 0) by way of (-ulp, 0) to (0, 1) is clockwise, by rounding."""
     got = ConvexPolygons([(0.0, 0.0), (-(2.0**-52), 0.0), (0.0, 1.0)], 3).add_segment((0.0, 1.0))
     assert [got.support_function((0.0, -1.0)), got.support_function((0.0, 1.0))] == [1.0, 2.0]
@@ -509,15 +526,20 @@ def test_sum_of_a_needle_that_turns_the_wrong_way_with_a_segment_along_it() -> N
 
 @SOME
 @given(UNEVEN, st.data())
-def test_clip_of_an_uneven_polygon(case: Case, data: st.DataObject) -> None:
-    """As for exactly convex ones, but that an edge of an ulp in the wrong place is also a slack of
-    the band.
+def test_clip_of_an_uneven_polygon_is_exact_up_to_its_unevenness(
+    case: Case, data: st.DataObject
+) -> None:
+    """An edge of an ulp in the wrong place is also a slack of the band.
+
+    The other tolerances are the same as for exactly convex polygons.
     """
     normal, lower, upper = data.draw(bands(case))
     direction = (Fraction(normal[0]), Fraction(normal[1]))
     slack = FEW * U * (abs(direction[0]) * case.size[0] + abs(direction[1]) * case.size[1])
     got = case.polygon.cut(normal, lower, upper)
+
     assert got.counts <= case.polygon.counts + 2
+
     result = exact(got.polygon())
     narrow = (
         []
@@ -525,25 +547,31 @@ def test_clip_of_an_uneven_polygon(case: Case, data: st.DataObject) -> None:
         else exact_clip(case.exact, direction, bound(lower, slack), bound(upper, -slack))
     )
     lost = outside_by(narrow, hull(result), case.box())
+
     assert lost is None, f"lost {[float(c) for c in lost]} from {got.polygon().tolist()}"
     assert outside_by(result, case.exact, case.box()) is None
 
 
 @SOME
 @given(UNEVEN, st.data())
-def test_measures_of_an_uneven_polygon(case: Case, data: st.DataObject) -> None:
-    """Right up to the ulp by which the polygon is not convex."""
+def test_measures_of_an_uneven_polygon_are_exact_up_to_its_unevenness(
+    case: Case, data: st.DataObject
+) -> None:
+    """Errors are at most the few ulp by which the polygon is not convex."""
     probe = data.draw(probes(case))
     point = exact([probe])[0]
     got = float(case.polygon.margin(probe))
     wanted = exact_distance(case.exact, point)
     tolerance = math.hypot(*map(float, case.box(few=2 * FEW)))
+
     assert abs(abs(got) - wanted) <= tolerance
     if wanted > tolerance:
         assert (got > 0.0) == strictly_inside(case.exact, point)
+
     n = len(case.polygon.polygon())
     ulps = 2 * n * FEW * (case.box(few=1)[0] * case.extent[1] + case.box(few=1)[1] * case.extent[0])
     ulps += 4 * n * FEW * case.box(few=1)[0] * case.box(few=1)[1]
+
     assert abs(Fraction(float(case.polygon.area())) - exact_area(case.exact)) <= ulps
     assert (
         outside_by(exact([case.polygon.centroid().tolist()]), case.exact, case.box(few=n * FEW))
@@ -557,7 +585,9 @@ def test_measures_of_an_uneven_polygon(case: Case, data: st.DataObject) -> None:
 
 @SOME
 @given(CASES, st.data())
-def test_support_function_and_vector(case: Case, data: st.DataObject) -> None:
+def test_support_function_and_vector_are_exact_up_to_rounding(
+    case: Case, data: st.DataObject
+) -> None:
     x, y = data.draw(directions(case))
     value = float(case.polygon.support_function((x, y)))
     vector = case.polygon.support_vector((x, y))
@@ -566,9 +596,11 @@ def test_support_function_and_vector(case: Case, data: st.DataObject) -> None:
     slack = FEW * (
         U * (abs(direction[0]) * case.size[0] + abs(direction[1]) * case.size[1]) + MINIMUM
     )
+
     assert abs(Fraction(value) - wanted) <= slack
     assert exact([vector.tolist()])[0] in case.exact
     assert dot(direction, exact([vector.tolist()])[0]) >= wanted - slack
+
     low, high = case.polygon.bounding_box()
     assert exact([low.tolist(), high.tolist()]) == [
         tuple(f(p[k] for p in case.exact) for k in (0, 1)) for f in (min, max)
@@ -577,7 +609,7 @@ def test_support_function_and_vector(case: Case, data: st.DataObject) -> None:
 
 @st.composite
 def probes(draw: st.DrawFn, case: Case) -> tuple[float, float]:
-    """Vertices, points of edges and next to them, the middle, anywhere near."""
+    """Points: vertices, points of edges and next to them, the middle, anywhere near."""
     corners = [(float(x), float(y)) for x, y in case.exact]
     a = draw(st.sampled_from(corners))
     b = draw(st.sampled_from(corners))
@@ -594,9 +626,10 @@ def probes(draw: st.DrawFn, case: Case) -> tuple[float, float]:
 
 @SOME
 @given(CASES, st.data())
-def test_margin(case: Case, data: st.DataObject) -> None:
-    """Only differences of coordinates are rounded: the error scales with the set and the way to it,
-    not with place.
+def test_margin_is_exact_up_to_rounding(case: Case, data: st.DataObject) -> None:
+    """The error is relative to the size of the set and to the distance of the point from it.
+
+    Only differences of coordinates are rounded.
     """
     probe = data.draw(probes(case))
     point = exact([probe])[0]
@@ -604,6 +637,7 @@ def test_margin(case: Case, data: st.DataObject) -> None:
     wanted = exact_distance(case.exact, point)
     reach = max(math.hypot(float(x - point[0]), float(y - point[1])) for x, y in case.exact)
     tolerance = FEW * float(U) * reach
+
     assert abs(abs(got) - wanted) <= tolerance
     if wanted > tolerance:
         assert (got > 0.0) == strictly_inside(case.exact, point)
@@ -616,7 +650,7 @@ def area_tolerance(case: Case) -> Fraction:
 
 @SOME
 @given(CASES)
-def test_area(case: Case) -> None:
+def test_area_is_exact_up_to_rounding(case: Case) -> None:
     assert abs(Fraction(float(case.polygon.area())) - exact_area(case.exact)) <= area_tolerance(
         case
     )
@@ -624,14 +658,16 @@ def test_area(case: Case) -> None:
 
 @SOME
 @given(CASES)
-def test_centroid(case: Case) -> None:
+def test_centroid_is_exact_up_to_rounding(case: Case) -> None:
     got = exact([case.polygon.centroid().tolist()])[0]
     n = len(case.exact)
     box = (
         FEW * U * (case.size[0] + n * case.extent[0]),
         FEW * U * (case.size[1] + n * case.extent[1]),
     )
+
     assert outside_by([got], case.exact, box) is None
+
     area = exact_area(case.exact)
     if area == 0 or area > 64 * area_tolerance(case):
         # The weights are wrong by area_tolerance / area, relatively, and move the centroid by that
@@ -652,15 +688,18 @@ def test_centroid(case: Case) -> None:
     ),
     st.integers(4, 8),
 )
-def test_outward_reduction(case: Case, cap: int) -> None:
+def test_reduced_polygon_contains_the_polygon(case: Case, cap: int) -> None:
     """A new vertex is rounded at its own, larger, coordinates, once for every edge dropped."""
     got = case.polygon.reduce_outward(cap)
     if case.polygon.counts <= cap:
         assert got.polygon().tolist() == case.polygon.polygon().tolist()
         return
+
     assert got.counts <= cap
+
     result = exact(got.polygon())
     after = Case(got, result)
+
     assert (
         outside_by(case.exact, hull(result), after.box(case.size, few=FEW * len(case.exact)))
         is None

@@ -1,5 +1,4 @@
-"""Kernels on polygons as thin as rounding, which a thousand operations leave: ends of needles, and
-edges to remove.
+"""Kernels on polygons as thin as rounding, which a thousand operations leave.
 
 `test_polygon_oracle.py` has the operations on exactly convex polygons and on those with vertices
 moved by an ulp.
@@ -29,9 +28,12 @@ def reach(*arrays: Floats) -> Fraction:
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(("distance", "thickness"), [(0.0, 1e-16), (1.0, 1e-15), (1e4, 1e-12)])
-def test_a_sliver_along_the_segment_keeps_its_ends(distance: float, thickness: float) -> None:
-    """Where heights agree within rounding, the lowest vertex may be found on the upper side: an end
-    would be lost.
+def test_sum_of_a_sliver_with_a_segment_along_it_keeps_its_ends(
+    distance: float, thickness: float
+) -> None:
+    """An end must not be lost where the lowest vertex is found on the upper side.
+
+    Its height and the heights there agree within rounding.
     """
     rng = np.random.default_rng(1)
     for trial in range(8000):
@@ -57,7 +59,7 @@ def test_a_sliver_along_the_segment_keeps_its_ends(distance: float, thickness: f
 
 
 def test_reduction_of_a_set_as_thin_as_rounding_contains_it() -> None:
-    """Where no edge can go, for rounding has left none a direction, a rectangle is taken."""
+    """A rectangle replaces the set if rounding has left no edge a direction."""
     rng = np.random.default_rng(5)
     for _ in range(300):
         along = rng.uniform(-1.0, 1.0, 12)
@@ -71,9 +73,10 @@ def test_reduction_of_a_set_as_thin_as_rounding_contains_it() -> None:
         assert polygon.moments(reduced, len(reduced))[0] < 1e-14
 
 
-def test_the_edge_that_adds_the_min_area_is_removed_first() -> None:
-    """The reference computes all areas again after each removal; the lengths are equal in pairs, so
-    that areas tie.
+def test_edge_that_adds_the_minimum_area_is_removed_first() -> None:
+    """The reference computes all areas again after each removal.
+
+    The lengths are equal in pairs, so that areas are equal too.
     """
     rng = np.random.default_rng(2)
     work = np.empty((128, 2))

@@ -1,7 +1,6 @@
-"""Operations that two polygons, or their constraints, take part in: against exact rationals, and in
-batches.
+"""Operations on two polygons, or on constraints, against exact rationals, and in batches.
 
-The oracle, the cases and the meaning of tolerances are those of `test_polygon_oracle`.
+The oracle, the cases and the tolerances are described in `test_polygon_oracle`.
 """
 
 from __future__ import annotations
@@ -58,8 +57,9 @@ def exact_intersection(one: Sequence[Exact], other: Sequence[Exact]) -> list[Exa
 
 
 def exact_difference(one: Sequence[Exact], other: Sequence[Exact]) -> list[Exact]:
-    """Return the Pontryagin difference: the intersection of the translates by the vertices of the
-    other polygon.
+    """Return the Pontryagin difference of two polygons.
+
+    It is the intersection of the translates of one by the vertices of the other.
     """
     kept: list[Exact] | None = None
     for x, y in other:
@@ -75,9 +75,7 @@ def holds(polygon: Sequence[Exact], point: Exact) -> bool:
 
 @st.composite
 def partners(draw: st.DrawFn, case: Case) -> Case:
-    """A polygon that meets another one: it shares vertices and parts of sides, touches it, lies in
-    it, crosses it.
-    """
+    """A polygon that shares vertices or sides with another one, or is in it, or crosses it."""
     corners = [(float(x), float(y)) for x, y in case.exact]
     low = np.min(corners, axis=0)
     high = np.max(corners, axis=0)
@@ -88,6 +86,7 @@ def partners(draw: st.DrawFn, case: Case) -> Case:
         dx = draw(UNIT) * (high[0] - low[0])
         dy = draw(UNIT) * (high[1] - low[1])
         return case_of([(x + dx, y + dy) for x, y in corners])
+
     unit = draw(st.lists(st.tuples(UNIT, UNIT), min_size=1, max_size=7))
     within = [
         (low[0] + abs(x) * (high[0] - low[0]), low[1] + abs(y) * (high[1] - low[1]))
@@ -100,6 +99,7 @@ def partners(draw: st.DrawFn, case: Case) -> Case:
         a = corners[i - 1]
         b = corners[i]
         return case_of([a, (0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])), *within[:3]])
+
     wide = [
         (x + 3.0 * draw(UNIT) * (high[0] - low[0]), y + 3.0 * draw(UNIT) * (high[1] - low[1]))
         for x, y in within
@@ -126,7 +126,7 @@ PAIRS = CASES.flatmap(lambda case: st.tuples(st.just(case), partners(case)))
 
 @SOME
 @given(PAIRS)
-def test_intersection(pair: tuple[Case, Case]) -> None:
+def test_intersection_is_empty_only_if_the_exact_one_is(pair: tuple[Case, Case]) -> None:
     """Nonempty exactly where the exact one is, and each vertex within 8 ulp of the coordinates."""
     one, other = pair
     wanted = exact_intersection(one.exact, other.exact)
@@ -139,7 +139,7 @@ def test_intersection(pair: tuple[Case, Case]) -> None:
 
 @st.composite
 def slivers(draw: st.DrawFn) -> Case:
-    """A triangle or a quadrangle a few units of rounding to 1e-6 of its length thick."""
+    """A triangle or a quadrangle as thin as a few units of rounding, up to 1e-6 of its length."""
     angle = draw(ANGLE)
     thickness = draw(st.sampled_from([1e-16, 1e-15, 1e-14, 1e-12, 1e-9, 1e-6]))
     x = draw(UNIT)
@@ -157,13 +157,16 @@ def slivers(draw: st.DrawFn) -> Case:
 
 @SOME
 @given(slivers(), slivers())
-def test_intersection_of_slivers(one: Case, other: Case) -> None:
-    """Within 16 units of rounding of the coordinates of both: where one is on an axis, the other
-    gives the scale.
+def test_intersection_of_slivers_is_exact_up_to_rounding(one: Case, other: Case) -> None:
+    """Within 16 units of rounding of the coordinates of both.
+
+    If one is on an axis, the other gives the scale.
     """
     wanted = exact_intersection(one.exact, other.exact)
     got = one.polygon & other.polygon
+
     assert got.is_empty == (not wanted)
+
     size = (max(one.size[0], other.size[0]), max(one.size[1], other.size[1]))
     assert_same_set(got, wanted, (16 * U * size[0], 16 * U * size[1]))
 
@@ -172,6 +175,7 @@ def test_intersection_of_slivers(one: Case, other: Case) -> None:
 @given(PAIRS)
 def test_subsets_and_equality_are_decided_exactly(pair: tuple[Case, Case]) -> None:
     one, other = pair
+
     for inner, outer in ((one, other), (other, one)):
         assert (inner.polygon <= outer.polygon) == all(holds(outer.exact, p) for p in inner.exact)
     assert one.polygon.equals(other.polygon) == (set(one.exact) == set(other.exact))
@@ -181,21 +185,24 @@ def test_subsets_and_equality_are_decided_exactly(pair: tuple[Case, Case]) -> No
 
 @SOME
 @given(CASES, st.data())
-def test_contains_is_decided_exactly(case: Case, data: st.DataObject) -> None:
+def test_membership_is_decided_exactly(case: Case, data: st.DataObject) -> None:
     probe = data.draw(probes(case))
+
     assert (
         case.polygon.contains(probe)
         == (probe in case.polygon)
         == holds(case.exact, exact([probe])[0])
     )
+
     reach = float(max(*case.size, abs(Fraction(probe[0])), abs(Fraction(probe[1]))))
     away = float(case.polygon.distance(probe))
+
     assert case.polygon.contains(probe, tolerance=away + 1e-15 * reach)
 
 
 @SOME
 @given(PAIRS)
-def test_convex_hull_of_a_union(pair: tuple[Case, Case]) -> None:
+def test_hull_of_a_union_has_exactly_its_vertices(pair: tuple[Case, Case]) -> None:
     one, other = pair
     got = one.polygon.convex_hull(other.polygon)
     assert set(exact(got.polygon())) == set(hull(one.exact + other.exact))
@@ -203,12 +210,14 @@ def test_convex_hull_of_a_union(pair: tuple[Case, Case]) -> None:
 
 @SOME
 @given(PAIRS)
-def test_minkowski_difference(pair: tuple[Case, Case]) -> None:
+def test_difference_is_empty_only_if_the_exact_one_is(pair: tuple[Case, Case]) -> None:
     """Nonempty exactly where the exact one is, and each vertex within 4 ulp of the coordinates."""
     one, other = pair
     wanted = exact_difference(one.exact, other.exact)
     got = one.polygon.minkowski_difference(other.polygon)
+
     assert got.is_empty == (not wanted)
+
     size = (one.size[0] + other.size[0], one.size[1] + other.size[1])
     assert_same_set(got, wanted, (4 * U * size[0], 4 * U * size[1]))
 
@@ -217,16 +226,18 @@ def two_digits(values: ArrayLike) -> Floats:
     return np.round(np.asarray(values), 2) + 0.0
 
 
-def test_a_difference_of_sets_that_touch_is_decided_exactly() -> None:
-    """Parallelograms with coordinates of two digits, and three of their vertices or a side, moved
-    or not.
+def test_difference_of_sets_that_fit_in_one_place_is_decided_exactly() -> None:
+    """Parallelograms with coordinates of two digits, less three of their vertices or a side.
 
-    Formerly rounding made a third of such differences empty that are a point, or nearly so.
+    These are moved in some cases. Without exact decisions a third of the differences that are a
+    point, or nearly a point, would be empty.
     """
     one = ConvexPolygons.from_vertices([(0, 0), (-0.4, 0), (-0.5, -0.3), (-0.1, -0.3)])
     part = ConvexPolygons.from_vertices([(0, 0), (-0.4, 0), (-0.1, -0.3)])
+
     assert part <= one
     assert one.minkowski_difference(part).polygon().tolist() == [[0.0, 0.0]]
+
     random = np.random.default_rng(3)
     kinds = {0: 0, 1: 0, 2: 0}
     for number in range(500):
@@ -242,10 +253,11 @@ def test_a_difference_of_sets_that_touch_is_decided_exactly() -> None:
         assert got.is_empty == (not wanted)
         assert_same_set(got, wanted, (4 * U, 4 * U))
         kinds[min(len(hull(wanted)), 2)] += 1
+
     assert min(kinds.values()) > 50
 
 
-def test_a_box_less_a_box_is_exact() -> None:
+def test_difference_of_boxes_is_exact() -> None:
     small = ConvexPolygons.from_box((0, 0), (0.5, 0.25))
     box = ConvexPolygons.from_box((0.1, 0.2), (3.7, 9.1)).minkowski_difference(small)
     assert [end.tolist() for end in box.bounding_box()] == [[0.1, 0.2], [3.7 - 0.5, 9.1 - 0.25]]
@@ -269,23 +281,28 @@ def exact_distance_between(one: Sequence[Exact], other: Sequence[Exact]) -> floa
 
 @SOME
 @given(PAIRS)
-def test_distances(pair: tuple[Case, Case]) -> None:
+def test_distances_are_zero_only_if_the_sets_meet(pair: tuple[Case, Case]) -> None:
     """Zero exactly where the sets meet; otherwise the error scales with the coordinates."""
     one, other = pair
     tolerance = 32 * float(U) * float(max(*one.size, *other.size))
     wanted = exact_distance_between(one.exact, other.exact)
     got = float(one.polygon.distance(other.polygon))
+
     assert (got == 0.0) == (wanted == 0.0)
     assert abs(got - wanted) <= tolerance
+
     spread = max(exact_distance_between([p], other.exact) for p in one.exact)
     spread = max([spread, *(exact_distance_between([p], one.exact) for p in other.exact)])
+
     assert abs(float(one.polygon.hausdorff_distance(other.polygon)) - spread) <= tolerance
+
     far = max(
         dot((a[0] - b[0], a[1] - b[1]), (a[0] - b[0], a[1] - b[1]))
         for a in one.exact
         for b in one.exact
     )
     assert float(one.polygon.diameter()) == pytest.approx(math.sqrt(far), rel=1e-14)
+
     for point in other.polygon.polygon():
         near = one.polygon.closest_point(point)
         assert outside_by(exact([near]), one.exact, one.box()) is None
@@ -318,12 +335,15 @@ def half_planes(draw: st.DrawFn) -> list[tuple[float, float, float]]:
     if draw(st.booleans()):
         size = draw(SCALE)
         rows += [(1.0, 0.0, size), (-1.0, 0.0, size), (0.0, 1.0, size), (0.0, -1.0, size)]
+
     return draw(st.permutations(rows))
 
 
 @SOME
 @given(half_planes())
-def test_from_constraints(rows: list[tuple[float, float, float]]) -> None:
+def test_set_of_constraints_is_empty_or_unbounded_only_if_the_exact_one_is(
+    rows: list[tuple[float, float, float]],
+) -> None:
     """Empty and unbounded sets are found exactly; each vertex is within 4 ulp of itself."""
     far = Fraction(10) ** 40
     wanted: list[Exact] = [(-far, -far), (far, -far), (far, far), (-far, far)]
@@ -334,12 +354,15 @@ def test_from_constraints(rows: list[tuple[float, float, float]]) -> None:
             else wanted
         )
         wanted = wanted if wanted and ((a, b) != (0.0, 0.0) or c >= 0.0) else []
+
     array = np.array(rows)
     if any(max(abs(x), abs(y)) == far for x, y in wanted):
         with pytest.raises(ValueError, match="the set is unbounded"):
             ConvexPolygons.from_constraints(array[:, :2], array[:, 2])
         return
+
     got = ConvexPolygons.from_constraints(array[:, :2], array[:, 2])
+
     assert got.is_empty == (not wanted)
     for point in exact(got.polygon()):
         assert (
@@ -349,6 +372,7 @@ def test_from_constraints(rows: list[tuple[float, float, float]]) -> None:
             )
             <= 0
         )
+
     if wanted:
         size = max(abs(x) for x, _ in wanted), max(abs(y) for _, y in wanted)
         assert_same_set(got, wanted, (4 * U * size[0], 4 * U * size[1]))
@@ -356,12 +380,14 @@ def test_from_constraints(rows: list[tuple[float, float, float]]) -> None:
 
 @SOME
 @given(CASES)
-def test_constraints_describe_the_set(case: Case) -> None:
+def test_set_of_its_constraints_is_the_polygon(case: Case) -> None:
     normals, offsets = case.polygon.constraints()
+
     assert np.hypot(*normals.T) == pytest.approx(1.0)
     assert float((case.polygon.polygon() @ normals.T - offsets).max()) <= 1e-15 * float(
         max(case.size)
     )
+
     length = math.hypot(*case.extent)
     if len(case.exact) > 2 and float(abs(turn(*case.exact[:3]))) > 1e-3 * length**2:
         again = ConvexPolygons.from_constraints(normals, offsets)
@@ -370,10 +396,10 @@ def test_constraints_describe_the_set(case: Case) -> None:
 
 @SOME
 @given(FAT_CASES, st.tuples(UNIT, UNIT, UNIT, UNIT), st.tuples(UNIT, UNIT))
-def test_preimage(case: Case, entries: tuple[float, ...], offset: tuple[float, float]) -> None:
-    """The image of the preimage is the set, to rounding; the preimage under a singular matrix is
-    unbounded.
-    """
+def test_image_of_the_preimage_is_the_polygon(
+    case: Case, entries: tuple[float, ...], offset: tuple[float, float]
+) -> None:
+    """They are equal to rounding; the preimage under a singular matrix is unbounded."""
     matrix = np.array([[2.0 + entries[0], entries[1]], [entries[2], 2.0 + entries[3]]])
     assume(abs(float(np.linalg.det(matrix))) > 0.5)
     size = float(max(*case.size, *(abs(Fraction(x)) for x in offset)))
@@ -389,6 +415,7 @@ def test_preimage(case: Case, entries: tuple[float, ...], offset: tuple[float, f
         assert outside_by(exact(image.polygon()), wide, box) is None
         if float(case.polygon.area()) > 1e-3 * size**2:
             assert float(image.hausdorff_distance(case.polygon)) <= 1e-6 * size
+
     with pytest.raises(ValueError, match="unbounded"):
         case.polygon.translate(-case.polygon.centroid()).preimage([[1.0, 0.0], [0.0, 0.0]])
 
@@ -408,14 +435,14 @@ def test_preimage(case: Case, entries: tuple[float, ...], offset: tuple[float, f
         ]
     )
 )
-def test_max_disc(case: Case) -> None:
-    """The disc lies in the set, and no larger one does: linear programs about a corner, in units of
-    the extent.
-    """
+def test_largest_disc_is_in_the_polygon_and_as_large_as_a_linear_program_finds(case: Case) -> None:
+    """The programs are about a corner, in units of the extent."""
     centre, radius = case.polygon.chebyshev_centre()
     size = float(max(case.size))
+
     assert outside_by(exact([centre]), case.exact, case.box(few=64)) is None
     assert float(case.polygon.margin(centre)) >= float(radius) - 64 * float(U) * size
+
     corners = np.array(
         [[float(x - case.exact[0][0]), float(y - case.exact[0][1])] for x, y in case.exact]
     )
@@ -423,24 +450,30 @@ def test_max_disc(case: Case) -> None:
     if len(case.exact) < 3:
         assert radius == 0.0
         return
+
     sides = zip(case.exact, [*case.exact[1:], case.exact[0]], strict=True)
     along = np.array([[float(q[0] - p[0]), float(q[1] - p[1])] for p, q in sides])
     normals = np.column_stack([along[:, 1], -along[:, 0]]) / np.hypot(*along.T)[:, None]
     limits = (normals * corners).sum(axis=1) / width
     rows = np.column_stack([normals, np.ones(len(normals))])
     best = linprog([0.0, 0.0, -1.0], A_ub=rows, b_ub=limits, bounds=(None, None), method="highs")
+
     assert best.status == 0
     assert float(radius) >= -best.fun * width - 1e-6 * width
 
 
 @SOME
 @given(CASES, st.integers(0, 1), UNIT)
-def test_projection_slice_and_samples(case: Case, axis: int, part: float) -> None:
+def test_projection_slice_and_samples_are_exact_up_to_rounding(
+    case: Case, axis: int, part: float
+) -> None:
     lower, upper = (float(end) for end in case.polygon.project(axis))
+
     assert (lower, upper) == (
         float(min(p[axis] for p in case.exact)),
         float(max(p[axis] for p in case.exact)),
     )
+
     value = lower + abs(part) * (upper - lower)
     normal = AXES[axis]
     line = exact_clip(case.exact, normal, Fraction(value), Fraction(value))
@@ -449,24 +482,31 @@ def test_projection_slice_and_samples(case: Case, axis: int, part: float) -> Non
         wanted = min(p[1 - axis] for p in line), max(p[1 - axis] for p in line)
         for end, exact_end in zip(ends, wanted, strict=True):
             assert abs(Fraction(float(end)) - exact_end) <= case.box()[1 - axis]
+
     points = case.polygon.sample(50, seed=1)
+
     assert outside_by(exact(points), case.exact, case.box()) is None
 
 
 @pytest.mark.parametrize("sides", [3, 4, 7, 64])
-def test_balls_and_zonotopes(sides: int) -> None:
+def test_polygons_of_balls_and_zonotopes_have_their_supports(sides: int) -> None:
     centre = (1.0, -2.0)
     outer, inner = (
         ConvexPolygons.from_ball(centre, 3.0, sides, outer=outer) for outer in (True, False)
     )
+
     assert float(outer.margin(centre)) == pytest.approx(3.0, rel=1e-14)
     assert np.hypot(*(inner.polygon() - centre).T) == pytest.approx(3.0, rel=1e-14)
     assert (int(outer.counts), int(inner.counts)) == (sides, sides)
+
     generators = np.random.default_rng(sides).normal(size=(sides, 2))
     zonotope = ConvexPolygons.from_zonotope(Zonotope(centre, generators))
+
     assert int(zonotope.counts) == 2 * sides
+
     directions = np.random.default_rng(1).normal(size=(20, 2))
     wanted = directions @ centre + np.abs(directions @ generators.T).sum(axis=1)
+
     np.testing.assert_allclose(
         zonotope.broadcast_to((20,)).support_function(directions), wanted, rtol=1e-14
     )
@@ -480,10 +520,8 @@ def test_balls_and_zonotopes(sides: int) -> None:
 
 @SOME
 @given(FAT_CASES, st.data())
-def test_rings_of_both_orders_are_taken(case: Case, data: st.DataObject) -> None:
-    """Clockwise rings, closed rings, repeated vertices, and vertices along a side are no
-    obstacle.
-    """
+def test_rings_of_both_orders_give_the_polygon(case: Case, data: st.DataObject) -> None:
+    """Rings may be clockwise or closed, repeat vertices, and have vertices along a side."""
     assume(len(case.exact) > 2)
     ring = [tuple(map(float, p)) for p in case.exact]
     start = data.draw(st.integers(0, len(ring) - 1))
@@ -543,7 +581,7 @@ def mixed_batch(seed: int) -> ConvexPolygons:
 
 
 @pytest.mark.parametrize("number", range(len(UNARY) + len(BINARY)))
-def test_empty_members_do_not_affect_the_others(number: int) -> None:
+def test_empty_members_do_not_affect_other_members(number: int) -> None:
     batch = mixed_batch(1)
     partner = mixed_batch(2)
     if number >= len(UNARY):

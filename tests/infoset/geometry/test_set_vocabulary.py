@@ -1,6 +1,4 @@
-"""`ConvexPolygons`, `Polytope` and `Zonotope` share names, and each operation refuses mistaken
-arguments clearly.
-"""
+"""`ConvexPolygons`, `Polytope` and `Zonotope` share names and refuse mistaken arguments."""
 
 from __future__ import annotations
 
@@ -13,21 +11,59 @@ import shapely
 from infoset import ConvexPolygons, Polytope, Zonotope
 
 VOCABULARY = {
-    "linear_map", "affine_map", "translate", "minkowski_sum", "minkowski_difference", "intersection", "convex_hull",
-    "cut", "preimage", "support_function", "support_vector", "contains", "is_subset", "equals", "is_empty",
-    "vertices", "constraints", "area", "volume", "centroid", "chebyshev_centre", "bounding_box", "diameter",
-    "hausdorff_distance", "distance", "closest_point", "project", "slice", "sample", "reduce_outward", "plot",
-    "add_segment", "from_vertices", "from_constraints", "from_box", "from_ball", "from_zonotope", "from_shapely",
-    "to_shapely", "margin", "empty", "isdisjoint", "polytope", "space",
-}  # fmt: skip
+    "linear_map",
+    "affine_map",
+    "translate",
+    "minkowski_sum",
+    "minkowski_difference",
+    "intersection",
+    "convex_hull",
+    "cut",
+    "preimage",
+    "support_function",
+    "support_vector",
+    "contains",
+    "is_subset",
+    "equals",
+    "is_empty",
+    "vertices",
+    "constraints",
+    "area",
+    "volume",
+    "centroid",
+    "chebyshev_centre",
+    "bounding_box",
+    "diameter",
+    "hausdorff_distance",
+    "distance",
+    "closest_point",
+    "project",
+    "slice",
+    "sample",
+    "reduce_outward",
+    "plot",
+    "add_segment",
+    "from_vertices",
+    "from_constraints",
+    "from_box",
+    "from_ball",
+    "from_zonotope",
+    "from_shapely",
+    "to_shapely",
+    "margin",
+    "empty",
+    "isdisjoint",
+    "polytope",
+    "space",
+}
 """The names of both classes."""
 
 ONLY_POLYGONS = {
     **dict.fromkeys(
         ["counts", "shape", "stack", "broadcast_to"], "a Polytope is a single set, not a batch"
     ),
-    "polygon": "the vertices of a member of a batch; those of a Polytope are .vertices",
-    "from_points": "from_vertices of a Polytope is a hull of points in any order; a ring has an order",
+    "polygon": "the vertices of a member of a batch; a Polytope has .vertices",
+    "from_points": "a Polytope from_vertices is a hull of points in any order; a ring has an order",
     "unchecked": "for arrays of kernels, which only polygons have",
 }
 ONLY_POLYTOPES = {
@@ -71,7 +107,7 @@ def names(kind: type) -> set[str]:
     return {name for name in {*dir(kind), *fields} if not name.startswith("_")}
 
 
-def test_both_classes_have_the_same_names() -> None:
+def test_polygons_and_polytopes_have_the_same_names() -> None:
     assert names(ConvexPolygons) & names(Polytope) >= VOCABULARY
     assert names(ConvexPolygons) - names(Polytope) == set(ONLY_POLYGONS)
     assert names(Polytope) - names(ConvexPolygons) == set(ONLY_POLYTOPES)
@@ -88,10 +124,11 @@ def test_zonotopes_have_names_of_polytopes() -> None:
     }
 
 
-def test_projections_and_slices_take_a_number_or_several() -> None:
+def test_projections_and_slices_take_one_axis_or_several() -> None:
     square = ConvexPolygons.from_box([0, 1], [2, 5])
     cube = Polytope.from_box([0, 1, 2], [3, 5, 7])
     number: Any
+
     for number in (1, [1], (1,), np.array([1]), np.int64(1)):
         assert [float(end) for end in square.project(number)] == [1.0, 5.0]
         assert [end.tolist() for end in cube.project(number).bounding_box()] == [[1.0], [5.0]]
@@ -100,6 +137,7 @@ def test_projections_and_slices_take_a_number_or_several() -> None:
             assert np.ravel(cube.slice(number, values).bounding_box()) == pytest.approx(
                 [0.0, 2.0, 3.0, 7.0], abs=1e-15
             )
+
     assert [end.tolist() for end in square.project([1, 0]).bounding_box()] == [
         [1.0, 0.0],
         [5.0, 2.0],
@@ -107,7 +145,7 @@ def test_projections_and_slices_take_a_number_or_several() -> None:
     assert [end.tolist() for end in cube.project([2, 0]).bounding_box()] == [[2.0, 0.0], [7.0, 3.0]]
 
 
-def test_polytopes_from_and_to_shapely() -> None:
+def test_polytope_is_converted_from_and_to_shapely() -> None:
     triangle = shapely.Polygon([(0, 0), (0, 2), (1, 0)])
     for geometry, dimension in (
         (triangle, 2),
@@ -118,6 +156,7 @@ def test_polytopes_from_and_to_shapely() -> None:
         assert (one.space, one.dimension) == (2, dimension)
         assert one.area() == pytest.approx(geometry.area)
         assert one.to_shapely().normalize().equals_exact(geometry.normalize(), 1e-15)
+
     assert Polytope.from_shapely(shapely.Polygon()).is_empty
     assert Polytope.empty(2).to_shapely().is_empty
     with pytest.raises(
@@ -129,9 +168,10 @@ def test_polytopes_from_and_to_shapely() -> None:
             operation(Polytope.empty(3))
 
 
-def test_a_single_polygon_takes_many_points_and_directions() -> None:
+def test_single_polygon_takes_many_points_and_directions() -> None:
     square = ConvexPolygons.from_box([0, 0], [2, 2])
     points = np.array([[[1.0, 1.0], [3.0, 1.0], [5.0, 6.0]]])
+
     assert square.contains(points).tolist() == [[True, False, False]]
     assert square.margin(points).tolist() == [[1.0, -1.0, -5.0]]
     assert square.closest_point(points).tolist() == [[[1.0, 1.0], [2.0, 1.0], [2.0, 2.0]]]
@@ -145,10 +185,11 @@ def test_a_single_polygon_takes_many_points_and_directions() -> None:
 
 
 @pytest.mark.parametrize("kind", [ConvexPolygons, Polytope])
-def test_multiples_of_sets_and_disjoint_sets(kind: Any) -> None:
+def test_sets_have_multiples_and_are_disjoint_from_sets_apart(kind: Any) -> None:
     square = kind.from_box([0, 1], [2, 5])
     far = kind.from_box([2, 7], [3, 8])
     wanted = kind.from_box([0, 2], [4, 10])
+
     for doubled in (2 * square, square * 2.0, np.float64(2.0) * square):
         assert bool(np.all(doubled.equals(wanted, 1e-12)))
     assert bool(np.all((-square).equals(kind.from_box([-2, -5], [0, -1]), 1e-12)))
@@ -161,15 +202,16 @@ def test_multiples_of_sets_and_disjoint_sets(kind: Any) -> None:
     )
 
 
-def test_a_witness_of_disjoint_sets() -> None:
+def test_witness_separates_disjoint_sets() -> None:
     one = Polytope.from_box([0, 0, 0], [1, 1, 1])
     two = Polytope.from_vertices([[2, 2, 2], [3, 2, 2], [2, 3, 2], [2, 2, 3]])
     direction = one.separating_direction(two)
+
     assert direction == pytest.approx(np.ones(3) / np.sqrt(3.0), abs=1e-12)
     assert one.separating_direction(one) is None
 
 
-def test_maps_of_zonotopes() -> None:
+def test_zonotope_is_mapped_by_operators_and_methods() -> None:
     turned = np.array([[0.0, -1.0], [1.0, 0.0]]) @ Zonotope([1, 2], [[1, 0], [0, 3]])
     assert turned.centre.tolist() == [-2.0, 1.0]
     assert turned.generators.tolist() == [[0.0, 1.0], [-3.0, 0.0]]

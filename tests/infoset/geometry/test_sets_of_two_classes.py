@@ -23,8 +23,9 @@ ANSWERS: list[str] = ["is_subset", "equals", "isdisjoint"]
 
 
 def some_polygon(random: np.random.Generator) -> ConvexPolygons:
-    """A polygon, a segment or a point with small integer coordinates: different sets are far
-    apart.
+    """A polygon, a segment or a point with small integer coordinates.
+
+    Different sets are far apart.
     """
     size = random.choice([1, 2, 3, 4, 6])
     return ConvexPolygons.from_points(random.integers(-4, 5, (size, 2)))
@@ -48,6 +49,7 @@ def test_set_made_from_polygon_and_polytope_is_the_exact_one_to_rounding(
         # polytopes.
         box = ConvexPolygons.from_box([-1, -1], [1, 1])
         one, other = (one + other + box, other) if seed % 2 else (one, other + 9 * box)
+
     exact = getattr(one, name)(other)
 
     for left, right in in_both_orders(one, other):
@@ -125,7 +127,7 @@ def test_witness_separates_a_polytope_from_a_polygon() -> None:
 
 
 @pytest.mark.parametrize("name", [*SETS, *NUMBERS, *ANSWERS])
-def test_empty_set_of_the_other_class_is_as_one_of_the_same_class(name: str) -> None:
+def test_empty_set_of_the_other_class_gives_the_results_of_the_same_class(name: str) -> None:
     square = ConvexPolygons.from_box([0, 0], [2, 2])
     empty = ConvexPolygons.empty()
 
@@ -164,6 +166,6 @@ def test_batch_and_polytope_of_another_space_are_refused(name: str) -> None:
 
 @pytest.mark.parametrize("name", [*SETS, *ANSWERS, "hausdorff_distance"])
 @pytest.mark.parametrize("kind", [ConvexPolygons, Polytope])
-def test_other_argument_that_is_no_set_is_refused(kind: Any, name: str) -> None:
+def test_argument_other_than_a_set_is_refused(kind: Any, name: str) -> None:
     with pytest.raises(TypeError, match="other must be"):
         getattr(kind.from_box([0, 0], [1, 1]), name)("a set")

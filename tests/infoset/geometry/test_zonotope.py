@@ -1,6 +1,4 @@
-"""Zonotopes against exact rational numbers, determinants, linear programs and the operations of
-polytopes.
-"""
+"""Zonotopes against exact rational numbers, determinants, linear programs and polytopes."""
 
 from __future__ import annotations
 
@@ -74,8 +72,9 @@ def directions_of(zonotope: Zonotope, count: int = 30) -> Floats:
 
 
 def assert_contains_and_fits(outer: Polytope, zonotope: Zonotope, excess: float = 1e-11) -> None:
-    """Check the supports: not below the exact ones by more than they round, nor above by more than
-    `excess`.
+    """Check that the supports are not below the exact ones, nor above them by more than `excess`.
+
+    Both up to rounding.
     """
     rows = directions_of(zonotope)
     wanted = np.array([float(exact_support(zonotope, exact(row))) for row in rows])
@@ -90,8 +89,9 @@ def assert_contains_and_fits(outer: Polytope, zonotope: Zonotope, excess: float 
 
 @st.composite
 def whole(draw: st.DrawFn) -> Zonotope:
-    """Return a zonotope of small integers in different units; flat ones and parallel generators are
-    frequent.
+    """Return a zonotope of small integers in different units.
+
+    Flat sets and parallel generators are frequent.
     """
     space = draw(st.integers(1, 4))
     entries = st.integers(-2, 2)
@@ -117,14 +117,16 @@ def rotated_boxes(count: int) -> Zonotope:
 
 @SOME
 @given(whole(), st.integers(1, 4), st.integers(0, 1000))
-def test_maps_have_the_supports_of_the_set_along_mapped_directions(
+def test_map_has_the_supports_of_the_set_along_mapped_directions(
     zonotope: Zonotope, rows: int, seed: int
 ) -> None:
     random = np.random.default_rng(seed)
     matrix = random.normal(size=(rows, zonotope.space))
     offset = random.normal(size=rows)
     image = zonotope.affine_map(matrix, offset)
+
     assert (image.space, len(image.generators)) == (rows, len(zonotope.generators))
+
     for direction in random.normal(size=(5, rows)):
         back = [exact_product(exact(direction), exact(column)) for column in matrix.T]
         wanted = exact_support(zonotope, back) + exact_product(exact(direction), exact(offset))
@@ -142,6 +144,7 @@ def test_operators_have_exact_supports(zonotope: Zonotope) -> None:
     support = exact_support(zonotope, direction)
     length = sum((abs(a * b) for a, b in zip(direction, exact(half), strict=True)), Fraction(0))
     along = abs(exact_product(direction, exact(half)))
+
     assert exact_support(-zonotope, opposite) == support
     assert exact_support(2 * zonotope, direction) == 2 * support
     assert (
@@ -164,6 +167,7 @@ def test_translation_moves_the_centre(zonotope: Zonotope) -> None:
 def test_projection_takes_axes_in_their_order() -> None:
     zonotope = Zonotope([1, 2, 3], [[1, 0, 0], [0, 2, 0], [1, 1, 1]])
     shadow = zonotope.project([2, 0])
+
     assert shadow.centre.tolist() == [3.0, 1.0]
     assert shadow.generators.tolist() == [[0.0, 1.0], [1.0, 1.0]]
     assert zonotope.project(1).generators.tolist() == [[2.0], [1.0]]
@@ -208,6 +212,7 @@ def test_box_has_its_ends_exactly() -> None:
     lower = [-1.0, 0.0, 2.0]
     upper = [3.0, 0.5, 2.0]
     box = Zonotope.box(lower, upper)
+
     assert [end.tolist() for end in box.bounding_box()] == [lower, upper]
     assert box.dimension == 2
     assert sorted(box.polytope().vertices.tolist()) == sorted(
@@ -228,6 +233,7 @@ def test_polytope_contains_the_zonotope_and_fits_it(zonotope: Zonotope) -> None:
     rank = (
         int(np.linalg.matrix_rank(zonotope.generators / units)) if len(zonotope.generators) else 0
     )
+
     assert outer.dimension == zonotope.dimension == rank
     assert_contains_and_fits(outer, zonotope)
     assert zonotope.volume() == pytest.approx(outer.volume(), rel=1e-11)
@@ -245,18 +251,22 @@ def test_polytope_has_the_vertices_of_the_hull_of_all_sums(zonotope: Zonotope) -
     count = len(zonotope.generators)
     signs = np.array(list(product([-1.0, 1.0], repeat=count))).reshape(2**count, count)
     hull = Polytope.from_vertices(zonotope.centre + signs @ zonotope.generators)
+
     assert (len(outer.vertices), len(outer.normals)) == (len(hull.vertices), len(hull.normals))
+
     # Each vertex is one of the hull, within the movement of vertices and their rounding.
     widths = np.abs(zonotope.generators).sum(axis=0)
     near = 1e-11 * widths + 4.0 * EPS * sizes_of(zonotope)
+
     for vertex in outer.vertices:
         assert (np.abs(hull.vertices - vertex) <= near).all(axis=1).any()
 
 
 @pytest.mark.parametrize("count", range(3, 12))
-def test_facets_in_general_position_are_those_of_all_pairs(count: int) -> None:
+def test_facets_in_general_position_are_spanned_by_all_pairs(count: int) -> None:
     zonotope = Zonotope(np.zeros(3), np.random.default_rng(count).normal(size=(count, 3)))
     outer = zonotope.polytope()
+
     assert len(outer.normals) == count * (count - 1)
     assert len(outer.vertices) == count * (count - 1) + 2
     assert (outer.incidence.sum(axis=0) == 4).all()
@@ -265,9 +275,7 @@ def test_facets_in_general_position_are_those_of_all_pairs(count: int) -> None:
 
 @pytest.mark.parametrize("count", [2, 3, 5, 8])
 def test_facets_hold_for_the_zonotope_exactly(count: int) -> None:
-    """The offset of a facet is at least the exact support along its stored normal, whatever the
-    rounding.
-    """
+    """The offset of a facet is at least the exact support along its stored normal."""
     for space in (2, 3):
         zonotope = Zonotope(
             np.ones(space) / 3.0, np.random.default_rng(count).normal(size=(count + 1, space))
@@ -283,6 +291,7 @@ def test_facets_hold_for_the_zonotope_exactly(count: int) -> None:
 def test_thirteen_rotated_boxes_have_all_facets() -> None:
     zonotope = rotated_boxes(13)
     outer = zonotope.polytope()
+
     assert (len(outer.normals), len(outer.vertices)) == (1482, 1484)
     assert outer.volume() == pytest.approx(zonotope.volume(), rel=1e-12)
     assert_contains_and_fits(outer, zonotope, 1e-13)
@@ -293,15 +302,14 @@ def test_aligned_boxes_are_one_box() -> None:
     zonotope = Zonotope(np.zeros(3), np.vstack([np.diag(half) for half in halves]))
     outer = zonotope.polytope()
     wanted = Polytope.from_box(-halves.sum(axis=0), halves.sum(axis=0))
+
     assert sorted(outer.vertices.tolist()) == sorted(wanted.vertices.tolist())
     assert sorted(outer.normals.tolist()) == sorted(wanted.normals.tolist())
 
 
 @pytest.mark.parametrize("seed", range(12))
 def test_generators_in_common_planes_give_facets_of_more_than_four_sides(seed: int) -> None:
-    """Rotated integers: rounding moves generators out of their common planes, and no sliver is
-    left.
-    """
+    """Rounding moves rotated integers out of their common planes, and no sliver is left."""
     random = np.random.default_rng(seed)
     whole_rows = np.array(
         [[1, 0, 0], [0, 1, 0], [1, 1, 0], [1, -1, 0], [0, 0, 1], [1, 0, 1]], float
@@ -309,6 +317,7 @@ def test_generators_in_common_planes_give_facets_of_more_than_four_sides(seed: i
     turned = whole_rows @ Rotation.random(random_state=seed).as_matrix()
     plain = Zonotope(np.zeros(3), whole_rows).polytope()
     rotated = Zonotope(random.normal(size=3), turned).polytope()
+
     assert len(rotated.vertices) == len(plain.vertices)
     assert sorted(rotated.incidence.sum(axis=0)) == sorted(plain.incidence.sum(axis=0))
     assert max(plain.incidence.sum(axis=0)) == 8
@@ -322,6 +331,7 @@ def test_nearly_coplanar_and_parallel_generators_lose_nothing(away: float, seed:
     rows = np.array([[1, 0, 0], [0, 1, 0], [1, 1, 0], [1, 1, 0], [0, 0, 1], [2, 1, 1]], float)
     zonotope = Zonotope(np.zeros(3), rows + away * random.normal(size=rows.shape))
     outer = zonotope.polytope()
+
     assert_contains_and_fits(outer, zonotope)
     assert outer.volume() == pytest.approx(float(exact_volume(zonotope.generators)), rel=1e-10)
 
@@ -334,8 +344,10 @@ def test_needle_has_the_volume_of_its_determinants(thin: float) -> None:
         size=(5, 3)
     )
     zonotope = Zonotope(np.zeros(3), generators)
+
     assert zonotope.dimension == 3
     assert zonotope.volume() == pytest.approx(float(exact_volume(generators)), rel=1e-13)
+
     outer = zonotope.polytope()
     assert (len(outer.normals), len(outer.vertices)) == (20, 22)
     assert_contains_and_fits(outer, zonotope)
@@ -362,7 +374,7 @@ FLAT_SETS = [
 
 @pytest.mark.parametrize(("space", "generators", "dimension", "vertices", "volume"), FLAT_SETS)
 @pytest.mark.parametrize("far", [0.0, 1.0, 1e6])
-def test_flat_zonotopes(
+def test_flat_zonotope_has_its_dimension_vertices_and_volume(
     space: int,
     generators: list[list[float]],
     dimension: int,
@@ -372,6 +384,7 @@ def test_flat_zonotopes(
 ) -> None:
     zonotope = Zonotope(far * np.arange(1.0, space + 1), generators)
     outer = zonotope.polytope()
+
     assert (zonotope.dimension, outer.dimension) == (dimension, dimension)
     assert (len(zonotope.vertices), len(outer.vertices)) == (vertices, vertices)
     assert zonotope.volume() == pytest.approx(volume, rel=1e-13)
@@ -386,11 +399,12 @@ def test_far_and_small_zonotope_keeps_its_shape() -> None:
     generators = 2.0**-40 * np.array([[1, 0, 0], [0, 1, 0], [1, 1, 1], [0, 1, 2]], float)
     near = Zonotope(np.zeros(3), generators).polytope()
     far = Zonotope([3.0, 5.0, 7.0], generators).polytope()
+
     assert (len(far.vertices), len(far.normals)) == (len(near.vertices), len(near.normals))
     assert far.volume() == pytest.approx(near.volume(), rel=1e-12)
 
 
-def test_volume_of_many_subsets_is_that_of_the_polytope() -> None:
+def test_volume_is_computed_by_the_polytope_if_the_subsets_are_many() -> None:
     generators = np.random.default_rng(0).normal(size=(1500, 2))
     zonotope = Zonotope(np.zeros(2), generators)  # 1.1e6 pairs
     pairs = np.abs(np.subtract(*(generators[:, [k]] * generators[None, :, 1 - k] for k in (0, 1))))
@@ -404,7 +418,7 @@ def test_polytope_of_a_zonotope_is_computed_once() -> None:
 
 
 @pytest.mark.parametrize("space", [1, 2, 3, 4])
-def test_operations_are_those_of_polytopes(space: int) -> None:
+def test_operations_give_the_same_sets_as_polytopes(space: int) -> None:
     random = np.random.default_rng(space)
     one = Zonotope(random.normal(size=space), random.normal(size=(space + 1, space)))
     two = Zonotope(one.centre + 0.1, random.normal(size=(space, space)))
@@ -412,6 +426,7 @@ def test_operations_are_those_of_polytopes(space: int) -> None:
     second = two.polytope()
     matrix = random.normal(size=(2, space))
     small = Zonotope(np.zeros(space), 0.01 * np.eye(space))
+
     assert (one + two).polytope().equals(first + second, 1e-11)
     assert (matrix @ one).polytope().equals(matrix @ first, 1e-11)
     assert one.project([0]).polytope().equals(first.project([0]), 1e-11)
@@ -430,13 +445,14 @@ def test_operations_are_those_of_polytopes(space: int) -> None:
     assert small + one.centre <= one
     assert not one <= small
     assert one.equals(Zonotope(one.centre, -one.generators[::-1]), 1e-11)
+
     points = one.centre + random.normal(size=(3, 2, space))
     np.testing.assert_array_equal(one.margin(points), first.margin(points))
     assert one.centroid() == pytest.approx(first.centroid(), abs=1e-12)
     assert not one.is_empty
 
 
-def test_area_of_the_plane() -> None:
+def test_area_is_the_volume_of_a_set_of_the_plane() -> None:
     assert Zonotope([1, 2], [[1, 0], [0, 3]]).area() == pytest.approx(12.0)
     assert Zonotope([1, 2], [[1, 1]]).area() == 0.0
 
@@ -453,17 +469,19 @@ def test_sum_with_a_set_of_another_class_is_a_polytope() -> None:
         assert found.equals(SQUARE.polytope() + box, 1e-12)
 
 
-def test_plot_returns_the_artists() -> None:
+def test_plot_returns_the_artists_of_the_polytope() -> None:
     import matplotlib.pyplot as plt
 
     figure, ax = plt.subplots()
     zonotope = Zonotope([1, 2], [[1, 0], [0, 3], [1, 1]])
     (patch,) = zonotope.plot(ax, alpha=0.5)
     corners = patch.get_path().vertices[:-1]
+
     assert ConvexPolygons.from_points(corners).area() == pytest.approx(zonotope.volume())
     assert len(corners) == 6
     assert len(zonotope.plot()) == 1
     assert len(ax.patches) == 2
+
     plt.close(figure)
     with pytest.raises(ValueError, match=r"a set of R\^3 is drawn on axes of 3 dimensions"):
         rotated_boxes(1).plot(ax)
@@ -474,8 +492,9 @@ def test_plot_returns_the_artists() -> None:
 
 
 def boundary_points(zonotope: Zonotope, random: np.random.Generator) -> Floats:
-    """Return vertices, and the middles of facets: all generators but those in the plane of a facet
-    at their ends.
+    """Return vertices, and the middles of facets.
+
+    In the middle of a facet all generators are at their ends, except the ones in its plane.
     """
     units = np.where(
         np.abs(zonotope.generators).sum(axis=0) > 0.0, np.abs(zonotope.generators).sum(axis=0), 1.0
@@ -490,11 +509,12 @@ def boundary_points(zonotope: Zonotope, random: np.random.Generator) -> Floats:
         if values.min() > 1e-6:
             signs = np.where(np.abs(heights) > 1e-9, np.sign(heights), 0.0)
             found.append(zonotope.centre + signs @ zonotope.generators)
+
     return np.array(found)
 
 
 @pytest.mark.parametrize("seed", range(24))
-def test_boundary_is_inside_and_what_is_beyond_it_is_not(seed: int) -> None:
+def test_point_is_inside_if_it_is_on_the_boundary_and_outside_just_beyond(seed: int) -> None:
     random = np.random.default_rng(seed)
     space = 2 + seed % 4
     count = space + int(random.integers(0, 5))
@@ -504,9 +524,11 @@ def test_boundary_is_inside_and_what_is_beyond_it_is_not(seed: int) -> None:
             np.vstack([np.eye(space), random.integers(-1, 2, (count - space, space))])
             @ np.linalg.qr(rows[:space])[0]
         )
+
     units = 10.0 ** random.integers(-6, 7, space)
     zonotope = Zonotope(random.normal(size=space) * units, rows * units)
     points = boundary_points(zonotope, random)
+
     assert zonotope.contains(points).all()
     assert zonotope.contains(0.5 * points + 0.5 * points[::-1]).all()
     for factor in (1e-3, 1e-6, 1e-9, 1e-11):
@@ -539,8 +561,9 @@ def test_membership_agrees_with_linear_programs(seed: int) -> None:
         assert is_inside == (optimum.fun <= 1.0)
 
 
-def test_membership_of_batches_and_single_points() -> None:
+def test_membership_takes_batches_and_single_points() -> None:
     zonotope = Zonotope([0, 0, 0], [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]])
+
     assert zonotope.contains(np.zeros((2, 3, 3))).shape == (2, 3)
     assert zonotope.contains(np.zeros((0, 3))).shape == (0,)
     assert np.ones(3) in zonotope
@@ -557,7 +580,9 @@ def test_points_of_a_flat_set_are_inside_and_points_across_are_not(rank: int, fa
     plane = random.normal(size=(rank, 5))
     zonotope = Zonotope(far * random.normal(size=5), random.normal(size=(6, rank)) @ plane)
     inside = zonotope.centre + random.uniform(-1.0, 1.0, (20, 6)) @ zonotope.generators
+
     assert zonotope.contains(inside).all()
+
     across = np.linalg.svd(np.vstack([plane, np.zeros((5, 5))]))[2][-1]
     assert not zonotope.contains(inside + 1e-8 * across).any()
 
@@ -572,6 +597,7 @@ def test_reduced_zonotope_contains_the_set(space: int, order: float) -> None:
     random = np.random.default_rng(space)
     zonotope = Zonotope(random.normal(size=space), random.normal(size=(6 * space, space)))
     outer = zonotope.reduce_outward(order)
+
     assert len(outer.generators) <= order * space
     for row in random.normal(size=(20, space)):
         assert exact_support(outer, exact(row)) >= exact_support(zonotope, exact(row))
@@ -590,6 +616,7 @@ def test_reduction_does_not_depend_on_units() -> None:
     units = 2.0 ** np.array([-20, 0, 13])
     zonotope = Zonotope(np.zeros(3), random.normal(size=(20, 3)))
     scaled = Zonotope(np.zeros(3), zonotope.generators * units).reduce_outward(3)
+
     np.testing.assert_array_equal(scaled.generators, zonotope.reduce_outward(3).generators * units)
 
 
@@ -614,6 +641,7 @@ def test_cut_keeps_all_points_in_the_strips(seed: int) -> None:
     outer = zonotope.cut(normals, lower, upper, slack_ulp=8.0)
     inside = ((points @ normals.T >= lower) & (points @ normals.T <= upper)).all(axis=1)
     inside[0] = True
+
     assert outer.contains(points[inside]).all()
     assert np.linalg.norm(outer.generators / units) <= np.linalg.norm(
         zonotope.generators / units
@@ -632,6 +660,7 @@ def test_gain_of_a_cut_has_the_smallest_sum_of_squares() -> None:
     wanted = np.vstack([zonotope.generators, np.zeros((2, 3))])
     gain = np.linalg.lstsq(stacked, wanted, rcond=None)[0].T
     outer = zonotope.cut(normals, middle - half, middle + half)
+
     assert outer.centre == pytest.approx(zonotope.centre + gain @ [0.5, -0.4], abs=1e-13)
     assert outer.generators[:6] == pytest.approx(zonotope.generators - images @ gain.T, abs=1e-13)
     assert outer.generators[6:8] == pytest.approx((gain * half).T, abs=1e-13)
@@ -645,11 +674,12 @@ def test_cut_by_exact_values_of_all_coordinates_is_a_point() -> None:
         assert end == pytest.approx([0.5, -0.25, 0.125], abs=1e-13)
 
 
-def test_cut_by_the_same_strip_twice() -> None:
+def test_cut_by_the_same_strip_twice_is_in_the_strip() -> None:
     zonotope = rotated_boxes(2)
     normal = np.array([1.0, 2.0, -1.0])
     middle = float(normal @ zonotope.centre)
     twice = zonotope.cut([normal, normal], middle, middle)
+
     for end in (twice.support_function(normal), -twice.support_function(-normal)):
         assert end == pytest.approx(middle, abs=1e-12)
 
