@@ -14,7 +14,7 @@ from infoset.sensors import BearingSensor, Sensor
 Interval = tuple[float, float]
 
 MAX_SECTIONS = 10_000
-"""Maximum number of sections: a few hundred are enough (default 29), more only take memory."""
+"""Maximum number of sections: they take 6 MB for each engagement (docs/performance.md)."""
 CENTROID_ERRORS_AT_THRESHOLD = 10.0
 """Minimum range threshold in centroid errors of the camera.
 

@@ -20,7 +20,11 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
 AREA_ROUNDING = 64.0 * float(np.finfo(np.float64).eps)
-"""Rounding of an area, relative to the products of coordinates and widths in it."""
+"""Rounding of an area, relative to the products of coordinates and widths in it.
+
+Areas of rings of 1000 vertices differ by at most 10 units of rounding from the areas of their
+hulls.
+"""
 
 
 def ring_of_points(points: Floats) -> Floats:

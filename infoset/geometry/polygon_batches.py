@@ -25,12 +25,12 @@ from infoset.geometry.polygon import Point, Points, vertex
 from infoset.geometry.tolerances import EPS
 
 LEAST_LENGTH = 1e-300
-"""Divisor in place of the length of a side that underflows: vertices of a tidy polygon differ."""
+"""Divisor in place of a length that underflows to zero: the vertices of a side are different."""
 
 
 @compiled
 def drop_repeats(vertices: Floats, counts: Integers) -> None:
-    """Remove repeated vertices, also the one that closes a ring, in place."""
+    """Remove repeated vertices, also the last one of a closed ring, in place."""
     for i in range(counts.size):
         counts[i] = polygon_exact.drop_repeats(vertices[i], counts[i])
 

@@ -17,9 +17,9 @@ from infoset.geometry.polygon import Point, Points, following, preceding, put, v
 from infoset.geometry.polygon_exact import exact_sum, hull, tidy
 
 FAR = 1e70
-"""Half-width of a box that contains all bounded sets of coefficients up to 1e60.
+"""Half-width of a box around all sets: a set that reaches it counts as unbounded.
 
-A set that reaches the box is unbounded. Products of three coefficients do not overflow.
+It is far above 1e60, the maximum of all numbers, and products of three numbers stay finite.
 """
 BOX_SIDES = 4
 """Number of lines of this box, the first ones of all."""

@@ -13,22 +13,20 @@ A product, a sum, a division and a step outward are rounded once each. A given r
 that is shorter than the longest one by this factor is the rounding of a row that is zero.
 """
 ON = 2.0**10 * UNSURE
-"""Distance of a point from a half-space on whose boundary it lies, 9.1e-13, in the double
-description.
+"""Distance of a point from a half-space, 9.1e-13, up to which it is on its boundary.
 
-A vertex is a combination of earlier ones: after a thousand roundings its coordinates are known to
-this.
+It is used in the double description. A vertex is a combination of earlier vertices: after a
+thousand roundings its coordinates are known to this.
 """
 SNAP = 8.0 * ON
-"""Thickness, 7.3e-12, of what counts as flat, and distance from a facet of points that count as its
-vertices.
+"""Thickness of a set that counts as flat, 7.3e-12, and distance of a facet from its vertices.
 
 Two roundings of one facet are up to 8.5e-13 apart (random systems of three states): they are
 merged.
 """
 REDUCED = 2.0**12 * SNAP
-"""Thickness, 3.0e-8, of a layer in place of a flat set; about the square root of the rounding, so
-that it stays thick.
+"""Thickness, 3.0e-8, of a layer in place of a flat set.
 
-Depth from which a set is certainly not flat, and the pivot of a matrix that is certainly not zero.
+It is about the square root of the rounding, so that the layer stays thick. From this depth on a set
+is certainly not flat, and a pivot of a matrix certainly not zero.
 """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +22,8 @@ from infoset import (
 )
 from infoset.arrays import Floats
 
-E, STEP = 58e3, 0.5
+E = 58e3
+STEP = 0.5
 SENSOR = AngleSensor(0.5, 0.00015, 0.00023, 5801.3e3)
 KNOWN = StateBox((-10e3, 10e3), (5301.3e3, 6301.3e3), (-100.0, 100.0), (-59e3, -57e3))
 MODEL = SetModel(
@@ -86,29 +88,40 @@ def test_rates_of_one_engagement_leave_room_for_the_sections_of_another(rates: i
         np.testing.assert_array_equal(other.polygons[0].polygon(), one.polygons[0].polygon())
 
 
-def test_value_in_space_is_one_number_or_one_for_each_axis_and_engagement() -> None:
-    model = replace(MODEL, bounds=replace(KNOWN, y_m=(-8e3, 8e3), vy_m_s=(-80.0, 80.0)))
-    for batch in (1, 3):
-        one = InformationSet(model, batch)
-        each = InformationSet(model, batch)
-        one.measure_angle(0.0002)
-        one.shift(1.0)
-        each.measure_angle(np.full((2, batch), 0.0002))
-        each.shift(np.full((2, batch), 1.0))
-        np.testing.assert_array_equal(one.predicted_miss().upper_m, each.predicted_miss().upper_m)
-        for change in (one.measure_angle, one.shift):
-            for value in (
-                [0.0004],
-                [0.1, 0.2, 0.3],
-                [[0.1, 0.2]] * 3,
-                [[np.nan] * batch] * 2,
-                "ab",
-            ):
-                with pytest.raises(
-                    (ValueError, TypeError), match=r"have the shape \(2, [13]\)|finite|numbers"
-                ):
-                    change(value)
-        np.testing.assert_array_equal(one.predicted_miss().upper_m, each.predicted_miss().upper_m)
+def model_in_space() -> SetModel:
+    return replace(MODEL, bounds=replace(KNOWN, y_m=(-8e3, 8e3), vy_m_s=(-80.0, 80.0)))
+
+
+@pytest.mark.parametrize("batch", [1, 3])
+def test_number_in_space_is_for_all_axes_and_engagements(batch: int) -> None:
+    one = InformationSet(model_in_space(), batch)
+    each = InformationSet(model_in_space(), batch)
+
+    one.measure_angle(0.0002)
+    one.shift(1.0)
+    each.measure_angle(np.full((2, batch), 0.0002))
+    each.shift(np.full((2, batch), 1.0))
+
+    np.testing.assert_array_equal(one.predicted_miss().upper_m, each.predicted_miss().upper_m)
+
+
+@pytest.mark.parametrize("batch", [1, 3])
+@pytest.mark.parametrize(
+    "value", [[0.0004], [0.1, 0.2, 0.3], [[0.1, 0.2]] * 3, [[np.nan, np.nan, np.nan]] * 2, "ab"]
+)
+def test_value_in_space_of_another_shape_is_refused_and_changes_nothing(
+    value: Any, batch: int
+) -> None:
+    information = InformationSet(model_in_space(), batch)
+    before = information.predicted_miss().upper_m
+
+    for change in (information.measure_angle, information.shift):
+        with pytest.raises(
+            (ValueError, TypeError), match=r"have the shape \(2, [13]\)|finite|numbers"
+        ):
+            change(value)
+
+    np.testing.assert_array_equal(information.predicted_miss().upper_m, before)
 
 
 def test_new_grid_has_twice_the_fewest_sections_and_one_over_the_feasible_range() -> None:
@@ -138,13 +151,15 @@ def test_range_measurement_keeps_exactly_the_ranges_within_its_bound() -> None:
 
 @pytest.mark.parametrize("seed", range(6))
 def test_ends_of_the_range_are_feasible_and_labels_just_beyond_are_not(seed: int) -> None:
-    # A sharp sensor and a large offset make angles tell range, so that the ends are found between
-    # stored labels.
+    # With a sharp sensor and a large offset angles depend on the range, so that the ends of the
+    # range are between stored labels.
     sharp = AngleSensor(0.5, 2e-6, 2e-6, 5801.3e3)
     model = replace(MODEL, angle_sensor=sharp, disturbance_m_s2=0.0, sections=15, fewest_sections=2)
     random = np.random.default_rng(seed)
     information = InformationSet(model)
-    z, v, x = 9e3, -80.0, 5801.3e3
+    z = 9e3
+    v = -80.0
+    x = 5801.3e3
     for _ in range(90):
         information.measure_angle(z / x + random.uniform(-1.0, 1.0) * 2e-6)
         impulse = float(random.uniform(-7.0, 7.0))
@@ -162,12 +177,10 @@ def test_ends_of_the_range_are_feasible_and_labels_just_beyond_are_not(seed: int
 
     assert maximum[0] - minimum[0] < 0.9 * 1000e3
     for end, outward in ((minimum[0], -1.0), (maximum[0], 1.0)):
-        assert not information.section_at(end + travelled).polygons[0].is_empty
-        assert (
-            information.section_at(end + travelled + outward * 2e-9 * (end + travelled))
-            .polygons[0]
-            .is_empty
-        )
+        label = end + travelled
+        beyond = label + outward * 2e-9 * label
+        assert not information.section_at(label).polygons[0].is_empty
+        assert information.section_at(beyond).polygons[0].is_empty
 
 
 def test_initial_rectangle_is_the_rectangle_of_the_paper() -> None:
@@ -265,9 +278,9 @@ def test_inconsistent_measurement_is_reported_and_the_last_consistent_set_contin
     assert MODEL.bounds.x_m[0] <= label[1] <= MODEL.bounds.x_m[1]
     assert information.status == [SetStatus.TRACKING, SetStatus.TRACKING]
 
-    # As before the measurement, and wider by what one measurement may err: e b in V, which is x b
-    # of miss.
-    x, slack = 5801.3e3, 1e-9
+    # The set before the measurement, wider by the error bound of one measurement: e b in V, which
+    # is x b of miss.
+    x = 5801.3e3
     bound = MODEL.angle_sensor.error_bound(x)
     old = before.section_at(x, 1).polygons[0]
     new = information.section_at(x, 1).polygons[0]
@@ -275,7 +288,7 @@ def test_inconsistent_measurement_is_reported_and_the_last_consistent_set_contin
 
     for direction in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (1.0, 0.01), (-1.0, 0.02)):
         assert new.support_function(direction) == pytest.approx(
-            float(grown.support_function(direction)), rel=slack
+            float(grown.support_function(direction)), rel=1e-9
         )
 
     information.predict()
@@ -337,7 +350,7 @@ def test_label_of_an_inconsistent_range_is_the_nearest_feasible_one(
 
     assert step == 0
 
-    # The limits stand a little outside the outermost sections' labels.
+    # The limits are a little outside the labels of the outermost sections.
     wanted = feasible.min() if nearest == "minimum" else feasible.max()
     assert label == pytest.approx(wanted, rel=1e-3)
 
@@ -389,9 +402,8 @@ def test_sections_at_the_vertex_cap_contain_the_exact_ones() -> None:
     assert int(kept.counts) <= 256
     assert int(exact.counts) > 256
 
-    normals = np.column_stack(
-        (np.cos(np.linspace(0, 6.28, 60)), np.sin(np.linspace(0, 6.28, 60)))
-    ) * (50.0, 1.0)
+    turns = np.linspace(0.0, 6.28, 60)
+    normals = np.column_stack((50.0 * np.cos(turns), np.sin(turns)))
     for normal in normals:
         assert kept.support_function(normal) >= exact.support_function(normal) * (1.0 - 1e-13)
     assert kept.area() <= exact.area() * 1.001

@@ -1,4 +1,4 @@
-"""Drawn sets: what is on the axes and in the picture."""
+"""Drawn sets: the artists on the axes, and the pixels of the picture."""
 
 from __future__ import annotations
 

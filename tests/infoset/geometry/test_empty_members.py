@@ -16,7 +16,7 @@ SHAPES: list[tuple[int, ...]] = [(7,), (2, 3), (3, 1, 2)]
 
 
 class Arguments(NamedTuple):
-    """Arguments of operations, one for each member of a batch, or those of one member."""
+    """Arguments of operations, one for each member of a batch, or for one member."""
 
     vector: Floats
     matrix: Floats
@@ -265,7 +265,7 @@ def test_samples_of_a_batch_are_in_its_members_and_masked_for_empty_ones(
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_constraints_of_a_batch_describe_it(shape: tuple[int, ...]) -> None:
-    """Of a flat member rounded directions may leave nothing: such members are left out."""
+    """Flat members are left out: rounded directions may make them empty."""
     batch = random_batch(np.random.default_rng(1), shape, 0.5)
     solid = batch.counts > 2
 

@@ -8,8 +8,8 @@ the words of this module, the sets, the arguments and the expected answer. Only 
 * pycvxset, https://github.com/merlresearch/pycvxset (tests of polytopes),
 * LazySets, https://github.com/JuliaReach/LazySets.jl (tests of polyhedra, polytopes and zonotopes).
 
-Where the answer of this project is another one, the line has both: `expected` is that of the other
-project, `here` that of this one, and `because` the reason.
+If the answer of this project is different, the line has both: `expected` is the answer of the other
+project, `here` the answer of this project, and `because` the reason.
 
 A set is given by half-spaces (`normals`, `offsets`, `across`, `levels`), by `points`, perhaps with
 `directions` and `lines`, by a `centre` and `generators`, one a row, or by `lower` and `upper`.
@@ -35,7 +35,8 @@ CASES: list[dict[str, Any]] = json.loads((Path(__file__).parent / "peers.json").
 TOLERANCE = 1e-8
 """Distance of numbers that count as equal, absolute and relative.
 
-The other projects compare with 1e-4 to 1e-14, and print ten digits of what is no short decimal.
+The other projects compare with 1e-4 to 1e-14, and print ten digits of numbers that are not short
+decimals.
 """
 ERRORS: dict[str, type[Exception]] = {
     "EmptyPolytopeError": EmptyPolytopeError,
@@ -53,7 +54,6 @@ def numbers(values: Any) -> Floats:
 def space_of(given: dict[str, Any]) -> int:
     """Return the dimension of the space of a set of half-spaces."""
     rows = [*given["normals"], *given.get("across", [])]
-
     return len(rows[0])
 
 
@@ -119,7 +119,7 @@ OPERATIONS: dict[str, Callable[..., Any]] = {
     "translation": lambda one, offset: one.translate(offset),
     "scaling": lambda one, factor: factor * one,
     "negation": lambda one: -one,
-    # What is true of sets.
+    # Properties of sets.
     "is empty": lambda one: one.is_empty,
     "is bounded": lambda one: one.polytope().is_bounded,
     "has an interior": has_interior,
@@ -188,7 +188,7 @@ def assert_same_sets(found: AnySet, expected: AnySet) -> None:
 
 
 def assert_same_rows(found: Floats, expected: Floats) -> None:
-    """Each row of one table is one of the other, and there are as many."""
+    """Check that each row of one table is in the other one, and that they have equal lengths."""
     assert len(found) == len(expected)
     if not len(expected):
         return

@@ -78,8 +78,8 @@ AXES: list[Exact] = [(Fraction(x), Fraction(y)) for x, y in ((1, 0), (0, 1), (-1
 def outside_by(points: Sequence[Exact], polygon: Sequence[Exact], box: Exact) -> Exact | None:
     """Return a point that is not in the polygon enlarged by [-box, box], if there is one.
 
-    The normals of that sum are those of the polygon and the axes: to test these is to test
-    containment.
+    The normals of the enlarged polygon are the normals of the polygon and the axes: only these are
+    tested.
     """
     if not polygon:
         return points[0] if points else None

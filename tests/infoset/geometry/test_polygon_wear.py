@@ -73,28 +73,27 @@ def test_reduction_of_a_set_as_thin_as_rounding_contains_it() -> None:
         assert polygon.moments(reduced, len(reduced))[0] < 1e-14
 
 
-def test_edge_that_adds_the_minimum_area_is_removed_first() -> None:
+@pytest.mark.parametrize("count", [5, 16, 33, 60])
+def test_edge_that_adds_the_minimum_area_is_removed_first(count: int) -> None:
     """The reference computes all areas again after each removal.
 
     The lengths are equal in pairs, so that areas are equal too.
     """
-    rng = np.random.default_rng(2)
-    work = np.empty((128, 2))
-    for count in (5, 16, 33, 60):
-        lengths = 10.0 ** rng.uniform(-4.0, 0.0, count)
-        directions = np.linspace(0.0, 3.0, count)
-        steps = np.minimum(lengths, lengths[::-1])[:, None] * np.stack(
-            [np.cos(directions), np.sin(directions)], axis=-1
-        )
-        path = np.cumsum(steps, axis=0)
-        expected = path.copy()
-        while len(expected) > 4:
-            removals = [
-                polygon_reduction.removed_edge(expected, i - 1, i, i + 1, i + 2)
-                for i in range(1, len(expected) - 2)
-            ]
-            first = min(range(len(removals)), key=lambda i: removals[i][0])
-            expected[first + 1] = removals[first][1:]
-            expected = np.delete(expected, first + 2, axis=0)
-        assert polygon_reduction.drop_inner_edges(path, count, 4, work) == (4, True)
-        np.testing.assert_array_equal(path[:4], expected)
+    random = np.random.default_rng(2)
+    lengths = 10.0 ** random.uniform(-4.0, 0.0, count)
+    turns = np.linspace(0.0, 3.0, count)
+    directions = np.stack([np.cos(turns), np.sin(turns)], axis=-1)
+    path = np.cumsum(np.minimum(lengths, lengths[::-1])[:, None] * directions, axis=0)
+
+    expected = path.copy()
+    while len(expected) > 4:
+        removals = [
+            polygon_reduction.removed_edge(expected, i - 1, i, i + 1, i + 2)
+            for i in range(1, len(expected) - 2)
+        ]
+        first = min(range(len(removals)), key=lambda i: removals[i].added)
+        expected[first + 1] = removals[first].x, removals[first].y
+        expected = np.delete(expected, first + 2, axis=0)
+
+    assert polygon_reduction.drop_inner_edges(path, count, 4, np.empty((128, 2))) == (4, True)
+    np.testing.assert_array_equal(path[:4], expected)

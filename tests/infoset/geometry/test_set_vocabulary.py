@@ -124,25 +124,26 @@ def test_zonotopes_have_names_of_polytopes() -> None:
     }
 
 
-def test_projections_and_slices_take_one_axis_or_several() -> None:
+@pytest.mark.parametrize("number", [1, [1], (1,), np.array([1]), np.int64(1)])
+def test_projections_and_slices_take_an_axis_as_a_number_or_a_sequence(number: Any) -> None:
     square = ConvexPolygons.from_box([0, 1], [2, 5])
     cube = Polytope.from_box([0, 1, 2], [3, 5, 7])
-    number: Any
 
-    for number in (1, [1], (1,), np.array([1]), np.int64(1)):
-        assert [float(end) for end in square.project(number)] == [1.0, 5.0]
-        assert [end.tolist() for end in cube.project(number).bounding_box()] == [[1.0], [5.0]]
-        assert [float(end) for end in square.slice(number, 2.0)] == [0.0, 2.0]
-        for values in (2.0, [2.0]):
-            assert np.ravel(cube.slice(number, values).bounding_box()) == pytest.approx(
-                [0.0, 2.0, 3.0, 7.0], abs=1e-15
-            )
+    assert [float(end) for end in square.project(number)] == [1.0, 5.0]
+    assert [end.tolist() for end in cube.project(number).bounding_box()] == [[1.0], [5.0]]
+    assert [float(end) for end in square.slice(number, 2.0)] == [0.0, 2.0]
+    for values in (2.0, [2.0]):
+        assert np.ravel(cube.slice(number, values).bounding_box()) == pytest.approx(
+            [0.0, 2.0, 3.0, 7.0], abs=1e-15
+        )
 
-    assert [end.tolist() for end in square.project([1, 0]).bounding_box()] == [
-        [1.0, 0.0],
-        [5.0, 2.0],
-    ]
-    assert [end.tolist() for end in cube.project([2, 0]).bounding_box()] == [[2.0, 0.0], [7.0, 3.0]]
+
+def test_projections_have_the_axes_in_their_order() -> None:
+    square = ConvexPolygons.from_box([0, 1], [2, 5]).project([1, 0])
+    cube = Polytope.from_box([0, 1, 2], [3, 5, 7]).project([2, 0])
+
+    assert [end.tolist() for end in square.bounding_box()] == [[1.0, 0.0], [5.0, 2.0]]
+    assert [end.tolist() for end in cube.bounding_box()] == [[2.0, 0.0], [7.0, 3.0]]
 
 
 def test_polytope_is_converted_from_and_to_shapely() -> None:

@@ -1,4 +1,4 @@
-"""Operations of a polygon with a polytope of the plane: those of two polytopes, in either order."""
+"""Operations of a polygon with a polytope of the plane, in either order."""
 
 from __future__ import annotations
 
