@@ -2,7 +2,7 @@
 
 from infoset.sim.adversary import NothingCountsError, Objective, WorstEngagement, find_worst
 from infoset.sim.bound.lower_bound import LowerBound, lower_bound
-from infoset.sim.campaign import Campaign
+from infoset.sim.campaign import Campaign, RunsUntil
 from infoset.sim.closed_form import possible_miss_of
 from infoset.sim.covariance import Covariance
 from infoset.sim.miss_cause import MissCause
@@ -45,6 +45,7 @@ __all__ = [
     "RecordedInconsistency",
     "Requirement",
     "Results",
+    "RunsUntil",
     "Scenario",
     "StoppingRule",
     "Sun",

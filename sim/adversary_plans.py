@@ -1,11 +1,14 @@
-"""Plans of an adversary (start, errors and target of each engagement): random ones, and changes of
-the best ones.
+"""Plans of an adversary (start, errors and target of each engagement), and random changes of them.
+
+All probabilities and sizes of changes are chosen: with other values a search finds other
+engagements, which are as valid.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,7 +44,7 @@ class Plans:
     lineage, changes : ndarray of int, shape (n,)
         Index of the first plan from which a plan was derived, and number of changes since then.
     value : ndarray, shape (n,)
-        What the search maximises, m; -inf if the engagement does not count, or before it is
+        Value that the search maximises, m; -inf if the engagement does not count, or before it is
         simulated.
     """
 
@@ -66,9 +69,8 @@ class Plans:
 
 def joined(parts: Sequence[Plans]) -> Plans:
     """Return the plans of all parts."""
-    return Plans(
-        *(np.concatenate([getattr(part, of.name) for part in parts]) for of in fields(Plans))
-    )
+    columns = ([getattr(part, field.name) for part in parts] for field in fields(Plans))
+    return Plans(*map(np.concatenate, columns))
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,7 @@ class Constructions:
     shift_side: Floats
 
     def take(self, which: Integers | slice) -> Constructions:
-        """Return those of some plans."""
+        """Return the constructions of some plans."""
         return Constructions(*(getattr(self, field.name)[which] for field in fields(self)))
 
     def noise(self, shift_m: Floats | None, target_side: Floats | None) -> GameNoise:
@@ -115,11 +117,10 @@ class _ConstructedNoise(GameNoise):
 
     @property
     def truth_side(self) -> Floats:
-        """Side to which the shift moves the true state, shape (B,) or (C, B): 1 or -1, 0 for no
-        shift.
-        """
-        side = self.shift_side
-        return side if self.target_side is None else np.where(side == 0.0, 0.0, self.target_side)
+        """Side to which the shift moves the true state, shape (B,) or (C, B); 0 for no shift."""
+        if self.target_side is None:
+            return self.shift_side
+        return np.where(self.shift_side == 0.0, 0.0, self.target_side)
 
     def _upper_is_worse(self, miss: PredictedMiss, step: int) -> Flags:
         chosen = draws_of_step("choices", self.tie_draws, step, miss.upper_m.shape) >= 0.0
@@ -127,27 +128,38 @@ class _ConstructedNoise(GameNoise):
 
 
 def by_axis(values: Floats, sensor: Sensor | None = None) -> Floats:
-    """Return values of shape (n, C, ...) as a sensor uses them: (C, n, ...) if it measures by axis,
-    otherwise (n, ...).
+    """Return values of shape (n, C, ...) as a sensor uses them.
 
-    None is the angle sensor.
+    The shape is (C, n, ...) if it measures by axis, otherwise (n, ...). None is the angle sensor.
     """
-    return np.moveaxis(values, 1, 0) if sensor is None or sensor.is_lateral else values[:, 0]
+    if sensor is None or sensor.is_lateral:
+        return np.moveaxis(values, 1, 0)
+    return values[:, 0]
+
+
+class _Maker(NamedTuple):
+    """A construction of first plans: its name, rule for ties, and random choices.
+
+    The rule None keeps the chosen extremes at every step.
+    """
+
+    name: str
+    tie: TieRule | None
+    draw_choices: Callable[[int], Floats]
 
 
 class Planner:
     """Random plans of a scenario whose flights have a number of steps.
 
-    In the guaranteed model the target accelerates at the bound of the model, or at that of the
-    scenario's target if that is greater. In the model `paper` the disturbance is fictitious.
+    In the guaranteed model the target accelerates at the bound of the model, or at the bound of the
+    scenario's target if it is greater. In the model `paper` the disturbance is fictitious.
 
     Attributes
     ----------
     sensors : tuple of Sensor
-        Sensors of the rows of the errors, that of the angles first.
+        Sensors of the rows of the errors, the angle sensor first.
     acceleration_m_s2 : ndarray, shape (axes,)
-        Acceleration of the target along each axis, m/s^2; zero if the target is that of the
-        scenario.
+        Acceleration of the target along each axis, m/s^2; zero leaves the target of the scenario.
     constructions : list of str
         Construction of each first plan so far, by lineage.
     """
@@ -162,16 +174,17 @@ class Planner:
         self.sensors: tuple[Sensor, ...] = (scenario.bearing_sensor, *others)
         self._lower, self._upper = corners(model.bounds)
         self._axes = len(model.axes)
+
         self.acceleration_m_s2: Floats = np.zeros(self._axes)
         if model.is_guaranteed:
-            self.acceleration_m_s2 = np.array(
-                [model.axis(axis).disturbance_m_s2 for axis in model.axes]
-            )
+            bounds = [model.axis(axis).disturbance_m_s2 for axis in model.axes]
+            self.acceleration_m_s2 = np.array(bounds)
             if target is not None and target.manoeuvre is not Manoeuvre.NONE:
-                self.acceleration_m_s2 = np.maximum(
-                    self.acceleration_m_s2, amplitudes_m_s2(target, self._axes)
-                )
+                amplitudes = amplitudes_m_s2(target, self._axes)
+                self.acceleration_m_s2 = np.maximum(self.acceleration_m_s2, amplitudes)
+
         self.constructions: list[str] = []
+        # Moves of the start are listed three times: they are chosen three times as often.
         self._changes: list[Callable[[Plans, int], None]] = [
             self._flip,
             self._move_switch,
@@ -185,54 +198,58 @@ class Planner:
             self._changes.append(self._turn_target)
 
     def first(self, count: int) -> tuple[Plans, Constructions]:
-        """Return first plans, in equal numbers for each construction, and how game noise chooses
-        their errors.
-        """
-        makers: list[tuple[str, TieRule | None, Callable[[int], Floats]]] = [
-            *((f"game noise, tie {tie.value}", tie, self._coins) for tie in TieRule),
-            ("extremes kept in random order", None, self._coins),
-            ("extremes kept in blocks", None, self._blocks),
+        """Return first plans, in equal numbers for each construction, and their constructions."""
+        makers = [
+            *(_Maker(f"game noise, tie {tie.value}", tie, self._coins) for tie in TieRule),
+            _Maker("extremes kept in random order", None, self._coins),
+            _Maker("extremes kept in blocks", None, self._blocks),
         ]
         shares = [len(part) for part in np.array_split(np.arange(count), len(makers))]
         plans: list[Plans] = []
         constructions: list[Constructions] = []
-        for (name, tie, draw_choices), share in zip(makers, shares, strict=True):
-            errors = np.zeros((share, len(self.sensors), self._axes, self._steps))
-            errors[:, ANGLE] = draw_choices(share)
-            # Game noise with a shift knows the sign of a constant acceleration.
-            in_blocks = (self._random.random((share, 1, 1)) < 0.5) & (tie is None)
-            sides = np.where(in_blocks, self._blocks(share), self._coins(share)[:, :, :1])
-            lineage = len(self.constructions) + np.arange(share)
-            self.constructions += [name] * share
-            plans.append(
-                Plans(
-                    self._starts(share),
-                    errors,
-                    sides,
-                    lineage,
-                    0 * lineage,
-                    np.full(share, -np.inf),
-                )
-            )
-            constructions.append(self._construction(tie, errors[:, ANGLE]))
-        together = (
-            np.concatenate([getattr(each, of.name) for each in constructions])
-            for of in fields(Constructions)
+        for maker, share in zip(makers, shares, strict=True):
+            made = self._made(maker, share)
+            plans.append(made)
+            constructions.append(self._construction(maker.tie, made.errors[:, ANGLE]))
+
+        columns = (
+            [getattr(c, field.name) for c in constructions] for field in fields(Constructions)
         )
-        return joined(plans), Constructions(*together)
+        return joined(plans), Constructions(*map(np.concatenate, columns))
+
+    def _made(self, maker: _Maker, count: int) -> Plans:
+        """Return a number of first plans of one construction."""
+        errors = np.zeros((count, len(self.sensors), self._axes, self._steps))
+        errors[:, ANGLE] = maker.draw_choices(count)
+        # Game noise with a shift knows the sign of a constant acceleration.
+        in_blocks = (self._random.random((count, 1, 1)) < 0.5) & (maker.tie is None)
+        sides = np.where(in_blocks, self._blocks(count), self._coins(count)[:, :, :1])
+        lineage = len(self.constructions) + np.arange(count)
+        self.constructions += [maker.name] * count
+        return Plans(
+            start=self._starts(count),
+            errors=errors,
+            sides=sides,
+            lineage=lineage,
+            changes=0 * lineage,
+            value=np.full(count, -np.inf),
+        )
 
     def _construction(self, tie: TieRule | None, drawn: Floats) -> Constructions:
-        """Return game noise with a rule for ties, or for None noise that keeps the drawn extremes
-        at every step.
-        """
-        share = len(drawn)
-        side = {TieRule.UPPER: -1.0, TieRule.LOWER: 1.0}.get(tie, 0.0) if tie is not None else 0.0
+        """Return game noise with a rule for ties, and for None with the drawn extremes."""
+        count = len(drawn)
         choices = drawn.copy()
-        if side:
-            choices[:] = -side
-        if tie is TieRule.ALTERNATE:
+        side = 0.0
+        # The shift moves the true state away from the extreme that is kept at ties.
+        if tie is TieRule.UPPER:
+            side = -1.0
+            choices[:] = 1.0
+        elif tie is TieRule.LOWER:
+            side = 1.0
+            choices[:] = -1.0
+        elif tie is TieRule.ALTERNATE:
             choices[:] = np.where(np.arange(self._steps) % 2 == 0, 1.0, -1.0)
-        return Constructions(choices, np.full(share, tie is None), np.full(share, side))
+        return Constructions(choices, np.full(count, tie is None), np.full(count, side))
 
     def children(self, elite: Plans, count: int) -> Plans:
         """Return changed plans of the elite; plans with a greater miss are chosen more often."""
@@ -254,16 +271,16 @@ class Planner:
         return self._lower + (self._upper - self._lower) * np.where(at_end, np.round(share), share)
 
     def _coins(self, count: int) -> Floats:
+        """Return independent signs for each step."""
         return np.asarray(self._random.choice([-1.0, 1.0], (count, self._axes, self._steps)))
 
     def _blocks(self, count: int) -> Floats:
-        one = (count, self._axes, 1)
-        switches = self._random.random((*one[:2], self._steps)) < 10.0 ** self._random.uniform(
-            -2.5, -0.5, one
-        )
-        return np.asarray(
-            self._random.choice([-1.0, 1.0], one) * (-1.0) ** np.cumsum(switches, axis=2)
-        )
+        """Return signs that switch at random, between once in 300 and once in 3 steps."""
+        uniform = self._random.random((count, self._axes, self._steps))
+        frequency = 10.0 ** self._random.uniform(-2.5, -0.5, (count, self._axes, 1))
+        switches = uniform < frequency
+        first = self._random.choice([-1.0, 1.0], (count, self._axes, 1))
+        return np.asarray(first * (-1.0) ** np.cumsum(switches, axis=2))
 
     def _last_step(self, plans: Plans, i: int) -> int:
         """Return the last step before the closest approach of a start, plus one."""
@@ -285,27 +302,28 @@ class Planner:
 
     def _some_axes(self) -> slice:
         """Return one lateral axis or both."""
-        return (
-            slice(0, 1)
-            if self._axes == 1
-            else slice(*((0, 1), (1, 2), (0, 2))[int(self._random.integers(3))])
-        )
+        if self._axes == 1:
+            return slice(0, 1)
+        first, end = ((0, 1), (1, 2), (0, 2))[int(self._random.integers(3))]
+        return slice(first, end)
 
     def _flip(self, plans: Plans, i: int) -> None:
         """Change the sign of the errors of the angles in a block."""
         plans.errors[i, ANGLE, self._some_axes(), self._span(plans, i)] *= -1.0
 
     def _move_switch(self, plans: Plans, i: int) -> None:
-        """Move one switching time by a few steps; if both axes are moved, one of the first."""
+        """Move one switching time by a few steps; for both axes, one of the first axis."""
         errors = plans.errors[i, ANGLE, self._some_axes()]
-        switches = np.flatnonzero(np.diff(np.sign(errors[0, : self._last_step(plans, i) + 1])))
-        if switches.size:
-            at = int(self._random.choice(switches))
-            by = int(self._random.integers(1, 5))
-            if self._random.random() < 0.5:
-                errors[:, at + 1 : at + 1 + by] *= -1.0
-            else:
-                errors[:, max(0, at + 1 - by) : at + 1] *= -1.0
+        signs = np.sign(errors[0, : self._last_step(plans, i) + 1])
+        switches = np.flatnonzero(np.diff(signs))
+        if not switches.size:
+            return
+        begin = int(self._random.choice(switches)) + 1
+        by = int(self._random.integers(1, 5))
+        if self._random.random() < 0.5:
+            errors[:, begin : begin + by] *= -1.0
+        else:
+            errors[:, max(0, begin - by) : begin] *= -1.0
 
     def _give_block(self, plans: Plans, i: int) -> None:
         """Set the errors of a block."""
@@ -317,26 +335,23 @@ class Planner:
     def _move_error(self, plans: Plans, i: int) -> None:
         """Change the size of the errors of a block."""
         errors = plans.errors[i, ..., self._span(plans, i)]
-        by = self._random.normal(
-            0.0, 10.0 ** self._random.uniform(-2.0, 0.0), (len(self.sensors), self._axes, 1)
-        )
+        deviation = 10.0 ** self._random.uniform(-2.0, 0.0)
+        by = self._random.normal(0.0, deviation, (len(self.sensors), self._axes, 1))
         errors[:] = np.clip(errors + by, -1.0, 1.0)
 
     def _move_start(self, plans: Plans, i: int) -> None:
         """Move the start in some coordinates or in all, or set some coordinates to an end."""
         width = self._upper - self._lower
         which = self._random.random(len(width)) < self._random.choice([0.25, 1.0])
-        moved = plans.start[i] + width * 10.0 ** self._random.uniform(
-            -5.0, -0.5
-        ) * self._random.normal(size=len(width))
+        size = 10.0 ** self._random.uniform(-5.0, -0.5)
+        moved = plans.start[i] + width * size * self._random.normal(size=len(width))
         if self._random.random() < 0.1:
             moved = np.where(self._random.random(len(width)) < 0.5, self._lower, self._upper)
         plans.start[i] = np.clip(np.where(which, moved, plans.start[i]), self._lower, self._upper)
 
     def _turn_target(self, plans: Plans, i: int) -> None:
-        """Give the target's acceleration another sign in a block, or from a step on, along one axis
-        or both.
-        """
+        """Change the sign of the target's acceleration in a block, or from a step on."""
         span = self._span(plans, i)
-        span = slice(span.start, span.stop if self._random.random() < 0.5 else None)
+        if self._random.random() >= 0.5:
+            span = slice(span.start, None)
         plans.sides[i, self._some_axes(), span] = self._random.choice([-1.0, 1.0])

@@ -7,14 +7,14 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from infoset.guidance import Strategy
 from infoset.guidance.noise import NoiseSource
-from infoset.limits import COUNT, WHOLE, Limits
+from infoset.limits import COUNT, WHOLE, Limits, shown
 from infoset.sim.parallel import CampaignNoise, Task, simulate_tasks
 from infoset.sim.requirement import AnyRequirement
 from infoset.sim.scenario import Scenario, noise_name, strategy_name
@@ -25,9 +25,47 @@ from infoset.sim.undecided_cells import UndecidedCells
 from infoset.sim.versions import versions
 
 FEWEST_CHUNKS = 256
+"""Minimum number of chunks of a large campaign: a hundred workers have a few each, and a killed
+process loses less than 1 % of the runs.
+"""
 MAX_CHUNK = 4096
+"""Maximum number of engagements per chunk, about 0.5 MB as a file: a campaign of a million runs has
+some 250 files, and a chunk takes seconds to a minute. Chosen; results do not depend on it.
+"""
 FEWEST_A_CELL = 50
-"""Minimum number of engagements per chunk of a sweep."""
+"""Minimum number of engagements per chunk of a sweep. Chosen; for fewer, writing a file takes a
+part of the time of its runs that cannot be neglected.
+"""
+
+
+@dataclass(frozen=True)
+class RunsUntil:
+    """Runs of a campaign, or of each cell of a sweep, until a rule is met or a requirement decided.
+
+    The rule is checked for each noise at the ends of chunks.
+
+    Parameters
+    ----------
+    rule : StoppingRule, Requirement or HitRequirement
+        Rule that stops the campaign or the cell.
+    max_runs, min_runs : int
+        Maximum and minimum number of runs, of each cell in a sweep.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the rule is of another type, or a number is out of its range.
+    """
+
+    rule: StoppingRule | AnyRequirement
+    max_runs: int
+    min_runs: int = 1
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.rule, StoppingRule | AnyRequirement):
+            raise TypeError(f"rule must be a StoppingRule or a requirement: got {shown(self.rule)}")
+        COUNT.need("min_runs", self.min_runs)
+        Limits(minimum=self.min_runs, whole=True).need("max_runs", self.max_runs)
 
 
 @dataclass(frozen=True)
@@ -38,13 +76,13 @@ class Campaign:
 
     Parameters
     ----------
-    runs : int
-        Number of runs, from run 0; with `until` the maximum number.
+    runs : int or RunsUntil
+        Number of runs, of each cell in a sweep, from run 0; or a rule with a maximum number.
     seed : int
         Run K is the same engagement in every campaign and experiment with this seed.
     noise : CampaignNoise, NoiseSource or None
-        Measurement noise, or one of your own, whose attribute `version` is in the manifest like
-        that of a strategy; None is the scenario's.
+        Measurement noise, or one of your own, whose attribute `version` is in the manifest; None is
+        the scenario's.
     strategy : Strategy or None
         A strategy of your own; None is the scenario's. The manifest contains its attribute
         `version`, or its name without this attribute; a campaign cannot be resumed with another
@@ -55,18 +93,13 @@ class Campaign:
     chunk : int or None
         Engagements per file; results do not depend on it. None chooses a value for the number of
         runs.
-    until : StoppingRule, Requirement, HitRequirement or None
-        A campaign, or a cell of a sweep, stops at the end of a chunk once this rule is met or this
-        requirement is decided for each noise.
     axes : tuple of Axis
         Keys and values that a sweep varies, as in a scenario file; stored as a description.
     cells : tuple of Scenario
         Scenarios of a sweep, one for each combination of the values; the last axis varies fastest.
-    max_runs : int or None
-        Maximum number of runs of a cell with a requirement in `until`; `runs` is then the minimum.
-        None is `runs`.
     require : Requirement, HitRequirement or None
-        Requirement of a sweep for its reports; stored as a description. None is that of `until`.
+        Requirement of a sweep for its reports; stored as a description. None is the requirement in
+        `runs`, if there is one.
 
     Raises
     ------
@@ -76,39 +109,36 @@ class Campaign:
     """
 
     scenario: Scenario
-    runs: int
+    runs: int | RunsUntil
     folder: str | Path
     seed: int = 0
     noise: CampaignNoise | NoiseSource | None = None
     strategy: Strategy | None = None
     guarantee: bool = True
     chunk: int | None = None
-    until: StoppingRule | AnyRequirement | None = None
     axes: tuple[Axis, ...] = ()
     cells: tuple[Scenario, ...] = ()
-    max_runs: int | None = None
     require: AnyRequirement | None = None
 
     def __post_init__(self) -> None:
-        for name, limits in (("runs", COUNT), ("seed", WHOLE), ("chunk", COUNT)):
-            if name != "chunk" or self.chunk is not None:
-                limits.need(name, getattr(self, name))
-        if self._own_noise is not None and not (
-            hasattr(self.noise, "measure") or callable(self.noise)
-        ):
+        if not isinstance(self.runs, RunsUntil):
+            COUNT.need("runs", self.runs)
+        WHOLE.need("seed", self.seed)
+        if self.chunk is not None:
+            COUNT.need("chunk", self.chunk)
+
+        own = self._own_noise
+        if own is not None and not (hasattr(own, "measure") or callable(own)):
             raise TypeError(
-                "noise must be None, a CampaignNoise, or have the method measure: got "
-                f"{self.noise!r}"
+                f"noise must be None, a CampaignNoise, or have the method measure: got {own!r}"
             )
-        if len(self.cells) != (
-            math.prod(len(axis.values) for axis in self.axes) if self.axes else 0
-        ):
+
+        combinations = math.prod(len(axis.values) for axis in self.axes) if self.axes else 0
+        if len(self.cells) != combinations:
             raise ValueError(
                 "a sweep needs at least one axis, and a scenario for each combination of their "
                 "values"
             )
-        if self.max_runs is not None:
-            Limits(minimum=self.runs, whole=True).need("max_runs", self.max_runs)
 
     def run(
         self,
@@ -133,8 +163,8 @@ class Campaign:
             Whether the folder may contain this campaign already. The number of runs may be greater
             than before.
         progress : callable or None
-            Called after each chunk with the fraction done, from 0 to 1; with `until`, of the
-            maximum number of runs.
+            Called after each chunk with the fraction done, from 0 to 1, of the maximum number of
+            runs.
         within_chunks : bool
             Whether threads call `progress` after each step of a chunk, too.
 
@@ -154,54 +184,57 @@ class Campaign:
             If results are not finite.
         """
         with CampaignFolder.begin(Path(self.folder), self.manifest(), resume=resume) as folder:
-            within = within_chunks and executor is None
-            self._simulate_missing(folder, executor, workers, progress, within)
+            known = None
+            if progress is not None:
+                known = _Progress(progress, folder, within_chunks and executor is None)
+            self._simulate_missing(folder, executor, workers, known)
         return folder
 
     def manifest(self) -> Manifest:
         """Return the manifest of the campaign; a resumed campaign keeps the size of its chunks."""
         noise = self._noise
-        own = self._own_noise
-        chunk = self.chunk
-        if chunk is None:
-            folder = Path(self.folder)
-            chunk = (
-                read_manifest(folder).chunk
-                if (folder / MANIFEST).is_file()
-                else self._default_chunk()
-            )
-        required = (
-            self.until
-            if self.require is None and isinstance(self.until, AnyRequirement)
-            else self.require
-        )
+        own_noise = None
+        if self._own_noise is not None:
+            own_noise = getattr(self._own_noise, "version", None) or noise_name(self._own_noise)
+        version = getattr(self.strategy, "version", None)
         hashes = ",".join(fingerprint(noise.applied_to(cell)) for cell in self.cells)
+
+        rule = None if self._until is None else self._until.rule
+        required = self.require
+        if required is None and isinstance(rule, AnyRequirement):
+            required = rule
         return Manifest(
             scenario=noise.applied_to(self.scenario),
-            runs=self.cell_runs,
-            chunk=chunk,
+            runs=self._max_runs,
+            chunk=self._chunk_size(),
             seed=self.seed,
             noise=noise,
-            own_noise=None if own is None else getattr(own, "version", None) or noise_name(own),
-            strategy=getattr(self.strategy, "version", None)
-            or strategy_name(self.scenario, self.strategy),
+            own_noise=own_noise,
+            strategy=version or strategy_name(self.scenario, self.strategy),
             guarantee=self.guarantee,
             versions=versions(),
             axes=self.axes,
             cells_hash=hashlib.sha256(hashes.encode()).hexdigest()[:32] if self.cells else "",
-            until=None if self.until is None else str(self.until),
+            until=None if rule is None else str(rule),
             require=None if required is None else str(required),
         )
 
     @property
-    def engagements(self) -> int:
-        """Engagements of all cells, at most."""
-        return self.cell_runs * max(1, len(self.cells))
+    def max_engagements(self) -> int:
+        """Maximum number of engagements of all cells."""
+        return self._max_runs * max(1, len(self.cells))
 
     @property
-    def cell_runs(self) -> int:
-        """Maximum number of runs of a cell."""
-        return self.runs if self.max_runs is None else self.max_runs
+    def _until(self) -> RunsUntil | None:
+        return self.runs if isinstance(self.runs, RunsUntil) else None
+
+    @property
+    def _max_runs(self) -> int:
+        return self.runs.max_runs if isinstance(self.runs, RunsUntil) else self.runs
+
+    @property
+    def _min_runs(self) -> int:
+        return self.runs.min_runs if isinstance(self.runs, RunsUntil) else self.runs
 
     @property
     def _noise(self) -> CampaignNoise:
@@ -213,57 +246,85 @@ class Campaign:
     def _own_noise(self) -> NoiseSource | None:
         return None if isinstance(self.noise, CampaignNoise) else self.noise
 
+    def _chunk_size(self) -> int:
+        """Return the engagements per file: given, as in the folder, or the default."""
+        if self.chunk is not None:
+            return self.chunk
+        folder = Path(self.folder)
+        if (folder / MANIFEST).is_file():
+            return read_manifest(folder).chunk
+        return self._default_chunk()
+
     def _default_chunk(self) -> int:
         """Return the engagements per file: one or more batches of the engine.
 
         Small chunks limit the work that is lost if a process stops. Large chunks limit the number
         of files. Chunks of a sweep are not larger than a cell, because cells may be extended later.
         """
-        batches = -(-self.cell_runs // (FEWEST_CHUNKS * ENGAGEMENTS_AT_ONCE))
+        batches = -(-self._max_runs // (FEWEST_CHUNKS * ENGAGEMENTS_AT_ONCE))
         size = max(1, min(batches, MAX_CHUNK // ENGAGEMENTS_AT_ONCE)) * ENGAGEMENTS_AT_ONCE
-        return min(size, max(self.runs, FEWEST_A_CELL)) if self.axes else size
+        return min(size, max(self._min_runs, FEWEST_A_CELL)) if self.axes else size
 
     def _simulate_missing(
         self,
         folder: CampaignFolder,
         executor: Executor | None,
         workers: int | None,
-        progress: Callable[[float], None] | None,
-        within_chunks: bool,
+        progress: _Progress | None,
     ) -> None:
-        done = folder.finished_runs
-        total = folder.wanted_runs
-        is_stopped = bool(folder.manifest.cell_runs)
-        cells = (
-            None
-            if self.until is None or is_stopped
-            else UndecidedCells(folder, self.until, self.runs)
-        )
+        cells = None
+        store = folder.write
+        missing: Iterator[tuple[int, range]]
         missing = (chunk for chunk in folder.manifest.chunks() if not folder.has(*chunk))
-        running: dict[tuple[int, int], float] = {}
+        is_stopped = bool(folder.manifest.cell_runs)
+        if self._until is not None and not is_stopped:
+            cells = UndecidedCells(folder, self._until.rule, self._until.min_runs)
+            store = cells.store
+            missing = cells.missing()
 
-        def task_of(cell: int, runs: range) -> Task:
-            scenario = (self.cells or (self.scenario,))[cell]
-            noise = self._own_noise or self._noise
-            task = Task(scenario, runs, self.seed, noise, self.guarantee, self.strategy, cell)
-            if progress is None or not within_chunks:
-                return task
-
-            def report(share: float) -> None:
-                running[cell, runs.start] = share * len(runs)
-                progress(min(1.0, (done + sum([*running.values()])) / total))
-
-            return replace(task, progress=report)
-
-        tasks = (
-            task_of(cell, runs) for cell, runs in (missing if cells is None else cells.missing())
-        )
+        tasks = (self._task(cell, runs, progress) for cell, runs in missing)
         with contextlib.closing(simulate_tasks(tasks, executor, workers)) as finished:
             for task, results in finished:
-                (folder.write if cells is None else cells.store)(task.cell, task.runs, results)
-                done += len(task.runs)
-                running.pop((task.cell, task.runs[0]), None)
+                store(task.cell, task.runs, results)
                 if progress is not None:
-                    progress(done / total)
+                    progress.finish(task.cell, task.runs)
         if cells is not None and cells.runs:
             folder.stop(cells.runs)
+
+    def _task(self, cell: int, runs: range, progress: _Progress | None) -> Task:
+        scenario = self.cells[cell] if self.cells else self.scenario
+        noise = self._own_noise or self._noise
+        task = Task(scenario, runs, self.seed, noise, self.guarantee, self.strategy, cell)
+        if progress is None or not progress.within_chunks:
+            return task
+        return replace(task, progress=progress.of_chunk(cell, runs))
+
+
+class _Progress:
+    """Fraction of the runs that is done, reported after each chunk and within the running ones."""
+
+    def __init__(
+        self, report: Callable[[float], None], folder: CampaignFolder, within_chunks: bool
+    ) -> None:
+        self.within_chunks = within_chunks
+        self._report = report
+        self._done = folder.finished_runs
+        self._total = folder.wanted_runs
+        self._running: dict[tuple[int, int], float] = {}
+
+    def of_chunk(self, cell: int, runs: range) -> Callable[[float], None]:
+        """Return the function that reports the fraction of a chunk, from any thread."""
+
+        def report(share: float) -> None:
+            self._running[cell, runs.start] = share * len(runs)
+            # A list, because other threads change the dictionary.
+            running = sum([*self._running.values()])
+            self._report(min(1.0, (self._done + running) / self._total))
+
+        return report
+
+    def finish(self, cell: int, runs: Sequence[int]) -> None:
+        """Report that a chunk is stored."""
+        self._done += len(runs)
+        self._running.pop((cell, runs[0]), None)
+        self._report(self._done / self._total)

@@ -1,6 +1,4 @@
-"""Columns of results: each is declared once, at its field, and every file format reads the
-declaration.
-"""
+"""Columns of results, each declared at its field; every file format reads the declaration."""
 
 from __future__ import annotations
 
@@ -60,48 +58,45 @@ class Column:
 
 
 def columns(*declared: Column) -> dict[str, tuple[Column, ...]]:
-    """Return the metadata of a dataclass field that holds these columns, one for each component."""
+    """Return the metadata of a dataclass field with these columns, one for each component."""
     return {"columns": declared}
 
 
 @cache
 def columns_of(owner: Any) -> tuple[Column, ...]:
     """Return the columns that a dataclass declares, in the order of its fields."""
-    return tuple(
-        replace(
-            column,
-            field=field.name,
-            component=index - len(declared) if len(declared) > 1 else None,
-            derived=not field.init,
-        )
-        for field in fields(owner)
-        for declared in [field.metadata.get("columns", ())]
-        for index, column in enumerate(declared)
-    )
+    found = []
+    for field in fields(owner):
+        declared: tuple[Column, ...] = field.metadata.get("columns", ())
+        for index, column in enumerate(declared):
+            # From the end: in a plane, the first of several components is missing.
+            component = index - len(declared) if len(declared) > 1 else None
+            found.append(
+                replace(column, field=field.name, component=component, derived=not field.init)
+            )
+    return tuple(found)
 
 
 def columns_with_values(owner: Any) -> tuple[Column, ...]:
-    """Return the columns of `columns_of` without the optional ones that are unknown in all runs."""
-    return tuple(
-        column
-        for column in columns_of(owner.__class__)
-        if not column.optional or any(value is not None for value in values_of(owner, column))
-    )
+    """Return the columns without the optional ones that are unknown in all runs."""
+
+    def is_known(column: Column) -> bool:
+        return any(value is not None for value in values_of(owner, column))
+
+    declared = columns_of(owner.__class__)
+    return tuple(column for column in declared if not column.optional or is_known(column))
 
 
 def values_of(owner: object, column: Column) -> list[Any]:
-    """Return one column as plain Python values, one per run: texts for an enumeration, None if
-    unknown.
-    """
+    """Return one column as plain Python values, one per run; None is unknown."""
     values: Any = getattr(owner, column.field)
     if values is None:
         return [None] * len(cast("Any", owner))
     if isinstance(values, tuple):
         return [None if value is None else value.value for value in values]
     if column.component is not None:
-        if (
-            -column.component > values.shape[1]
-        ):  # in a plane nothing is along y, and there is no B-plane
+        # In a plane nothing is along y, and there is no B-plane.
+        if -column.component > values.shape[1]:
             return [None] * len(values)
         values = values[:, column.component]
     plain: list[Any] = values.tolist()
@@ -111,30 +106,19 @@ def values_of(owner: object, column: Column) -> list[Any]:
 def fields_of(owner: Any, table: Mapping[str, Sequence[Cell]]) -> dict[str, Any]:
     """Return the arguments of a dataclass from its columns by name: the inverse of `values_of`.
 
-    Optional columns may be missing. `ValueError` if another column is missing or unknown, if the
-    columns differ in length, or if a value is not of the column's kind.
+    Optional columns may be missing. A ValueError is raised if another column is missing or unknown,
+    if the columns differ in length, or if a value is not of the column's kind.
     """
-    declared = {column.name: column for column in columns_of(owner)}
-    unknown = [name for name in table if name not in declared]
-    if unknown:
-        raise ValueError(f"column {unknown[0]!r} is not known")
-    missing = [
-        name for name, column in declared.items() if name not in table and not column.optional
-    ]
-    if missing:
-        raise ValueError(f"column {missing[0]!r} is missing")
-    if not all(isinstance(cells, list) for cells in table.values()):
-        raise ValueError("a column is no list")
-    if len({len(cells) for cells in table.values()}) != 1:
-        raise ValueError("its columns differ in length")
-
+    declared = columns_of(owner)
+    _check_table(table, declared)
     arguments: dict[str, Any] = {}
-    for column in declared.values():
+    for column in declared:
         if column.derived:
             continue
         if column.name not in table:
             arguments.setdefault(column.field, None)
             continue
+
         values = _array_of(column, table[column.name])
         if column.component is None:
             arguments[column.field] = values
@@ -145,9 +129,27 @@ def fields_of(owner: Any, table: Mapping[str, Sequence[Cell]]) -> dict[str, Any]
     return arguments
 
 
+def _check_table(table: Mapping[str, Sequence[Cell]], declared: Sequence[Column]) -> None:
+    """Raise ValueError unless a table has the declared columns, as lists of equal length."""
+    names = [column.name for column in declared]
+    unknown = [name for name in table if name not in names]
+    if unknown:
+        raise ValueError(f"column {unknown[0]!r} is not known")
+    missing = [
+        column.name for column in declared if column.name not in table and not column.optional
+    ]
+    if missing:
+        raise ValueError(f"column {missing[0]!r} is missing")
+    if not all(isinstance(cells, list) for cells in table.values()):
+        raise ValueError("a column is no list")
+    if len({len(cells) for cells in table.values()}) != 1:
+        raise ValueError("its columns differ in length")
+
+
 def _array_of(column: Column, cells: Sequence[Cell]) -> Any:
-    """Return the values of a column: a tuple of members of an enumeration, or an array, masked if
-    it is nullable.
+    """Return the values of a column: a tuple of enumeration members, or an array.
+
+    The array of a nullable column is masked.
     """
     is_known = np.array([cell is not None for cell in cells], dtype=bool)
     if not column.nullable and not is_known.all():
@@ -184,30 +186,29 @@ def csv_text(names: Sequence[str], rows: Sequence[Sequence[Cell]]) -> str:
 
 
 def documented(owner: type[_Owner]) -> type[_Owner]:
-    """Complete the docstring of a dataclass, which ends with its parameters, by the fields that
-    declare columns.
-    """
+    """Add the fields that declare columns to a docstring, which must end with its parameters."""
     parameters: list[str] = []
     attributes = ["", "Attributes", "----------"]
     for field in fields(cast("Any", owner)):
         declared: tuple[Column, ...] = field.metadata.get("columns", ())
         if declared:
-            last = declared[-1]
-            array = (
-                "tuple"
-                if issubclass(last.kind, Enum)
-                else "masked array"
-                if last.nullable
-                else "ndarray"
-            )
-            fewest = sum(not column.optional for column in declared)
-            shape = "(B,)" if len(declared) == 1 else f"(B, {fewest} or {len(declared)})"
-            meaning = "; ".join(column.meaning for column in declared)
-            unit = f" Unit: {last.unit}." if last.unit else ""
             lines = parameters if field.init else attributes
-            lines += [
-                f"{field.name} : {array} of {last.kind.__name__}, shape {shape}",
-                f"    {meaning}.{unit}",
-            ]
+            lines += _described(field.name, declared)
     owner.__doc__ = "\n".join([inspect.getdoc(owner) or "", *parameters, *attributes])
     return owner
+
+
+def _described(name: str, declared: Sequence[Column]) -> list[str]:
+    """Return the lines of a field with columns in a docstring."""
+    last = declared[-1]
+    array = "masked array" if last.nullable else "ndarray"
+    if issubclass(last.kind, Enum):
+        array = "tuple"
+    fewest = sum(not column.optional for column in declared)
+    shape = "(B,)" if len(declared) == 1 else f"(B, {fewest} or {len(declared)})"
+    meaning = "; ".join(column.meaning for column in declared)
+    unit = f" Unit: {last.unit}." if last.unit else ""
+    return [
+        f"{name} : {array} of {last.kind.__name__}, shape {shape}",
+        f"    {meaning}.{unit}",
+    ]

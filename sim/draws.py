@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,10 +16,20 @@ from infoset.sim.gravity import max_impulses_m_s, with_gravity
 from infoset.sim.scenario import Scenario, corners
 
 START, TIE, EXECUTION, TARGET, POINTING, BIAS, IMAGES = 0, 3, 5, 6, 7, 8, 9
-"""Streams of a run; each kind of sensor has its own as well (`Sensor.stream`)."""
+"""Streams of a run; each kind of sensor has a separate one (`Sensor.stream`). Their numbers are
+never changed or used again: runs of a seed would change.
+"""
 Y = 16
-"""Difference between the streams of the y axis and those of the z axis, which are also those of a
-plane.
+"""Offset of the streams of the y axis, greater than all streams of the z axis. In a plane the
+streams of the z axis are used.
+"""
+MIN_SLOWDOWN = 1.01
+"""Minimum factor of the time of a flight at the lowest closing speed. Chosen; a flight ends at its
+arrival, so results do not depend on it.
+"""
+MAX_SPEED_CHANGE = 0.75
+"""Maximum share of the closing speed that gravity can take away in the time of a flight. Chosen; it
+limits the memory of the random numbers to four times the memory in free space.
 """
 
 
@@ -43,8 +54,8 @@ class Draws:
         Constant errors of the centroid of a camera in units of their bound; None for a camera with
         random errors.
     images : ndarray, shape (B, steps), or None
-        Uniform in [0, 1); an image is lost if its number is less than the probability of that. None
-        loses no image.
+        Uniform in [0, 1); an image is lost if its number is less than the probability of a loss.
+        None loses no image.
     redraws : ndarray of int, shape (B,), or None
         Normal starts outside the dispersion that were drawn again; None for uniform starts.
     """
@@ -66,13 +77,19 @@ class Draws:
         return int(self.tie.shape[-1])
 
 
+class Starts(NamedTuple):
+    """Initial states of runs, as in `Draws`."""
+
+    position_m: Floats
+    velocity_m_s: Floats
+    redraws: Integers | None
+
+
 def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
-    """Return the random numbers of some runs; run k has the same numbers in every call with the
-    same seed.
-    """
+    """Return the random numbers of some runs, which depend on the seed and the run only."""
     steps = max_number_of_steps(scenario)
     axes = scenario.set_model.axes
-    position_m, velocity_m_s, redraws = draw_starts(scenario, runs, seed)
+    starts = draw_starts(scenario, runs, seed)
 
     def uniform(stream: int, size: int = steps) -> Floats:
         return np.stack(
@@ -82,67 +99,65 @@ def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
     def lateral(stream: int, size: int = steps) -> Floats:
         return np.stack([uniform(stream + Y * (axis == "y"), size) for axis in axes])
 
-    nothing = np.broadcast_to(0.0, (len(axes), len(runs), steps))
-    errors = {
-        name: (lateral if sensor.is_lateral else uniform)(sensor.stream)
-        for name, sensor in scenario.sensors.items()
-    }
+    # Numbers that a scenario does not use are not drawn: they take time and memory.
+    errors = {}
+    for name, sensor in scenario.sensors.items():
+        drawn = lateral if sensor.is_lateral else uniform
+        errors[name] = drawn(sensor.stream)
+    tie = np.broadcast_to(0.0, (len(axes), len(runs), steps))
+    if scenario.noise is NoiseKind.GAME and scenario.tie is TieRule.RANDOM:
+        tie = lateral(TIE)
+    thruster = scenario.thruster
     camera = scenario.set_model.angle_sensor
-    bias = lateral(BIAS, 1)[..., 0] if camera.has_constant_bias else None
+    images = None
+    if camera.miss_probability > 0.0:
+        images = np.stack([generator(seed, run, IMAGES).uniform(size=steps) for run in runs])
     return Draws(
-        position_m,
-        velocity_m_s,
+        starts.position_m,
+        starts.velocity_m_s,
         errors,
-        tie=lateral(TIE)
-        if scenario.noise is NoiseKind.GAME and scenario.tie is TieRule.RANDOM
-        else nothing,
-        execution=uniform(EXECUTION) if scenario.thruster.execution_error_relative > 0.0 else None,
+        tie=tie,
+        execution=uniform(EXECUTION) if thruster.execution_error_relative > 0.0 else None,
         target=lateral(TARGET) if scenario.target is not None else None,
-        pointing=uniform(POINTING) if scenario.thruster.pointing_error_rad > 0.0 else None,
-        bias=bias,
-        images=(
-            np.stack([generator(seed, run, IMAGES).uniform(size=steps) for run in runs])
-            if camera.miss_probability > 0.0
-            else None
-        ),
-        redraws=redraws,
+        pointing=uniform(POINTING) if thruster.pointing_error_rad > 0.0 else None,
+        bias=lateral(BIAS, 1)[..., 0] if camera.has_constant_bias else None,
+        images=images,
+        redraws=starts.redraws,
     )
 
 
-def draw_starts(
-    scenario: Scenario, runs: Sequence[int], seed: int
-) -> tuple[Floats, Floats, Integers | None]:
-    """Return `position_m`, `velocity_m_s` and `redraws` of the `Draws` of some runs."""
+def draw_starts(scenario: Scenario, runs: Sequence[int], seed: int) -> Starts:
+    """Return the initial states of some runs."""
     lower, upper = corners(scenario.dispersion)
     redraws = None
     if scenario.covariance is None:
-        starts = np.stack([generator(seed, run, START).uniform(size=4) for run in runs])
+        uniform = np.stack([generator(seed, run, START).uniform(size=4) for run in runs])
         if scenario.is_spatial:
             along_y = np.stack([generator(seed, run, START + Y).uniform(size=2) for run in runs])
-            starts = np.insert(starts, [0, 2], along_y, axis=1)
-        starts = lower + (upper - lower) * starts
+            uniform = np.insert(uniform, [0, 2], along_y, axis=1)
+        starts = lower + (upper - lower) * uniform
     else:
-        of_run = [
+        drawn = [
             _normal_start(lower, upper, scenario.covariance, generator(seed, run, START))
             for run in runs
         ]
-        starts = np.stack([start for start, _ in of_run])
-        redraws = np.array([count for _, count in of_run])
+        starts = np.stack([start for start, _ in drawn])
+        redraws = np.array([count for _, count in drawn])
     position_m, velocity_m_s = np.split(starts, 2, axis=1)
-    return position_m, velocity_m_s, redraws
+    return Starts(position_m, velocity_m_s, redraws)
 
 
 def _normal_start(
     lower: Floats, upper: Floats, covariance: Covariance, random: np.random.Generator
 ) -> tuple[Floats, int]:
-    """Return a normal start around the middle of a box that is within it, and how many starts
-    before it were not.
+    """Return a normal start around the middle of a box, and how many starts before it were outside.
+
+    A start outside the box is drawn again.
     """
     redraws = 0
     while True:
-        start = 0.5 * (lower + upper) + (
-            covariance.root * random.standard_normal(covariance.size)
-        ).sum(axis=1)
+        normal = random.standard_normal(covariance.size)
+        start = 0.5 * (lower + upper) + (covariance.root * normal).sum(axis=1)
         if ((lower <= start) & (start <= upper)).all():
             return start, redraws
         redraws += 1
@@ -156,8 +171,7 @@ def generator(seed: int, run: int, stream: int) -> np.random.Generator:
 
 
 def max_number_of_steps(scenario: Scenario) -> int:
-    """Return the number of steps after which every start of the dispersion has passed its closest
-    approach.
+    """Return a number of steps after which every start has passed its closest approach.
 
     The time at the lowest closing speed is increased by the share of it that gravity can take away,
     at least by 1 %.
@@ -166,5 +180,6 @@ def max_number_of_steps(scenario: Scenario) -> int:
     slowest = -box.vx_m_s[1]
     model = scenario.set_model
     model = with_gravity(model, scenario.sun, max_impulses_m_s(model, scenario.thruster))
-    longer = max(1.01, 1.0 / (1.0 - min(model.gravity_speed_change, 0.75)))
+    speed_change = min(model.gravity_speed_change, MAX_SPEED_CHANGE)
+    longer = max(MIN_SLOWDOWN, 1.0 / (1.0 - speed_change))
     return math.ceil(longer * box.x_m[1] / (slowest * model.step_s)) + 2

@@ -13,6 +13,9 @@ from infoset.sim.flight_bounds import flight_bounds, greater_of_neighbours, no_b
 from infoset.sim.scenario import Scenario, Sun
 
 MIN_SPEED_CHANGE = 1e-8
+"""Minimum bound of the relative change of the closing speed (docs/guarantee.md, after Lemma 2):
+above the change by gravity in the 1997 scenario, and far above rounding errors.
+"""
 
 
 def on_board_model(scenario: Scenario) -> SetModel:
@@ -27,9 +30,7 @@ def on_board_model(scenario: Scenario) -> SetModel:
 
 
 def max_impulses_m_s(model: SetModel, thruster: Thruster) -> float:
-    """Return the maximum sum of a flight's impulses, m/s: the budget, or the maximum impulse at
-    every step.
-    """
+    """Return the maximum sum of a flight's impulses, m/s: the budget, or one in every step."""
     steps = model.bounds.x_m[1] / (-model.bounds.vx_m_s[1] * model.step_s) + 1.0
     most = min(thruster.budget_m_s, thruster.max_impulse_m_s * steps)
     return most * (1.0 + thruster.execution_error_relative)
@@ -61,6 +62,7 @@ def with_gravity(model: SetModel, sun: Sun | None, impulses_m_s: float) -> SetMo
         return replace(
             model, gravity_m_s2=0.0, gravity_y_m_s2=None, gravity_speed_change=MIN_SPEED_CHANGE
         )
+
     disturbances = tuple(model.axis(name).disturbance_m_s2 for name in model.axes)
     flight = flight_bounds(model.bounds, disturbances, sun, impulses_m_s)
     gradient = sun.gravitational_parameter_m3_s2 / flight.nearest_m**3
@@ -69,6 +71,7 @@ def with_gravity(model: SetModel, sun: Sun | None, impulses_m_s: float) -> SetMo
     jerk = (
         2.0 * gradient * (flight.speed_m_s + 3.0 * distance * flight.fastest_m_s / flight.nearest_m)
     )
+
     m = flight.closing_speed_m_s
     later_pull = _max_later(pull)
     later_jerk = _max_later(jerk)
@@ -79,10 +82,10 @@ def with_gravity(model: SetModel, sun: Sun | None, impulses_m_s: float) -> SetMo
         later_pull / m * velocity + (0.5 * (later_pull / m) ** 2 + later_jerk / (3.0 * m)) * offset
     )
     *along_y, along_z = (_max(each) for each in tide + scale)
-    # All that gravity has changed until the end of each step.
-    changes = (
-        np.cumsum(greater_of_neighbours(pull)) * flight.times_s[1] / min(m, model.closing_speed_m_s)
-    )
+
+    # Change of the closing speed until the end of each step.
+    slowest_m_s = min(m, model.closing_speed_m_s)
+    changes = np.cumsum(greater_of_neighbours(pull)) * flight.times_s[1] / slowest_m_s
     allowed = 1.0 - replace(model, gravity_speed_change=0.0).speed_error
     if model.is_guaranteed and changes[-1] >= allowed > 0.0:
         cause = (
@@ -90,6 +93,7 @@ def with_gravity(model: SetModel, sun: Sun | None, impulses_m_s: float) -> SetMo
             "model allows,"
         )
         raise no_bound(cause, distance[np.argmax(changes >= allowed)])
+
     return replace(
         model,
         gravity_m_s2=along_z,

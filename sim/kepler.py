@@ -1,6 +1,4 @@
-"""True motion: heliocentric two-body motion of spacecraft and object, as relative motion of a
-batch.
-"""
+"""True motion: relative motion of a batch of spacecraft and objects, both around the Sun."""
 
 from __future__ import annotations
 
@@ -14,19 +12,27 @@ from infoset.arrays import Flags, Floats
 from infoset.sim.scenario import Sun
 
 POSITION_ERROR_M = 1e-5
-"""Error of the position at arrival for which the length of a leap is chosen, m. The leap of a step
-is shorter than the step only where gravity is strong."""
+"""Error of the position at arrival for which the length of a leap is chosen, m: a hundredth of the
+error that the class promises, because the bound is an order of magnitude only. A leap is shorter
+than a step only where gravity is strong.
+"""
 SHORTEST_LEAP = 1e-6
 """Minimum length of a leap in units of the step. Only a fall into the attracting body needs shorter
 ones.
 """
 NEWTON_STEPS = 8
+"""Maximum number of Newton's steps: from a first error of 1 % the error is squared in each, and
+three steps reach rounding errors. Bisection follows where they do not converge.
+"""
 CONVERGED = 1e-9
 """Error of the time of a closest approach that Newton's method may leave, as a share of the leap.
 It changes the distance by at most this share of the way of a leap, which is below a millimetre for
-ways up to 1000 km."""
+ways up to 1000 km.
+"""
 HALVINGS = 60
 """Number of halvings of a leap that leave less than the rounding error of its length."""
+ARRIVAL_ROUNDING = 1e-16
+"""Relative error of the time of arrival at which Newton's method stops: below rounding errors."""
 X = -1
 """Axis x of a motion, after the lateral axes: z in a plane, y and z in space."""
 RELATIVE, SPACECRAFT = 0, 1
@@ -36,8 +42,9 @@ POSITION, VELOCITY, ACCELERATION, LOST = range(4)
 
 @dataclass(frozen=True)
 class Sight:
-    """True geometry of B engagements; arrays have the shape (C, B), for the plane of x and each
-    lateral axis.
+    """True geometry of B engagements, in the planes of x and each of C lateral axes.
+
+    Arrays have the shape (C, B).
 
     Parameters
     ----------
@@ -67,8 +74,8 @@ class Passage:
         Whether the object recedes after the step, or after a part of it. Elsewhere the distance is
         infinite and the others are zero.
     min_distance_m : ndarray
-        Minimum distance since the start, m. It is that at the start if the object recedes from
-        there on.
+        Minimum distance since the start, m: the distance at the start if the object recedes from
+        then on.
     arrival_s : ndarray
         Time from the beginning of the step to x = 0.
     lateral_m : ndarray, shape (C, B)
@@ -82,8 +89,7 @@ class Passage:
 
 
 class KeplerMotion:
-    """Motion of the object relative to the spacecraft, both in the Sun's gravity, or in free space
-    without a `sun`.
+    """Motion of the object relative to the spacecraft, in the Sun's gravity or in free space.
 
     `position_m` and `velocity_m_s` are the relative position and velocity at t = 0, shape (B, C +
     1), along the lateral axes, z in a plane, y and z in space, and x. The spacecraft's orbit gives
@@ -101,7 +107,7 @@ class KeplerMotion:
 
     def __init__(self, position_m: Floats, velocity_m_s: Floats, sun: Sun | None) -> None:
         batch, axes = position_m.shape
-        # For each engagement and axis the relative motion and that of the spacecraft.
+        # For each engagement, part and axis: the relative motion, and the spacecraft's.
         self._motion = np.zeros((batch, 4, axes, 2))
         self._motion[:, POSITION, :, RELATIVE] = position_m
         self._motion[:, VELOCITY, :, RELATIVE] = velocity_m_s
@@ -109,6 +115,7 @@ class KeplerMotion:
         self._scratch = np.empty((4, *self._motion.shape[1:]))
         # The relative positions nearest to the spacecraft so far, at which the distance is least.
         self._closest_m = np.ascontiguousarray(position_m, dtype=np.float64).copy()
+
         parameter = 0.0
         if sun is not None:
             toward_sun, along_orbit = sun_and_orbit(sun)
@@ -116,6 +123,7 @@ class KeplerMotion:
             self._motion[:, POSITION, :, SPACECRAFT] = -sun.distance_m * toward_sun[-axes:]
             self._motion[:, VELOCITY, :, SPACECRAFT] = speed * along_orbit[-axes:]
             parameter = float(sun.gravitational_parameter_m3_s2)
+
         # An acceleration with this error over the whole flight changes the position by
         # POSITION_ERROR_M.
         self._gravity = parameter, POSITION_ERROR_M * (velocity_m_s[:, X] / position_m[:, X]) ** 2
@@ -132,9 +140,7 @@ class KeplerMotion:
         return self._motion[:, VELOCITY, :, RELATIVE].copy()
 
     def bodies(self) -> Floats:
-        """Return position and velocity of spacecraft and object from the Sun, shape (2, 2, axes,
-        B).
-        """
+        """Return position and velocity of both craft from the Sun, shape (2, 2, axes, B)."""
         own, relative = (
             self._motion[:, :ACCELERATION, :, part].transpose(1, 2, 0)
             for part in (SPACECRAFT, RELATIVE)
@@ -167,8 +173,8 @@ class KeplerMotion:
     def arrival_s(self) -> Floats:
         """Return the times from now to x = 0, shape (B,), s.
 
-        The motion is that without further impulses. Impulses, which are across x, change this time
-        through gravity by some nanoseconds.
+        Further impulses, which are across x, would change these times through gravity by some
+        nanoseconds.
         """
         arrival_s = np.empty(len(self._motion))
         arrive_all(self._motion, self._manoeuvre, *self._gravity, self._scratch, arrival_s)
@@ -183,50 +189,45 @@ class KeplerMotion:
         if manoeuvre_m_s2 is not None:
             self._manoeuvre = np.ascontiguousarray(manoeuvre_m_s2.T)
             accelerate_all(self._motion, self._manoeuvre, self._gravity[0])
+
         batch = len(self._motion)
-        passage = passed, arrival, closest = (
-            np.zeros(batch, dtype=bool),
-            np.zeros(batch),
-            self._closest_m,
-        )
+        passed = np.zeros(batch, dtype=bool)
+        arrival = np.zeros(batch)
+        passage = (passed, arrival, self._closest_m)
         advance_all(
             self._motion, self._manoeuvre, *self._gravity, float(step_s), self._scratch, passage
         )
-        nearest = np.where(passed, closest.T, 0.0)
+
+        nearest = np.where(passed, self._closest_m.T, 0.0)
         minimum = np.where(passed, np.hypot.reduce(nearest), np.inf)
         return Passage(passed, minimum, arrival, nearest[:X])
 
 
 def sun_and_orbit(sun: Sun) -> tuple[Floats, Floats]:
-    """Return (y, z, x) of the Sun's direction, and of the spacecraft's velocity in units of that of
-    a circular orbit.
+    """Return (y, z, x) of the Sun's direction, and of the spacecraft's velocity.
 
-    Without a velocity in `sun` the second is a direction: the part of +x across the first, or z if
-    the Sun is on x.
+    The unit of the velocity is the speed of a circular orbit. Without a velocity in `sun` it is a
+    direction: the part of +x across the Sun's direction, or z if the Sun is on x.
     """
     level = np.cos(sun.elevation_rad)
     y = np.sin(sun.elevation_rad)
     z = level * np.sin(sun.direction_rad)
     x = level * np.cos(sun.direction_rad)
+    direction = np.array([y, z, x])
     if sun.spacecraft_velocity_m_s is not None:
+        # In a plane it has no component along y.
         velocity = np.array([0.0, *sun.spacecraft_velocity_m_s])[-3:]
-        return np.array([y, z, x]), velocity / np.sqrt(
-            sun.gravitational_parameter_m3_s2 / sun.distance_m
-        )
+        return direction, velocity / np.sqrt(sun.gravitational_parameter_m3_s2 / sun.distance_m)
+
     across = np.hypot(y, z)
-    along = (
-        np.array([-x * (y / across), -x * (z / across), across])
-        if across > 0.0
-        else np.array([0.0, x, 0.0])
-    )
-    return np.array([y, z, x]), along
+    if across > 0.0:
+        return direction, np.array([-x * (y / across), -x * (z / across), across])
+    return direction, np.array([0.0, x, 0.0])
 
 
 @inlined
 def attraction_share(squared_m2: float, gravitational_parameter_m3_s2: float) -> float:
-    """Return -K / |r|^3, whose product with r is the acceleration at r from the Sun, from the
-    square of |r|.
-    """
+    """Return -K / |r|^3 from the square of |r|: times r, the acceleration at r from the Sun."""
     return -gravitational_parameter_m3_s2 / (squared_m2 * math.sqrt(squared_m2))
 
 
@@ -310,8 +311,7 @@ def leap(
 def longest_leap_s(
     state: Floats, gravitational_parameter_m3_s2: float, acceleration_error_m_s2: float
 ) -> float:
-    """Return the maximum length of a leap for which its mean acceleration has at most a given
-    error.
+    """Return the maximum length of a leap whose mean acceleration has at most a given error.
 
     At the distance R from the Sun, a motion with the speed v changes in the time t = min(R/v,
     (R^3/K)^(1/2)). A leap of order four and length h has an error of the order of (K/R^2) (h/t)^4.
@@ -351,8 +351,9 @@ def copy_state(state: Floats, copy: Floats) -> None:
 
 @inlined
 def products(state: Floats) -> tuple[float, float]:
-    """Return r . v, which is zero at the closest approach, and its rate v . v + r . a, of the
-    relative motion.
+    """Return r . v of the relative motion and its rate v . v + r . a.
+
+    The first is zero at the closest approach.
     """
     radial = rate = 0.0
     for axis in range(state.shape[1]):
@@ -365,7 +366,7 @@ def products(state: Floats) -> tuple[float, float]:
 
 @inlined
 def turning_times(state: Floats, duration_s: float) -> tuple[float, float]:
-    """Return the times within a leap at which the rate of r . v is zero, in increasing order, s.
+    """Return the increasing times within a leap at which the rate of r . v is zero, s.
 
     Both are `duration_s` without such a time; r . v is monotone between the ends of the leap and
     these times. With the acceleration a of the start of the leap its rate is v . v + r . a + 3 v .
@@ -406,11 +407,10 @@ def approach(
     stage: Floats,
     start: Floats,
 ) -> None:
-    """Advance a state to the closest approach, at most `longest_s` later: Newton's method on r . v
-    = 0, or bisection.
+    """Advance a state to the closest approach, by Newton's method on r . v = 0, or bisection.
 
-    r . v is negative now and not negative after `longest_s`, and monotone between. `start` is
-    memory of the shape of the state.
+    The approach is at most `longest_s` later. r . v is negative now and not negative after
+    `longest_s`, and monotone between. `start` is memory of the shape of the state.
     """
     copy_state(state, start)
     moment = 0.0
@@ -440,9 +440,7 @@ def approach(
 
 @inlined
 def keep_closest(state: Floats, closest_m: Floats) -> None:
-    """Write the relative position of a state if it is nearer than the position of `closest_m`,
-    shape (A + 1,).
-    """
+    """Write the relative position of a state if it is nearer than `closest_m`, shape (A + 1,)."""
     squared = kept = 0.0
     for axis in range(state.shape[1]):
         squared += state[POSITION, axis, RELATIVE] * state[POSITION, axis, RELATIVE]
@@ -500,8 +498,9 @@ def arrive(
     acceleration_error_m_s2: float,
     stage: Floats,
 ) -> float:
-    """Advance a state to x = 0 without impulses, and return the time, s: Newton's method in leaps
-    of limited length.
+    """Advance a state to x = 0 without impulses, and return the time, s.
+
+    Newton's method takes leaps of limited length.
     """
     total = 0.0
     last = 0
@@ -509,13 +508,14 @@ def arrive(
         x = state[POSITION, X, RELATIVE]
         speed = state[VELOCITY, X, RELATIVE]
         rest = -x / speed
-        if speed >= 0.0 or abs(rest) <= 1e-16 * total:
+        if speed >= 0.0 or abs(rest) <= ARRIVAL_ROUNDING * total:
             return float(total + rest)
         longest = longest_leap_s(state, gravitational_parameter_m3_s2, acceleration_error_m_s2)
         longest = max(longest, SHORTEST_LEAP * abs(total + rest))
         if abs(rest) <= longest:
             last += 1
         duration = min(max(rest, -longest), longest)
+
         leap(state, manoeuvre_m_s2, gravitational_parameter_m3_s2, duration, stage)
         total += duration
     return total
@@ -525,8 +525,9 @@ def arrive(
 def accelerate_all(
     motion: Floats, manoeuvre_m_s2: Floats, gravitational_parameter_m3_s2: float
 ) -> None:
-    """Write the accelerations of all states, shape (B, 4, A + 1, 2); manoeuvres have the shape (B,
-    A).
+    """Write the accelerations of all states, shape (B, 4, A + 1, 2).
+
+    Manoeuvres have the shape (B, A).
     """
     for b in range(len(motion)):
         accelerate(motion[b], manoeuvre_m_s2[b], gravitational_parameter_m3_s2)
@@ -580,6 +581,7 @@ def advance_all(
             duration = left / leaps
             copy_state(state, before)
             leap(state, manoeuvre, gravitational_parameter_m3_s2, duration, stage)
+
             is_receding = products(state)[0] >= 0.0
             if is_receding or turning_times(before, duration)[0] < duration:
                 approach_within(
@@ -598,5 +600,5 @@ def advance_all(
 
 
 def _ratio(over: Floats, under: Floats) -> Floats:
-    """Return the quotient; zero where the divisor is zero, where no section exists."""
+    """Return the quotient, and zero where the divisor is zero."""
     return np.divide(over, under, out=np.zeros(over.shape), where=under != 0.0)

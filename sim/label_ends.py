@@ -42,7 +42,7 @@ class LabelEnds:
         self._is_over = np.zeros(batch, dtype=bool)
         # Sections whose control has ended: engagement, label and misses. Impulses move them until
         # their range is zero.
-        self._of = np.empty(0, dtype=np.int64)
+        self._engagements = np.empty(0, dtype=np.int64)
         self._labels_m = np.empty(0)
         self._misses_m = np.empty((2, len(self._laws), 0))
 
@@ -52,15 +52,19 @@ class LabelEnds:
 
     def fire(self, impulse_m_s: Floats, where: Flags, time_s: float) -> None:
         """Move the labels that have left and have not arrived by impulses of shape (C, B), m/s."""
-        if not self._of.size:
+        if not self._engagements.size:
             return
         impulse = np.where(where, impulse_m_s, 0.0)
         if not impulse.any():
             return
+
+        # The executed impulse is not known exactly: the misses move by its two ends.
         doubt = np.stack([impulse_doubts(impulse, law) for law in self._laws])
+        greatest = (impulse + doubt)[:, self._engagements]
+        least = (impulse - doubt)[:, self._engagements]
         to_go_s = np.maximum(self._labels_m / self._model.closing_speed_m_s - time_s, 0.0)
-        self._misses_m[0] -= (impulse + doubt)[:, self._of] * to_go_s
-        self._misses_m[1] -= (impulse - doubt)[:, self._of] * to_go_s
+        self._misses_m[0] -= greatest * to_go_s
+        self._misses_m[1] -= least * to_go_s
 
     def end(
         self,
@@ -75,7 +79,7 @@ class LabelEnds:
         Parameters
         ----------
         left, feasible : ndarray of bool, shape (B, S)
-            Sections that leave the set now, and those that were feasible before.
+            Sections that leave the set now, and all sections before.
         control_is_over : ndarray of bool, shape (B,)
             Engagements in which no further impulse can be given.
         labels_m : ndarray, shape (B, S)
@@ -83,36 +87,40 @@ class LabelEnds:
         misses_m : ndarray, shape (2, C, B, S)
             Minimum and maximum predicted miss of each section along each lateral axis, m.
         """
-        of, slots = np.nonzero(np.where(control_is_over[:, None], feasible, left))
-        leaves = left[of, slots]
-        counts = ~self._is_over[of]
-        misses = misses_m[:, :, of, slots]
-        self.left[of[leaves]] = True
-        np.maximum.at(self.published_m, of[leaves], _max(misses)[leaves])
-        self._is_over = self._is_over | control_is_over
-        self._exists[of[counts]] = True
-        self._of = np.concatenate((self._of, of[counts]))
-        self._labels_m = np.concatenate((self._labels_m, labels_m[of, slots][counts]))
+        engagements, slots = np.nonzero(np.where(control_is_over[:, None], feasible, left))
+        labels = labels_m[engagements, slots]
+        misses = misses_m[:, :, engagements, slots]
+
+        leaves = left[engagements, slots]
+        leaving = engagements[leaves]
+        self.left[leaving] = True
+        np.maximum.at(self.published_m, leaving, _max(misses)[leaves])
+
+        counts = ~self._is_over[engagements]
+        self._exists[engagements[counts]] = True
+        self._engagements = np.concatenate((self._engagements, engagements[counts]))
+        self._labels_m = np.concatenate((self._labels_m, labels[counts]))
         self._misses_m = np.concatenate((self._misses_m, misses[:, :, counts]), axis=2)
+        self._is_over = self._is_over | control_is_over
 
     def any_state_miss_m(self, results: Results) -> Floats:
         """Return the maximum miss of a state that the set contained when control ended for its
         label, m, shape (B,).
 
         The true state is such a state if it was always inside its section. Where the set became
-        empty, or no section has ended, it is the only one.
+        empty, or no section has ended, only the true state counts.
         """
         ended = self._exists & ~results.set_emptied
-        of_truth = np.where(ended & ~results.truth_kept, 0.0, results.miss_m)
-        of_sections = np.zeros_like(self.published_m)
-        np.maximum.at(of_sections, self._of, _max(self._misses_m) * self._scale(self._labels_m))
-        return np.maximum(np.where(ended, of_sections, 0.0), of_truth)
+        truth_m = np.where(ended & ~results.truth_kept, 0.0, results.miss_m)
+        misses_m = _max(self._misses_m) * self._scale(self._labels_m)
+        sections_m = np.zeros_like(self.published_m)
+        np.maximum.at(sections_m, self._engagements, misses_m)
+        return np.maximum(np.where(ended, sections_m, 0.0), truth_m)
 
     def _scale(self, labels: Floats) -> Floats:
-        """Return the maximum 1 + eta of a label: a length of the guaranteed model times 1 + eta is
-        the true one.
+        """Return the maximum of 1 + eta for each label: the ratio of true lengths to the model's.
 
-        The label is the true range at t = 0 divided by 1 + eta.
+        A label is the true range at t = 0 divided by 1 + eta.
         """
         model = self._model
         if not model.is_guaranteed:
@@ -122,7 +130,6 @@ class LabelEnds:
 
 
 def _max(misses: Floats) -> Floats:
-    """Return the maximum modulus of minimum and maximum misses of shape (2, C, ...), shape
-    (...).
-    """
-    return np.asarray(np.hypot.reduce(np.maximum(misses[1], -misses[0]), axis=0))
+    """Return the maximum modulus, shape (...), of misses between two ends, shape (2, C, ...)."""
+    lower, upper = misses
+    return np.asarray(np.hypot.reduce(np.maximum(upper, -lower), axis=0))

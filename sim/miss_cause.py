@@ -1,12 +1,10 @@
-"""Why engagements miss: the first cause that applies to each miss, from the true motion, the engine
-and the set.
-"""
+"""Causes of misses: the first one that applies, from the true motion, the engine and the set."""
 
 from __future__ import annotations
 
 from enum import Enum
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,12 +49,41 @@ EXPLAINED = {
     "corrected_m": (MissCause.ENGINE, "engine_corrects_m"),
     "possible_m": (MissCause.KNOWLEDGE, "last_possible_m"),
 }
-"""What explains the misses of a cause: the maximum of a column over them."""
+"""Numbers that explain the misses of a cause: the maximum of a column over these misses."""
+
+
+class _AtDecisions(NamedTuple):
+    """Values of n flights at K decisions.
+
+    Parameters
+    ----------
+    miss_m : ndarray, shape (K + 1, C, n)
+        Lateral misses without the impulses from each decision on; the last row is the miss.
+    tracking : ndarray of bool, shape (K, n)
+        Whether the flight decides impulses.
+    budget_m_s : ndarray, shape (K, n)
+        Budget left before the decision.
+    ends_m : ndarray, shape (K + 1, 2, C, n)
+        Ends of the possible misses; the last row is zero, for flights without a decision.
+    """
+
+    miss_m: Floats
+    tracking: Flags
+    budget_m_s: Floats
+    ends_m: Floats
+
+    def of_flights(self, which: Flags) -> _AtDecisions:
+        """Return the values of some flights."""
+        return _AtDecisions(
+            self.miss_m[..., which],
+            self.tracking[:, which],
+            self.budget_m_s[:, which],
+            self.ends_m[..., which],
+        )
 
 
 class DecisionLog:
-    """What decides the causes of misses, recorded in a flight of B engagements and evaluated after
-    it.
+    """Decisions of B engagements, from which the causes of misses are computed after the flight.
 
     Parameters
     ----------
@@ -78,7 +105,7 @@ class DecisionLog:
         self._steps: list[int] = []
         self._tracking = np.zeros((steps, lateral[1]), dtype=bool)
         self._budget_m_s = np.zeros((steps, lateral[1]))
-        # One row more, of zeros: after the last decision.
+        # The last row stays zero: it stands for the time after the last decision.
         self._ends_m = np.zeros((steps + 1, 2, *lateral))
         self._executed_m_s = np.zeros((steps + 1, *lateral))
 
@@ -100,34 +127,30 @@ class DecisionLog:
         """Return the fields of `Results` with the causes, from lateral misses (C, B) and arrivals
         (B,) of the motions.
 
-        In space the impulses of a flight reach a disc, so the modulus of M_i is compared with the
-        authority, and the radius of the possible misses is that of the disc around their rectangle.
+        In space the impulses of a flight reach a disc. Therefore the modulus of M_i is compared
+        with the authority, and the possible misses have the radius of the disc around their
+        rectangle.
         """
         thruster = self._scenario.thruster
         number = len(self._steps)
         steps = np.array(self._steps, dtype=np.int64) + thruster.delay_steps
-        tracking = self._tracking[:number]
-        budget_m_s = self._budget_m_s[:number]
-        ends_m = self._ends_m[: number + 1]
         times_s: Floats = self._scenario.step_s * steps.astype(np.float64)
-        miss = np.zeros((number + 1, *lateral_miss_m.shape))
-        miss[:-1] = self._executed_m_s[np.minimum(steps, len(self._executed_m_s) - 1)]
-        miss[:-1] *= np.maximum(arrival_s - times_s[:, None], 0.0)[:, None]
-        miss = np.cumsum(miss[::-1], axis=0)[::-1] + lateral_miss_m
+        flights = _AtDecisions(
+            self._misses_without_impulses_m(steps, times_s, lateral_miss_m, arrival_s),
+            self._tracking[:number],
+            self._budget_m_s[:number],
+            self._ends_m[: number + 1],
+        )
+
         causes = np.full(len(missed), None, dtype=object)
-        last = _last(tracking)
         if missed.any():
-            at_decisions = (
-                miss[..., missed],
-                tracking[:, missed],
-                budget_m_s[:, missed],
-                ends_m[..., missed],
-            )
-            causes[missed] = self._causes(*at_decisions, times_s, arrival_s[missed])
-        lower_m, upper_m = _chosen(ends_m, last)
+            causes[missed] = self._causes(flights.of_flights(missed), times_s, arrival_s[missed])
+
+        last = _last(flights.tracking)
+        lower_m, upper_m = _chosen(flights.ends_m, last)
         return {
             "causes": tuple(causes),
-            "unguided_miss_m": modulus(miss[0]),
+            "unguided_miss_m": modulus(flights.miss_m[0]),
             "engine_corrects_m": max_correctable_m(times_s, thruster, arrival_s),
             "budget_corrects_m": max_correctable_m(
                 times_s, thruster, arrival_s, budget=thruster.budget_m_s
@@ -135,55 +158,55 @@ class DecisionLog:
             "last_possible_m": np.ma.MaskedArray(modulus(0.5 * (upper_m - lower_m)), mask=last < 0),
         }
 
-    def _causes(
-        self,
-        miss: Floats,
-        tracking: Flags,
-        budget_m_s: Floats,
-        ends_m: Floats,
-        times_s: Floats,
-        arrival_s: Floats,
-    ) -> list[MissCause]:
+    def _misses_without_impulses_m(
+        self, steps: Integers, times_s: Floats, lateral_miss_m: Floats, arrival_s: Floats
+    ) -> Floats:
+        """Return the misses M_i without the impulses from each decision on, shape (K + 1, C, B)."""
+        effects_m = np.zeros((len(steps) + 1, *lateral_miss_m.shape))
+        effects_m[:-1] = self._executed_m_s[np.minimum(steps, len(self._executed_m_s) - 1)]
+        effects_m[:-1] *= np.maximum(arrival_s - times_s[:, None], 0.0)[:, None]
+        return np.asarray(np.cumsum(effects_m[::-1], axis=0)[::-1] + lateral_miss_m)
+
+    def _causes(self, flights: _AtDecisions, times_s: Floats, arrival_s: Floats) -> list[MissCause]:
         """Return the causes of n misses.
 
-        `miss`, shape (K + 1, C, n), has the misses without the impulses from each decision on, and
-        at last that of the flight; its modulus less the authority does not decrease: an impulse
-        changes both by at most its own share. `ends_m`, shape (K + 1, 2, C, n), are the ends of the
-        possible misses at the decisions.
+        The modulus of M_i less the authority does not decrease with i: an impulse changes both by
+        at most its own share.
         """
+        thruster = self._scenario.thruster
         radius_m = self._scenario.radius_m or 0.0
-        at = np.arange(miss.shape[2])
-        sizes = modulus(miss.swapaxes(0, 1))
+        corrects_m = partial(max_correctable_m, times_s, thruster, arrival_s)
         decisions = np.arange(len(times_s))[:, None]
-        corrects_m = partial(max_correctable_m, times_s, self._scenario.thruster, arrival_s)
-        possible = tracking & (sizes[:-1] - corrects_m(decisions, budget_m_s) <= radius_m)
-        critical = _last(possible)
-        last = _last(tracking)
+        each = np.arange(flights.miss_m.shape[2])
+        sizes = modulus(flights.miss_m.swapaxes(0, 1))
+
+        possible = flights.tracking & (
+            sizes[:-1] - corrects_m(decisions, flights.budget_m_s) <= radius_m
+        )
         exists = possible.any(axis=0)
-        then = np.minimum(critical + 1, len(times_s))
-        now_m = corrects_m(critical)
-        then_m = corrects_m(then)
-        lower_m, upper_m = _chosen(ends_m, critical)
+        critical = _last(possible)
+        last = _last(flights.tracking)
+        is_before_last = critical < last
+        after = np.minimum(critical + 1, len(times_s))
+        later_corrects_m = corrects_m(after)
+
+        # The impulse that is best for all possible misses, and the part of them that it and the
+        # later ones leave.
+        lower_m, upper_m = _chosen(flights.ends_m, critical)
         farthest_m = modulus(np.maximum(upper_m, -lower_m))
-        # More than the half-width of the possible misses if they exclude the true one.
-        unknown_m, unknown_at_last_m = (
-            np.maximum(
-                modulus(0.5 * (upper - lower)), modulus(miss[rows, :, at].T - 0.5 * (lower + upper))
-            )
-            for rows, (lower, upper) in ((rows, _chosen(ends_m, rows)) for rows in (critical, last))
+        left_m = np.maximum(
+            _unknown_m(flights, critical) - np.where(is_before_last, later_corrects_m, 0.0),
+            farthest_m - corrects_m(critical),
         )
-        # What the impulse that is best for all possible misses leaves beyond the later ones.
-        beyond_m = np.maximum(
-            unknown_m - np.where(critical < last, then_m, 0.0), farthest_m - now_m
-        )
-        by_budget = exists & (critical < last) & (sizes[then, at] - then_m <= radius_m)
-        within_m = corrects_m(budget=self._scenario.thruster.budget_m_s)
-        wide = ~exists | (beyond_m > radius_m)
+        wide = ~exists | (left_m > radius_m)
+
+        with_budget_m = corrects_m(budget=thruster.budget_m_s)
+        by_budget = exists & is_before_last & (sizes[after, each] - later_corrects_m <= radius_m)
         # The cause is the first of these conditions that holds.
         conditions = {
             MissCause.ENGINE: sizes[0] - corrects_m() > radius_m,
-            MissCause.BUDGET: by_budget | (sizes[0] - within_m > radius_m),
-            MissCause.KNOWLEDGE: wide & (~exists | (unknown_at_last_m > radius_m)),
+            MissCause.BUDGET: by_budget | (sizes[0] - with_budget_m > radius_m),
+            MissCause.KNOWLEDGE: wide & (~exists | (_unknown_m(flights, last) > radius_m)),
             MissCause.SATURATED: wide,
             MissCause.GUIDANCE: np.ones_like(wide),
         }
@@ -194,35 +217,48 @@ class DecisionLog:
 def count_causes(
     causes: NDArray[np.object_], unguided_m: Floats, engine_m: Floats, last_possible_m: Floats
 ) -> dict[str, Any]:
-    """Return the number of misses of each cause by name, and what explains them: columns of
-    results, shape (N,).
+    """Return the number of misses of each cause by name, and the numbers that explain them.
 
-    `needed_m` and `corrected_m` are the maximum miss without impulses of the misses by the engine,
-    and what their impulses correct; `possible_m` the maximum radius of the possible misses of those
-    by knowledge. None without such misses.
+    `needed_m` and `corrected_m` are the maximum miss without impulses and the maximum correction of
+    the misses by the engine; `possible_m` is the maximum radius of the possible misses of the
+    misses by knowledge. They are None without such misses. The arguments are columns of results,
+    shape (N,).
     """
     columns = {
         "unguided_miss_m": unguided_m,
         "engine_corrects_m": engine_m,
         "last_possible_m": last_possible_m,
     }
+    counts: dict[str, Any] = {
+        cause.value: int((causes == cause.value).sum()) for cause in MissCause
+    }
     explained = {
         name: max_of_cause(causes, columns[column], cause)
         for name, (cause, column) in EXPLAINED.items()
     }
-    return {**{cause.value: int((causes == cause.value).sum()) for cause in MissCause}, **explained}
+    return counts | explained
 
 
 def max_of_cause(causes: NDArray[np.object_], values_m: Floats, cause: MissCause) -> float | None:
-    """Return the maximum of a column of results over the misses of a cause; None without such
-    misses.
-    """
+    """Return the maximum of a column over the misses of a cause; None without such misses."""
     return max(values_m[causes == cause.value].tolist(), default=None)
 
 
+def _unknown_m(flights: _AtDecisions, rows: Integers) -> Floats:
+    """Return the radius of the possible misses of each flight at one of its decisions, m.
+
+    It is greater if they exclude the true miss: the distance of the true miss from their middle.
+    """
+    lower, upper = _chosen(flights.ends_m, rows)
+    truth = flights.miss_m[rows, :, np.arange(len(rows))].T
+    half_width = modulus(0.5 * (upper - lower))
+    return np.maximum(half_width, modulus(truth - 0.5 * (lower + upper)))
+
+
 def _chosen(rows: Floats, chosen: Integers) -> Floats:
-    """Return one row for each of n flights, shape (2, C, n), from rows of shape (K + 1, 2, C, n);
-    -1 is the last.
+    """Return one row for each of n flights, shape (2, C, n), from rows of shape (K + 1, 2, C, n).
+
+    The index -1 is the last row.
     """
     return np.moveaxis(rows[chosen, :, :, np.arange(len(chosen))], 0, -1)
 

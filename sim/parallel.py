@@ -36,11 +36,15 @@ from infoset.sim.simulate import simulate_runs
 from infoset.sim.versions import need_versions, versions
 
 _PARENT_CHECK_S = 0.5
+"""Time between two checks of the parent process, s. Chosen: a worker ends soon after its parent,
+and two checks a second take no measurable time.
+"""
 
 
 class CampaignNoise(Enum):
-    """Measurement noise of a campaign: a `NoiseKind`, MIXED (random in even runs, game in odd
-    ones), or OWN.
+    """Measurement noise of a campaign: a `NoiseKind`, MIXED, or OWN (the user's).
+
+    MIXED is random noise in even runs and game noise in odd ones.
     """
 
     RANDOM = "random"
@@ -53,9 +57,9 @@ class CampaignNoise(Enum):
     @property
     def kinds(self) -> tuple[CampaignNoise, ...]:
         """Noises of run 0, 1, 2, ..., repeated."""
-        return (
-            (CampaignNoise.RANDOM, CampaignNoise.GAME) if self is CampaignNoise.MIXED else (self,)
-        )
+        if self is CampaignNoise.MIXED:
+            return (CampaignNoise.RANDOM, CampaignNoise.GAME)
+        return (self,)
 
     def of_run(self, run: int) -> CampaignNoise:
         """Return the noise of a run."""
@@ -63,8 +67,9 @@ class CampaignNoise(Enum):
 
     def applied_to(self, scenario: Scenario) -> Scenario:
         """Return a scenario with this noise; MIXED and OWN leave it unchanged."""
-        is_other = self in (CampaignNoise.MIXED, CampaignNoise.OWN)
-        return scenario if is_other else replace(scenario, noise=NoiseKind(self.value))
+        if self in (CampaignNoise.MIXED, CampaignNoise.OWN):
+            return scenario
+        return replace(scenario, noise=NoiseKind(self.value))
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,12 +105,11 @@ class Task:
 def simulate_tasks(
     tasks: Iterable[Task], executor: Executor | None = None, workers: int | None = None
 ) -> Generator[tuple[Task, Results], None, None]:
-    """Simulate tasks on an executor and yield each with its results as soon as it is finished, in
-    any order.
+    """Simulate tasks on an executor and yield each with its results once it is finished.
 
-    The results of a run depend neither on the executor nor on the other runs of its task. When the
-    generator is closed or ends with an error, tasks that have not started are cancelled, and
-    threads stop after their current step.
+    The order may differ from the order of the tasks. The results of a run depend neither on the
+    executor nor on the other runs of its task. When the generator is closed or ends with an error,
+    tasks that have not started are cancelled, and threads stop after their current step.
 
     Parameters
     ----------
@@ -147,9 +151,8 @@ def simulate_tasks(
             for future in wait(running, return_when=FIRST_COMPLETED).done:
                 yield running.pop(future), future.result()
     except MemoryError:
-        can_wait = (
-            False  # Numba may still hold its lock, and a running task would wait for it for ever
-        )
+        # Numba may still hold its lock, and a running task would wait for it for ever.
+        can_wait = False
         raise
     finally:
         stopped.set()
@@ -160,8 +163,7 @@ def simulate_tasks(
 
 
 def simulate_task(task: Task, stopped: Callable[[], bool] | None = None) -> Results:
-    """Simulate the runs of a task and return the results in the order of the runs; see
-    `simulate_tasks`.
+    """Return the results of the runs of a task, in the order of the runs; see `simulate_tasks`.
 
     The simulation ends with an InterruptedError after a step at which `stopped` returns true. A
     FloatingPointError is raised if results are not finite.
@@ -175,26 +177,25 @@ def simulate_task(task: Task, stopped: Callable[[], bool] | None = None) -> Resu
             task.progress(share)
 
     noise = task.noise or CampaignNoise(task.scenario.noise.value)
-    kind = noise if isinstance(noise, CampaignNoise) else CampaignNoise.OWN
-    runs_by_noise = {
-        each: [run for run in task.runs if kind.of_run(run) is each] for each in kind.kinds
-    }
-    results = join(
-        [
-            simulate_runs(
-                each.applied_to(task.scenario),
+    own_noise = None if isinstance(noise, CampaignNoise) else noise
+    campaign_noise = noise if isinstance(noise, CampaignNoise) else CampaignNoise.OWN
+    parts = []
+    for kind in campaign_noise.kinds:
+        runs = [run for run in task.runs if campaign_noise.of_run(run) is kind]
+        if runs:
+            results_of_kind = simulate_runs(
+                kind.applied_to(task.scenario),
                 runs,
                 seed=task.seed,
                 strategy=task.strategy,
-                noise=None if isinstance(noise, CampaignNoise) else noise,
+                noise=own_noise,
                 guarantee=task.guarantee,
                 progress=progress,
                 observe=task.observe,
             )
-            for each, runs in runs_by_noise.items()
-            if runs
-        ]
-    )
+            parts.append(results_of_kind)
+
+    results = join(parts)
     if not is_finite(results):
         raise FloatingPointError(
             f"results of runs {task.runs[0]} to {task.runs[-1]} are not finite"
@@ -210,8 +211,7 @@ def is_finite(results: Results) -> bool:
 
 @contextlib.contextmanager
 def worker_processes(count: int) -> Iterator[Executor]:
-    """Start processes that simulate tasks, and end them on exit from the context, after an error at
-    once.
+    """Start processes that simulate tasks; they end with the context, after an error at once.
 
     Half of the work of an engagement needs the interpreter, which threads share and processes do
     not. A process takes one or two seconds to start. Processes are spawned: forked ones would keep
@@ -235,10 +235,9 @@ def worker_processes(count: int) -> Iterator[Executor]:
 
 
 class _WorkerNotice(NamedTuple):
-    """The notice about compiling in worker processes: the level of its logger, its purpose, and who
-    may give it.
+    """The notice about compiling in worker processes: level of its logger, purpose, and a lock.
 
-    Only the process that acquires the lock, which nobody releases, gives the notice.
+    Only the process that acquires the lock, which is never released, gives the notice.
     """
 
     level: int
@@ -255,9 +254,7 @@ def _start_worker(parent: int, notice: _WorkerNotice) -> None:
 
 
 def _end_with(parent: int) -> None:
-    """Ignore SIGINT (the parent handles it); exit when the parent dies, which the pool does not
-    do.
-    """
+    """Ignore SIGINT (the parent handles it), and exit when the parent dies (the pool does not)."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def watch() -> None:

@@ -1,8 +1,8 @@
-"""The record of one engagement: everything that its figures and pages show."""
+"""The record of one engagement: all values that its figures and pages show."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -38,10 +38,10 @@ class RecordedInconsistency:
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """One engagement, step by step: arrays have the shape (N, ...) for N steps, (N, C, ...) along C
-    lateral axes.
+    """One engagement, step by step.
 
-    NaN is an unknown value.
+    Arrays have the shape (N, ...) for N steps, (N, C, ...) along C lateral axes. NaN is an unknown
+    value.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class Record:
     sections : tuple of tuple of Section
         Sections after the measurement of each step, in ascending order of range.
     noise : str or None
-        Name of the noise that replaced that of the scenario; None if none did.
+        Name of the noise that replaced the scenario's; None if none did.
     inconsistency : RecordedInconsistency or None
         First measurement that contradicts the model; None without one.
     versions : mapping of str to str
@@ -110,7 +110,7 @@ class Record:
     def ending(self) -> str:
         """The outcome, and if the body has a size `hit`, or `missed` and why."""
         result = self.result
-        cause = self.result.causes[0]
+        cause = result.causes[0]
         return ending(result.outcomes[0].value, result.hit.tolist()[0], cause and cause.value)
 
     def __repr__(self) -> str:
@@ -164,29 +164,24 @@ def fly_one(
     scenario, own_noise = with_noise(scenario, noise)
     draws = draw(scenario, [run], seed)
     flight = Engagements(scenario, draws, own_strategy, noise=own_noise, target_m_s2=target_m_s2)
+
     steps: list[Step] = []
     sections: list[tuple[Section, ...]] = []
 
     def record(step: Step) -> None:
         steps.append(step)
+        # The view of the set shows the present step only.
         sections.append(tuple(step.information.sections()))
-
-    def rows(value: Callable[[Step], Any]) -> Floats:
-        return np.array([value(step) for step in steps], dtype=np.float64)
-
-    def interval(miss: PredictedMiss) -> Floats:
-        ends = np.stack([miss.lower_m, miss.upper_m], axis=-1)[:, 0]
-        return np.where(miss.exists[0], ends, np.nan)
-
-    def measured(sensor: Sensor) -> Floats:
-        unknown = np.full((len(scenario.set_model.axes), 1) if sensor.is_lateral else 1, np.nan)
-        return rows(lambda step: step.measured.get(sensor.name, unknown)[..., 0])
 
     while flight.flying:
         flight.advance(record)
         if progress is not None:
             progress(min(1.0, flight.step / draws.steps))
-    at_step, label = flight.inconsistency
+
+    def rows(value: Callable[[Step], Any]) -> Floats:
+        return np.array([value(step) for step in steps], dtype=np.float64)
+
+    axes = len(scenario.set_model.axes)
     return Record(
         scenario,
         seed,
@@ -197,13 +192,33 @@ def fly_one(
         true_range_m=rows(lambda step: step.sight.range_m[0]),
         true_angle_rad=rows(lambda step: step.sight.alpha_rad[:, 0]),
         true_rate_rad_s=rows(lambda step: step.sight.omega_rad_s[:, 0]),
-        measured={name: measured(sensor) for name, sensor in scenario.sensors.items()},
-        predicted_miss_m=rows(lambda step: interval(step.predicted_miss)),
+        measured={
+            name: _measured(steps, sensor, axes) for name, sensor in scenario.sensors.items()
+        },
+        predicted_miss_m=rows(lambda step: _interval(step.predicted_miss)),
         impulse_m_s=rows(lambda step: step.impulse_m_s[:, 0]),
         truth_margin_m=np.array([margin.filled(np.nan)[0] for margin in flight.truth_margins_m()]),
         sections=tuple(sections),
         noise=None if own_noise is None else noise_name(own_noise),
-        inconsistency=RecordedInconsistency(int(at_step[0]), float(label[0]))
-        if at_step.count()
-        else None,
+        inconsistency=_inconsistency(flight),
     )
+
+
+def _measured(steps: Sequence[Step], sensor: Sensor, axes: int) -> Floats:
+    """Return the values of a sensor by step; NaN where it did not measure."""
+    unknown = np.full((axes, 1) if sensor.is_lateral else 1, np.nan)
+    values = [step.measured.get(sensor.name, unknown)[..., 0] for step in steps]
+    return np.array(values, dtype=np.float64)
+
+
+def _interval(miss: PredictedMiss) -> Floats:
+    """Return the predicted miss of the engagement, shape (C, 2); NaN without a set."""
+    ends = np.stack([miss.lower_m, miss.upper_m], axis=-1)[:, 0]
+    return np.where(miss.exists[0], ends, np.nan)
+
+
+def _inconsistency(flight: Engagements) -> RecordedInconsistency | None:
+    steps, labels_m = flight.inconsistency
+    if not steps.count():
+        return None
+    return RecordedInconsistency(int(steps[0]), float(labels_m[0]))

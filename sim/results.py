@@ -30,9 +30,7 @@ MaskedFlags = np.ma.MaskedArray[tuple[int], np.dtype[np.bool_]]
 
 
 class GuaranteeWarning(UserWarning):
-    """A guarantee failed: a set lost the true state or became empty, or a miss exceeds the bound
-    Phi.
-    """
+    """A set lost the true state or became empty, or a miss exceeds the bound Phi."""
 
 
 class Outcome(Enum):
@@ -69,11 +67,10 @@ _UNGUIDED = "Miss without impulses, of the same true motion"
 _ENGINE = "Maximum change of the miss by all impulses of the flight, without a limit of their sum"
 _BUDGET = "Maximum change of the miss by impulses within the budget"
 _LAST = "Radius of the possible misses at the last decision; unknown without a decision"
-
-
-_along_y = partial(Column, nullable=True, optional=True)
 _REDRAWS = "Normal starts outside the dispersion that were drawn again; unknown for uniform starts"
 _B_DOT_T = "B.T of the closest approach; unknown without a reference plane"
+
+_in_space = partial(Column, nullable=True, optional=True)
 
 
 @documented
@@ -133,27 +130,27 @@ class Results:
     )
     position_m: Floats = field(
         metadata=columns(
-            _along_y("start_y_m", "m", "True y at the start, only in space"),
+            _in_space("start_y_m", "m", "True y at the start, only in space"),
             Column("start_z_m", "m", "True z at the start"),
             Column("start_x_m", "m", "true x"),
         )
     )
     velocity_m_s: Floats = field(
         metadata=columns(
-            _along_y("start_vy_m_s", "m/s", "True V_y at the start, only in space"),
+            _in_space("start_vy_m_s", "m/s", "True V_y at the start, only in space"),
             Column("start_vz_m_s", "m/s", "true V_z"),
             Column("start_vx_m_s", "m/s", "true V_x"),
         )
     )
     lateral_miss_m: Floats = field(
         metadata=columns(
-            _along_y("miss_y_m", "m", "True y at the closest approach, only in space"),
+            _in_space("miss_y_m", "m", "True y at the closest approach, only in space"),
             Column("miss_z_m", "m", "true z"),
         )
     )
     b_plane_m: Floats = field(
         init=False,
-        metadata=columns(_along_y("b_dot_t_m", "m", _B_DOT_T), _along_y("b_dot_r_m", "m", "B.R")),
+        metadata=columns(_in_space("b_dot_t_m", "m", _B_DOT_T), _in_space("b_dot_r_m", "m", "B.R")),
     )
     redraws: Integers | None = field(
         default=None,
@@ -181,9 +178,7 @@ class Results:
 
     @property
     def missed(self) -> dict[str, Any]:
-        """Number of misses of each cause, and what explains them
-        (`infoset.sim.miss_cause.count_causes`).
-        """
+        """Number of misses of each cause, and their explanation (`miss_cause.count_causes`)."""
         causes = np.array([cause and cause.value for cause in self.causes], dtype=object)
         return count_causes(
             causes, self.unguided_miss_m, self.engine_corrects_m, self.last_possible_m.filled(0.0)
@@ -191,9 +186,7 @@ class Results:
 
     @property
     def failures(self) -> str:
-        """In how many runs a guarantee failed, as text: the set, or the bound Phi; empty if none
-        did.
-        """
+        """Number of runs whose set or bound Phi failed, as text; empty if none did."""
         failed_sets = int((~self.truth_kept | self.set_emptied).sum())
         exceeded = int((~self.phi_held.filled(True)).sum())
         found = []
@@ -209,35 +202,32 @@ class Results:
 
     @property
     def redrawn_share(self) -> float | None:
-        """Share of the normal starts that were outside the dispersion and drawn again; None for
-        uniform starts.
+        """Share of the normal starts that were drawn again because they were outside the
+        dispersion; None for uniform starts.
         """
-        return (
-            None
-            if self.redraws is None
-            else float(1.0 - len(self) / (len(self) + self.redraws.sum()))
-        )
+        if self.redraws is None:
+            return None
+        return float(1.0 - len(self) / (len(self) + self.redraws.sum()))
 
     def to_dict(self) -> dict[str, list[Any]]:
-        """Return the columns by name as plain values, one per run: texts for outcomes, None if
-        unknown.
-        """
+        """Return the columns by name as plain values, one per run; None is unknown."""
         return {column.name: values_of(self, column) for column in columns_with_values(self)}
 
     def to_csv(self) -> str:
-        """Return the columns as comma-separated values, one row per run; `infoset.save` writes them
-        to a file.
+        """Return the columns as comma-separated values, one row per run.
 
-        An unknown value is an empty cell; numbers have all their digits.
+        An unknown value is an empty cell; numbers have all their digits. `infoset.save` writes them
+        to a file.
         """
         table = self.to_dict()
         return csv_text(list(table), list(zip(*table.values(), strict=True)))
 
     def to_pandas(self) -> Any:
-        """Return the columns as a pandas `DataFrame`, one row per run, with the units in
-        ``frame.attrs["units"]``.
+        """Return the columns as a pandas `DataFrame`, one row per run.
+
+        The units are in ``frame.attrs["units"]``.
         """
-        import pandas as pd  # of the extra `campaign`
+        import pandas as pd  # installed with the extra `campaign`
 
         frame = pd.DataFrame(self.to_dict())
         frame.attrs["units"] = {column.name: column.unit for column in columns_with_values(self)}
@@ -247,13 +237,9 @@ class Results:
         """Return the results at some indices, in the order of the indices."""
 
         def taken(values: Any) -> Any:
-            if not isinstance(values, tuple | np.ndarray):
-                return values
-            return (
-                tuple(values[index] for index in indices)
-                if isinstance(values, tuple)
-                else values[indices]
-            )
+            if isinstance(values, tuple):
+                return tuple(values[index] for index in indices)
+            return values[indices] if isinstance(values, np.ndarray) else values
 
         return Results(**{name: taken(getattr(self, name)) for name in _INPUTS})
 
@@ -275,36 +261,36 @@ def from_columns(
     burns_m_s: Sequence[Sequence[float]] | None,
     b_plane_t_rad: float | None,
 ) -> Results:
-    """Return results from the columns of `Results.to_dict` and the values that are no columns.
+    """Return results from the columns of `Results.to_dict` and the values that are not columns.
 
-    `ValueError` if they do not agree.
+    A ValueError is raised if they do not agree.
     """
     if not isinstance(table, Mapping) or not isinstance(guarantees, bool):
         raise ValueError("columns must be a table, and guarantees true or false")
     arguments = fields_of(Results, table)
-    burns = None if burns_m_s is None else np.array(burns_m_s, dtype=float)
-    if burns is not None and (
-        burns.ndim != 2 or len(burns) != len(arguments["runs"]) or not np.isfinite(burns).all()
-    ):
-        raise ValueError("burns_m_s must have one row of numbers for each run")
+    burns = None
+    if burns_m_s is not None:
+        burns = np.array(burns_m_s, dtype=float)
+        is_table = burns.ndim == 2 and len(burns) == len(arguments["runs"])
+        if not is_table or not np.isfinite(burns).all():
+            raise ValueError("burns_m_s must have one row of numbers for each run")
     if b_plane_t_rad is not None and not np.isfinite(float(b_plane_t_rad)):
         raise ValueError("b_plane_t_rad must be a number")
     return Results(**arguments, guarantees=guarantees, burns_m_s=burns, b_plane_t_rad=b_plane_t_rad)
 
 
 def ending(outcome: str, hit: bool | None, cause: str | None) -> str:
-    """Return how an engagement ended as text: the outcome, and if the body has a size `hit`, or
-    `missed` and why.
-    """
-    return outcome if hit is None else f"{outcome}, {'hit' if hit else f'missed ({cause})'}"
+    """Return the outcome as text, with `hit`, or `missed` and the cause, if the body has a size."""
+    if hit is None:
+        return outcome
+    return f"{outcome}, hit" if hit else f"{outcome}, missed ({cause})"
 
 
 def b_plane(lateral_m: Floats, t_rad: float | None) -> Floats:
-    """Return (B.T, B.R) of positions (y, z) of the object across the approach, shape (B, 2); (B, 0)
-    without axes.
+    """Return (B.T, B.R) of positions (y, z), shape (B, 2); shape (B, 0) without a reference plane.
 
-    B points from the object to the spacecraft, opposite to (y, z). `t_rad` is the direction of T
-    from y toward z.
+    (y, z) are positions of the object across the approach. B points from the object to the
+    spacecraft, opposite to (y, z). `t_rad` is the direction of T from y toward z.
     """
     if t_rad is None:
         return np.empty((len(lateral_m), 0))
@@ -322,10 +308,14 @@ def join(parts: Sequence[Results]) -> Results:
 
 
 def _joined(parts: Sequence[Any]) -> Any:
-    if isinstance(parts[0], bool):
+    """Return the values of one field of several results as one value."""
+    first = parts[0]
+    if isinstance(first, bool):
         return all(parts)
-    if parts[0] is None or isinstance(parts[0], float):
-        return parts[0]
-    if isinstance(parts[0], tuple):
+    if first is None or isinstance(first, float):
+        return first
+    if isinstance(first, tuple):
         return tuple(value for part in parts for value in part)
-    return (np.ma.concatenate if isinstance(parts[0], np.ma.MaskedArray) else np.concatenate)(parts)
+    if isinstance(first, np.ma.MaskedArray):
+        return np.ma.concatenate(parts)  # type: ignore[no-untyped-call]
+    return np.concatenate(parts)

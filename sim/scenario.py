@@ -31,31 +31,38 @@ from infoset.sensors import AngleSensor, BearingSensor, Camera, RangeSensor, Rat
 from infoset.sim.covariance import Covariance
 
 LIGHT_M_S = 299_792_458.0
+"""Speed of light, m/s: exact, by the definition of the metre."""
 
 
 @dataclass(frozen=True)
 class _Speed(Limits):
-    """A positive speed of a Newtonian motion: at most 1 % of the speed of light, where mistakes of
-    units begin.
+    """A positive speed of at most 1 % of the speed of light; higher ones are mistakes of units.
+
+    Relativity changes motions of such speeds by less than 1e-4 of themselves.
     """
 
     def problem(self, value: object) -> str | None:
         """Return why a speed is not allowed, or None."""
+        problem = super().problem(value)
+        if problem is not None:
+            return problem
         number: Any = value
-        is_fast = super().problem(value) is None and number > 0.01 * LIGHT_M_S
-        return (
-            "is more than a hundredth of the speed of light; check its unit"
-            if is_fast
-            else super().problem(value)
-        )
+        if number > 0.01 * LIGHT_M_S:
+            return "is more than a hundredth of the speed of light; check its unit"
+        return None
 
 
 _SPEED = _Speed(above=0.0)
 _DIRECTION = Limits(minimum=-2.0 * math.pi, maximum=2.0 * math.pi)
 _ELEVATION = Limits(minimum=-0.5 * math.pi, maximum=0.5 * math.pi)
 _SIGMA = Limits(minimum=0.01, maximum=10.0)
+"""Limits of a standard deviation in bounds of the error: from almost no errors to almost uniform
+ones, whose truncated density differs by 0.5 %.
+"""
 MAX_STEPS = 100_000
 """Maximum number of steps of a flight; all random numbers are drawn before it starts."""
+STEPS_ROUNDING = 1e-9
+"""Relative rounding error of the number of steps: a flight of exactly `MAX_STEPS` is allowed."""
 MIN_SHARE_WITHIN = 0.01
 """Minimum share of the starts of a covariance within the dispersion; a start is drawn again at most
 some 1000 times.
@@ -75,7 +82,7 @@ class Sun(Checked):
     direction_rad : float
         Direction of the Sun seen from the spacecraft at t = 0, from the x axis toward z, rad.
     elevation_rad : float
-        Angle of that direction out of the plane (x, z), toward y, rad. For space only.
+        Angle of this direction out of the plane (x, z), toward y, rad. For space only.
     spacecraft_velocity_m_s : tuple of float, or None
         Velocity of the spacecraft from the Sun at t = 0 along y, z and x, in a plane along z and x,
         m/s. None is a circular orbit, in the plane of the Sun and the x axis and toward +x.
@@ -111,7 +118,7 @@ class Target(Checked):
     acceleration_m_s2 : float
         Acceleration along z, m/s^2.
     acceleration_y_m_s2 : float or None
-        Acceleration along y, m/s^2; None is that along z. For space only.
+        Acceleration along y, m/s^2; None is the same as along z. For space only.
     switching_period_s : float
         Time between changes of sign (bang-bang), or the mean time (random telegraph), s.
     """
@@ -152,7 +159,7 @@ class Scenario:
     strategy : str
         Name of the guidance strategy.
     noise, tie : NoiseKind, TieRule
-        How errors of measurements are chosen, and what game noise keeps of two equally bad
+        Choice of the errors of measurements, and choice of game noise between two equally bad
         extremes.
     noise_sigma : float
         Standard deviation of Gaussian and correlated errors as a share of the bound, at which they
@@ -217,15 +224,20 @@ class Scenario:
         for sensor in self.sensors.values():
             self.set_model.check_period(sensor)
         self._check_axes()
-        _ = self.impulse_steps  # raises ValueError if the thruster can give no impulse
+        self._check_covariance()
+        # Properties that raise ValueError: if the thruster can give no impulse, and if the closing
+        # speed is too uncertain.
+        _ = self.impulse_steps
         self.set_model.check_start("dispersion", self.dispersion)
         if self.information_set.is_guaranteed:
-            _ = (
-                self.set_model.label_limits_m
-            )  # raises ValueError if the closing speed is too uncertain
+            _ = self.set_model.label_limits_m
+        self._check_lengths()
+
+    def _check_lengths(self) -> None:
+        """Check the number of steps, the distance of the Sun and the radius of the body."""
         farthest_m = self.dispersion.x_m[1]
         slowest_m_s = -self.dispersion.vx_m_s[1]
-        if farthest_m > MAX_STEPS * (1.0 + 1e-9) * slowest_m_s * self.step_s:
+        if farthest_m > MAX_STEPS * (1.0 + STEPS_ROUNDING) * slowest_m_s * self.step_s:
             raise ValueError(
                 f"step_s must be long enough for at most {MAX_STEPS} steps from {farthest_m:g} m "
                 f"at {slowest_m_s:g} m/s: got {self.step_s!r}"
@@ -257,9 +269,7 @@ class Scenario:
         )
 
     def _check_axes(self) -> None:
-        """Check that all values are in a plane, or all in space, and that the dispersion contains
-        normal starts.
-        """
+        """Check that all values are in a plane, or all in space."""
         if self.dispersion.axes != self.set_model.axes:
             raise ValueError(
                 "Scenario: uncertainty and dispersion must both have y_m and vy_m_s (an "
@@ -272,34 +282,42 @@ class Scenario:
                 f"sun.spacecraft_velocity_m_s must have {components} components: got "
                 f"{len(velocity)}"
             )
-        if self.covariance is not None:
-            if self.covariance.size != 2 * components:
-                raise ValueError(
-                    f"covariance must have {2 * components} components: got {self.covariance.size}"
-                )
-            share = self.covariance.share_within(0.5 * np.ptp(corners(self.dispersion), axis=0))
-            if share < MIN_SHARE_WITHIN:
-                raise ValueError(
-                    f"covariance: {100.0 * share:.2g} % of its starts are within dispersion, at "
-                    f"least {100.0 * MIN_SHARE_WITHIN:g} % must be: widen dispersion, or reduce "
-                    "the deviations"
-                )
+        if self.covariance is not None and self.covariance.size != 2 * components:
+            raise ValueError(
+                f"covariance must have {2 * components} components: got {self.covariance.size}"
+            )
         if self.is_spatial:
             return
-        for name, is_set in (
-            ("sun.elevation_rad", self.sun is not None and self.sun.elevation_rad != 0.0),
-            (
-                "target.acceleration_y_m_s2",
-                self.target is not None and self.target.acceleration_y_m_s2 is not None,
+
+        sun = self.sun
+        target = self.target
+        values_in_space = {
+            "sun.elevation_rad": sun is not None and sun.elevation_rad != 0.0,
+            "target.acceleration_y_m_s2": (
+                target is not None and target.acceleration_y_m_s2 is not None
             ),
-            ("thruster.pointing_error_rad", self.thruster.pointing_error_rad > 0.0),
-            ("b_plane_t_rad", self.b_plane_t_rad is not None),
-        ):
+            "thruster.pointing_error_rad": self.thruster.pointing_error_rad > 0.0,
+            "b_plane_t_rad": self.b_plane_t_rad is not None,
+        }
+        for name, is_set in values_in_space.items():
             if is_set:
                 raise ValueError(
                     f"{name} is a value of an engagement in space, and dispersion has no y_m and "
                     "vy_m_s: set them, or leave the value out"
                 )
+
+    def _check_covariance(self) -> None:
+        """Check that enough normal starts are within the dispersion."""
+        if self.covariance is None:
+            return
+        half_widths = 0.5 * np.ptp(corners(self.dispersion), axis=0)
+        share = self.covariance.share_within(half_widths)
+        if share < MIN_SHARE_WITHIN:
+            raise ValueError(
+                f"covariance: {100.0 * share:.2g} % of its starts are within dispersion, at "
+                f"least {100.0 * MIN_SHARE_WITHIN:g} % must be: widen dispersion, or reduce "
+                "the deviations"
+            )
 
     @property
     def bearing_sensor(self) -> BearingSensor:
@@ -327,17 +345,13 @@ class Scenario:
     @property
     def correlation_time_s(self) -> float:
         """Time constant of correlated errors, s."""
-        return (
-            0.1 * self.nominal_arrival_s
-            if self.noise_correlation_s is None
-            else self.noise_correlation_s
-        )
+        if self.noise_correlation_s is None:
+            return 0.1 * self.nominal_arrival_s
+        return self.noise_correlation_s
 
     @property
     def impulse_steps(self) -> Sequence[int] | None:
-        """Steps in which impulses can be given (`Thruster.impulse_steps`); None is every step from
-        the delay on.
-        """
+        """Steps in which impulses can be given; None is every step from the delay on."""
         return self.thruster.impulse_steps(self.nominal_arrival_s, self.step_s)
 
     @property
@@ -358,9 +372,7 @@ class Scenario:
 
 
 def corners(box: StateBox) -> tuple[Floats, Floats]:
-    """Return minimum and maximum (z, x, V_z, V_x) of a box, or (y, z, x, V_y, V_z, V_x) of one in
-    space.
-    """
+    """Return minimum and maximum (z, x, V_z, V_x) of a box; (y, z, x, V_y, V_z, V_x) in space."""
     lateral = [box.axis(name) for name in box.axes]
     intervals = np.array(
         [*(axis.z_m for axis in lateral), box.x_m, *(axis.vz_m_s for axis in lateral), box.vx_m_s],
@@ -372,7 +384,7 @@ def corners(box: StateBox) -> tuple[Floats, Floats]:
 def of_model(model: SetModel) -> dict[str, Any]:
     """Return the fields of a scenario with a set model: ``replace(scenario, **of_model(model))``.
 
-    The bounds of gravity and of the engine's errors are not among them; they follow from the
+    They do not contain the bounds of gravity and of the engine's errors, which follow from the
     scenario.
     """
     sensor = model.angle_sensor
@@ -389,16 +401,14 @@ def of_model(model: SetModel) -> dict[str, Any]:
 
 
 def strategy_name(scenario: Scenario, own: Strategy | None) -> str:
-    """Return the name of a strategy in files: the registered name, or module and class of the
-    user's own.
-    """
+    """Return the name of a strategy in files: registered, or module and class of the user's."""
     if own is None:
         return scenario.strategy
     return f"{type(own).__module__}.{type(own).__qualname__}"
 
 
 def need_scenario(scenario: object) -> None:
-    """Raise TypeError, with the function that reads a scenario, if an argument is no scenario."""
+    """Raise TypeError if an argument is not a `Scenario`; the message says how to read one."""
     if not isinstance(scenario, Scenario):
         raise TypeError(
             f"scenario must be a Scenario: got {shown(scenario)}; infoset.load_scenario returns it "
@@ -409,10 +419,9 @@ def need_scenario(scenario: object) -> None:
 def with_strategy(
     scenario: Scenario, strategy: Strategy | str | None
 ) -> tuple[Scenario, Strategy | None]:
-    """Return the scenario with a strategy if it is a registered name, and the strategy if it is an
-    object.
+    """Return the scenario with a registered strategy, or the scenario and a strategy object.
 
-    TypeError if the scenario is none.
+    A TypeError is raised if the scenario is not a `Scenario`.
     """
     need_scenario(scenario)
     if isinstance(strategy, str):
@@ -421,9 +430,7 @@ def with_strategy(
 
 
 def noise_name(own: NoiseSource) -> str:
-    """Return the name of a noise of the user's own in records: its attribute `name`, or that of its
-    class.
-    """
+    """Return the name of a user's noise in records: its attribute `name`, or its class."""
     kind = own if isinstance(own, type) else type(own)
     return str(getattr(own, "name", kind.__name__))
 
@@ -431,16 +438,13 @@ def noise_name(own: NoiseSource) -> str:
 def with_noise(
     scenario: Scenario, noise: NoiseSource | str | None
 ) -> tuple[Scenario, NoiseSource | None]:
-    """Return the scenario with a noise if it is the name of a kind, and the noise if it is a class
-    or an object.
+    """Return the scenario with the named kind of noise, or the scenario and a noise object.
 
     A ValueError is raised if no kind has this name.
     """
     if not isinstance(noise, str):
         return scenario, noise
-    if noise not in [kind.value for kind in NoiseKind]:
-        raise ValueError(
-            f"no noise is called '{noise}'; there are: "
-            f"{', '.join(kind.value for kind in NoiseKind)}"
-        )
+    names = [kind.value for kind in NoiseKind]
+    if noise not in names:
+        raise ValueError(f"no noise is called '{noise}'; there are: {', '.join(names)}")
     return replace(scenario, noise=NoiseKind(noise)), None

@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from infoset.arrays import Integers
 from infoset.guidance import Strategy
 from infoset.guidance.noise import NoiseSource
 from infoset.limits import WHOLE, shown
@@ -18,12 +19,16 @@ from infoset.sim.results import GuaranteeWarning, Results, join
 from infoset.sim.scenario import Scenario, with_noise, with_strategy
 
 ENGAGEMENTS_AT_ONCE = 200
+"""Maximum number of engagements of a batch: 25 % faster than 64 (docs/performance.md); larger ones
+gain little, and their sections leave the processor's cache.
+"""
 SECTIONS_AT_ONCE = 6000
+"""Maximum number of sections of a batch: 200 engagements with 29 sections, which take 3.7 MB."""
 STEPS_AT_ONCE = 500_000
 """Maximum number of engagements of a batch times their steps; each takes about 600 bytes."""
 FLIGHT_SHARE = 0.75
 """Share of the steps in the time of a batch; afterwards margins and bounds are computed from the
-whole history.
+whole history. It is measured, and affects the progress bar only.
 """
 
 
@@ -52,8 +57,8 @@ def simulate(
         A strategy of your own, the name of a registered one, or None for the scenario's.
     noise : MeasurementNoise, callable, str or None
         A noise of your own, the name of a kind, or None for the scenario's. A class, or a function
-        without arguments, is called for the noise of each batch; an object is that of all batches,
-        at the same time if there are threads.
+        without arguments, is called once for each batch and returns its noise. An object is used
+        for all batches, by several threads at the same time if there are threads.
     guarantee : bool
         Compute the bound Phi in the guaranteed model; a run takes 1.1 to 1.9 times as long, with a
         rate sensor 1.4 to 9 times.
@@ -90,7 +95,7 @@ def simulate(
 
 
 def warn_of_failures(scenario: Scenario, results: Results) -> None:
-    """Warn the user's code, once, of runs whose set failed or whose miss exceeds the bound Phi."""
+    """Give one warning of runs whose set failed or whose miss exceeds the bound Phi."""
     failures = results.failures
     if not failures:
         return
@@ -131,8 +136,7 @@ def simulate_runs(
     progress: Callable[[float], None] | None = None,
     observe: Callable[[int, Step], None] | None = None,
 ) -> Results:
-    """Return the results of `simulate` without its warning, for commands: they report such runs
-    themselves.
+    """Return the results of `simulate` without its warning: commands report failures themselves.
 
     Raises
     ------
@@ -142,12 +146,32 @@ def simulate_runs(
     WHOLE.need("seed", seed)
     scenario, own = with_strategy(scenario, strategy)
     scenario, own_noise = with_noise(scenario, noise)
+    numbers = _run_numbers(runs)
+    at_once = _engagements_at_once(scenario)
+    parts = []
+    for first in range(0, numbers.size, at_once):
+        batch = numbers[first : first + at_once]
+        draws = draw(scenario, batch.tolist(), seed)
+        flight = Engagements(scenario, draws, own, noise=own_noise, guarantee=guarantee)
+
+        observe_batch = None if observe is None else partial(observe, first)
+        while flight.flying:
+            flight.advance(observe_batch)
+            if progress is not None:
+                share = min(1.0, flight.step / draws.steps)
+                progress((first + FLIGHT_SHARE * batch.size * share) / numbers.size)
+
+        parts.append(flight.results(batch))
+        if progress is not None:
+            progress((first + batch.size) / numbers.size)
+    return join(parts)
+
+
+def _run_numbers(runs: int | Sequence[int]) -> Integers:
+    """Return run numbers from their number or a sequence of them."""
     numbers = np.asarray(runs)
-    if (
-        isinstance(runs, bool)
-        or numbers.ndim > 1
-        or (numbers.dtype.kind not in "iu" and numbers.size)
-    ):
+    is_integer = numbers.dtype.kind in "iu" or not numbers.size
+    if isinstance(runs, bool) or numbers.ndim > 1 or not is_integer:
         raise TypeError(
             "runs must be the number of runs or a sequence of run numbers, all integers: got "
             f"{shown(runs)}"
@@ -155,27 +179,15 @@ def simulate_runs(
     numbers = np.arange(int(numbers)) if numbers.ndim == 0 else numbers.astype(np.int64)
     if numbers.size == 0 or numbers.min() < 0:
         raise ValueError(f"need at least one run, and no negative run numbers: got runs={runs}")
-    parts = []
-    # Small batches fit into the processor's cache; with very many sections or steps, larger ones
-    # would not fit into memory.
+    return numbers
+
+
+def _engagements_at_once(scenario: Scenario) -> int:
+    """Return the number of engagements of a batch.
+
+    Small batches fit into the processor's cache; with very many sections or steps, larger ones
+    would not fit into memory.
+    """
+    by_sections = SECTIONS_AT_ONCE // scenario.set_model.sections
     by_steps = STEPS_AT_ONCE // max_number_of_steps(scenario)
-    at_once = max(
-        1, min(ENGAGEMENTS_AT_ONCE, SECTIONS_AT_ONCE // scenario.set_model.sections, by_steps)
-    )
-    for first in range(0, numbers.size, at_once):
-        chunk = numbers[first : first + at_once]
-        draws = draw(scenario, chunk.tolist(), seed)
-        flight = Engagements(scenario, draws, own, noise=own_noise, guarantee=guarantee)
-        steps = draws.steps
-        observe_batch = None if observe is None else partial(observe, first)
-        while flight.flying:
-            flight.advance(observe_batch)
-            if progress is not None:
-                progress(
-                    (first + FLIGHT_SHARE * chunk.size * min(1.0, flight.step / steps))
-                    / numbers.size
-                )
-        parts.append(flight.results(chunk))
-        if progress is not None:
-            progress((first + chunk.size) / numbers.size)
-    return join(parts)
+    return max(1, min(ENGAGEMENTS_AT_ONCE, by_sections, by_steps))

@@ -1,6 +1,4 @@
-"""Statistics of samples: empirical distribution, quantiles, and distribution-free confidence
-intervals.
-"""
+"""Statistics of samples: distribution, quantiles, and distribution-free confidence intervals."""
 
 from __future__ import annotations
 
@@ -17,6 +15,15 @@ from numpy.typing import ArrayLike
 
 from infoset.arrays import Floats
 from infoset.limits import FRACTION, WHOLE, real_values
+
+COUNT_ROUNDING = 1e-9
+"""Rounding error of an expected number of values: 100 values show the quantile of 0.99, although
+100 (1 - 0.99) is less than 1 in floating point.
+"""
+SPEARMAN_VARIANCE = 1.06
+"""Variance of Fisher's z of Spearman's coefficient over the variance for Pearson's (Fieller,
+Hartley, Pearson).
+"""
 
 
 @dataclass(frozen=True)
@@ -68,9 +75,7 @@ def empirical_distribution(sample: ArrayLike, confidence: float = 0.95) -> Distr
 
 
 def _ordered(sample: ArrayLike) -> Floats:
-    """Return the values of a sample in ascending order; raise ValueError unless all are finite, and
-    there is one.
-    """
+    """Return a sample in ascending order; raise ValueError if it is empty or not finite."""
     values = np.sort(real_values("sample", sample).ravel())
     if values.size == 0 or not np.isfinite(values).all():
         raise ValueError("a sample needs at least one value, all finite")
@@ -85,13 +90,11 @@ def shows(size: int, level: float) -> bool:
     0 and 1 are the extremes.
     """
     tail = min(level, 1.0 - level)
-    return tail == 0.0 or size * tail > 1.0 - 1e-9
+    return tail == 0.0 or size * tail > 1.0 - COUNT_ROUNDING
 
 
 def shown_quantiles(sample: Floats, levels: Sequence[float]) -> list[float | None]:
-    """Return quantiles of a sample with at least one value; None where it does not show the
-    quantile (`shows`).
-    """
+    """Return quantiles of a sample that is not empty; None for those that it does not show."""
     values = np.quantile(sample, levels).tolist()
     return [
         value if shows(len(sample), level) else None
@@ -121,7 +124,9 @@ class QuantileEstimate:
     @property
     def width(self) -> float | None:
         """Width of the interval; None if a side is not bounded."""
-        return None if self.lower is None or self.upper is None else self.upper - self.lower
+        if self.lower is None or self.upper is None:
+            return None
+        return self.upper - self.lower
 
 
 def estimate_quantiles(
@@ -154,18 +159,18 @@ def estimate_quantiles(
     if not all(0.0 <= level <= 1.0 for level in levels):
         raise ValueError(f"levels must lie in [0, 1]: got {levels}")
     values = _ordered(sample)
-    ends = [
-        (
-            float(values[lower - 1]) if lower >= 1 else None,
-            float(values[upper - 1]) if upper <= values.size else None,
-        )
-        for lower, upper in (order_statistics(values.size, level, confidence) for level in levels)
-    ]
+    intervals: list[tuple[float | None, float | None]] = []
+    for level in levels:
+        lower, upper = order_statistics(values.size, level, confidence)
+        lower_end = float(values[lower - 1]) if lower >= 1 else None
+        upper_end = float(values[upper - 1]) if upper <= values.size else None
+        intervals.append((lower_end, upper_end))
+
     # overwrite_input saves a second copy of a million values, and changes their order.
-    wanted = np.quantile(values, levels, overwrite_input=True)
+    quantiles = np.quantile(values, levels, overwrite_input=True)
     return [
-        QuantileEstimate(level, float(value), *interval)
-        for level, value, interval in zip(levels, wanted, ends, strict=True)
+        QuantileEstimate(level, float(quantile), *interval)
+        for level, quantile, interval in zip(levels, quantiles, intervals, strict=True)
     ]
 
 
@@ -188,7 +193,7 @@ class HitEstimate:
     Parameters
     ----------
     runs, hits : int
-        Number of runs, and of those that hit.
+        Number of runs, and number of hits among them.
     probability : float
         Share of the runs that hit.
     lower, upper : float
@@ -233,8 +238,9 @@ def estimate_hits(hits: int, runs: int, confidence: float = 0.95) -> HitEstimate
 
 
 def _lower_end(hits: int, runs: int, tail: float) -> float:
-    """Return the probability at which at least so many hits have the probability `tail`; 0 without
-    a hit.
+    """Return the probability of a hit for which P(at least this number of hits) is `tail`.
+
+    It is zero without a hit.
     """
     from scipy.stats import beta  # slow to load, and few commands need it
 
@@ -242,12 +248,11 @@ def _lower_end(hits: int, runs: int, tail: float) -> float:
 
 
 def runs_for_hits(share: float, misses: int = 0, confidence: float = 0.95) -> int:
-    """Return the minimum number of runs that show a probability of a hit, of which `misses` runs
-    miss.
+    """Return the minimum number of runs, with some misses, that show a probability of a hit.
 
-    With so many runs, the hypothesis that the probability is less than `share` is rejected at the
-    level 1 - `confidence`: the test is the exact binomial one, and one-sided. Without misses it is
-    the least n with share^n <= 1 - confidence, 299 runs for 99 % at 95 %.
+    With this number of runs, of which `misses` miss, the hypothesis that the probability is less
+    than `share` is rejected at the level 1 - `confidence`, by the exact one-sided binomial test.
+    Without misses it is the least n with share^n <= 1 - confidence: 299 runs for 99 % at 95 %.
 
     Raises
     ------
@@ -268,8 +273,7 @@ def runs_for_hits(share: float, misses: int = 0, confidence: float = 0.95) -> in
 
 
 def average_ranks(values: Floats) -> Floats:
-    """Return the ranks of finite values, from 1, for Spearman's coefficient; equal values have the
-    mean of their ranks.
+    """Return the ranks of finite values, from 1; equal values have the mean of their ranks.
 
     The ranks are exact. This takes half the time of `pandas.Series.rank`, which uses no vector
     instructions.
@@ -289,11 +293,10 @@ def average_ranks(values: Floats) -> Floats:
 def correlation_interval(
     correlation: float, size: int, confidence: float = 0.95, *, ranks: bool = False
 ) -> tuple[float, float]:
-    """Return the confidence interval of a correlation coefficient by Fisher's z; NaN with fewer
-    than 4 values.
+    """Return the confidence interval of a correlation coefficient by Fisher's z.
 
-    The interval is approximate, and assumes two normal variables. `ranks` is for Spearman's
-    coefficient, whose z has a standard deviation larger by a factor of sqrt(1.06).
+    It is NaN with fewer than 4 values. The interval is approximate, and assumes two normal
+    variables. `ranks` is for Spearman's coefficient.
 
     References
     ----------
@@ -301,9 +304,8 @@ def correlation_interval(
     """
     if size < 4:
         return math.nan, math.nan
-    half = NormalDist().inv_cdf(0.5 + 0.5 * confidence) * math.sqrt(
-        (1.06 if ranks else 1.0) / (size - 3)
-    )
+    variance = (SPEARMAN_VARIANCE if ranks else 1.0) / (size - 3)
+    half = NormalDist().inv_cdf(0.5 + 0.5 * confidence) * math.sqrt(variance)
     with np.errstate(divide="ignore"):  # the interval of 1 is the point 1
         z = np.arctanh(np.clip(correlation, -1.0, 1.0))
     return float(np.tanh(z - half)), float(np.tanh(z + half))

@@ -1,6 +1,4 @@
-"""Quantiles as text, and the rule that stops a campaign: the confidence interval of a quantile is
-narrow enough.
-"""
+"""Quantiles as text, and the rule that stops a campaign by the width of a quantile's interval."""
 
 from __future__ import annotations
 
@@ -16,8 +14,9 @@ from infoset.limits import Checked, Fraction, Positive, check_fields
 from infoset.sim.statistics import estimate_quantiles, level_name, number_text
 
 QUANTITIES = ("miss_m", "impulse_m_s", "guaranteed_miss_m")
-
+"""Columns of results whose quantiles are estimated."""
 DIGITS = r"[0-9]{1,20}(?:\.[0-9]{1,25})?(?:[eE][+-]?[0-9]{1,3})?"
+"""A number as text: any that `number_text` writes, and of limited length."""
 _RULE = re.compile(
     rf"\s*(?P<quantity>\w+)\s+p(?P<percent>{DIGITS})\s+ci\s*<\s*(?P<width>{DIGITS})\s*"
 )
@@ -61,17 +60,16 @@ class QuantileName:
 
 @dataclass(frozen=True)
 class StoppingRule(Checked):
-    """Stop when the confidence interval of a quantile is narrower than a width, written `miss_m p99
-    ci<0.5`.
+    """Stop when the confidence interval of a quantile is narrow enough: `miss_m p99 ci<0.5`.
 
     Parameters
     ----------
     quantile : QuantileName
         Quantile whose interval is compared with the width.
     width : float
-        In the unit of the quantity.
+        Limit of the width of the interval, in the unit of the quantity.
     confidence : float
-        Of the interval, in (0, 1).
+        Confidence of the interval, in (0, 1).
     """
 
     quantile: QuantileName
@@ -101,7 +99,7 @@ class StoppingRule(Checked):
 
     @property
     def quantity(self) -> str:
-        """Column of the results that it uses."""
+        """Column of the results with the quantity."""
         return self.quantile.quantity
 
     def numbers(self, column: Any) -> Floats:
@@ -109,7 +107,7 @@ class StoppingRule(Checked):
         return np.asarray(column.to_numpy(np.float64, na_value=np.nan))
 
     def met_by(self, sample: Floats) -> bool:
-        """Whether a sample is large enough."""
+        """Return whether the interval of a sample is narrow enough."""
         if not sample.size:
             return False
         (estimate,) = estimate_quantiles(sample, [self.quantile.level], self.confidence)

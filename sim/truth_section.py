@@ -21,16 +21,24 @@ from infoset.model import SetModel
 from infoset.set_queries import MaskedFloats
 from infoset.sim.kepler import Sight
 
-ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
-"""Rounding error of a margin, relative to the terms of z: a quarter of that for which each cut
-widens the set.
+MARGIN_ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
+"""Rounding error of a margin, relative to the terms of z: a quarter of `ROUNDING` of the section
+laws, by which each cut widens the set.
 """
 
 
 @dataclass(frozen=True)
 class _OutputTime:
-    """True states of the flights that measure in a step, after some events; slopes have the shape
-    (C, B).
+    """True states of the flights at a measurement.
+
+    Parameters
+    ----------
+    step, events : int
+        Step of the measurement, and number of events in the history until it.
+    where : ndarray of bool, shape (B,)
+        Flights that measure.
+    slope, slope_rate_per_s : ndarray, shape (C, B)
+        Slope z/x of the true line of sight, and its rate.
     """
 
     step: int
@@ -58,14 +66,9 @@ class TruthSection:
         self._output_times: list[_OutputTime] = []
 
     def store_state(self, where: Flags, sight: Sight) -> None:
-        """Store which flights measured in this step, after the measurements, and the true
-        states.
-        """
-        slope = sight.alpha_rad
-        rate = sight.omega_rad_s
-        if self._exact_angles:
-            slope = sight.slope
-            rate = sight.slope_rate_per_s
+        """Store the true states of the flights that measured, after their measurements."""
+        slope = sight.slope if self._exact_angles else sight.alpha_rad
+        rate = sight.slope_rate_per_s if self._exact_angles else sight.omega_rad_s
         self._output_times.append(
             _OutputTime(self._history.elapsed, self._history.events, where, slope, rate)
         )
@@ -96,61 +99,73 @@ class TruthSection:
         """Return the signed margins (m) of the true states in their sections, one array of shape
         (B,) per step.
 
-        A margin is that of the last measurement; it is masked before the first one. It includes an
-        allowance for rounding. `arrival_s` are the times from the start to x = 0.
+        The margin of a step is the margin at the last measurement; it is masked before the first
+        one. It includes an allowance for rounding. `arrival_s` are the times from the start to
+        x = 0.
         """
-        latest = np.full(len(arrival_s), np.inf)
-        margins = []
         measured: dict[int, Floats] = {}
         for time, margin in zip(self._output_times, self._margins(arrival_s), strict=True):
             measured[time.step] = np.minimum(margin, measured.get(time.step, np.inf))
+
+        margins = []
+        latest = np.full(len(arrival_s), np.inf)
         for step in range(self._history.elapsed + 1):
             margin = measured.get(step, latest)
             latest = np.where(np.isinf(margin), latest, margin)
-            margins.append(_if_measured(latest))
+            margins.append(_masked_unless_measured(latest))
         return margins
 
     def min_margin_m(self, arrival_s: Floats) -> MaskedFloats:
-        """Return the minimum signed margin of each true state, m; masked where nothing was
-        measured.
-        """
-        return _if_measured(self._margins(arrival_s).min(axis=0, initial=np.inf))
+        """Return the minimum signed margin of each true state, m; masked without measurements."""
+        return _masked_unless_measured(self._margins(arrival_s).min(axis=0, initial=np.inf))
 
     def _margins(self, arrival_s: Floats) -> Floats:
-        """Return the margin of each flight at each time, m, shape (L, B); infinite where it does
-        not measure.
+        """Return the margin of each flight at each of L measurements, m, shape (L, B); infinite
+        where it does not measure.
         """
-        law = self._law
-        history = copy.copy(self._history)
         times = self._output_times
         if not times:
             return np.empty((0, len(arrival_s)))
+
+        law = self._law
+        steps = np.arange(self._history.elapsed + 1)
         labels = law.closing_speed * arrival_s
-        ranges = labels - law.closing_speed * (law.step * np.arange(history.elapsed + 1))[:, None]
-        kinds = history.kinds[: history.events]
-        measured = np.isin(kinds, (ANGLE, RATE))
-        steps = np.cumsum(kinds == PREDICTION)
-        history.applies = history.applies[: history.events].copy()
-        history.applies[measured] &= (ranges >= self._min_range_m)[steps[measured]]
-        at = [time.step for time in times]
-        ranges = ranges[at]
-        where = np.reshape([time.where for time in times], ranges.shape) & (
-            ranges >= self._min_range_m
-        )
+        ranges_by_step = labels - law.closing_speed * (law.step * steps)[:, None]
+        history = self._history_beyond_threshold(ranges_by_step)
+        ranges = ranges_by_step[[time.step for time in times]]
+        measures = np.reshape([time.where for time in times], ranges.shape)
+        where = measures & (ranges >= self._min_range_m)
+
         # Shape (L, C, B), then (C, L, B).
-        each = (len(times), len(self._laws), len(labels))
-        slope = np.reshape([time.slope for time in times], each).swapaxes(0, 1)
-        rate = np.reshape([time.slope_rate_per_s for time in times], each).swapaxes(0, 1)
-        ends = np.array([time.events for time in times], dtype=np.int64)
+        shape = (len(times), len(self._laws), len(labels))
+        slope = np.reshape([time.slope for time in times], shape).swapaxes(0, 1)
+        rate = np.reshape([time.slope_rate_per_s for time in times], shape).swapaxes(0, 1)
         v = np.ascontiguousarray(rate * ranges - law.closing_speed * slope)
         z = np.ascontiguousarray(slope * ranges)
+
+        ends = np.array([time.events for time in times], dtype=np.int64)
         margins, reaches = margins_along(labels, ends, v, z, history, self._laws)
         # The label and z = label |slope| of the true state are rounded, and so is z = m - V
         # (label/e) of a vertex: the sections of an exactly known z are thinner than that.
-        margins += ROUNDING * labels * (np.abs(slope) + reaches / law.closing_speed)
+        margins += MARGIN_ROUNDING * labels * (np.abs(slope) + reaches / law.closing_speed)
         return np.where(where, margins.min(axis=0), np.inf)
 
+    def _history_beyond_threshold(self, ranges: Floats) -> History:
+        """Return the history without the measurements below the range threshold.
 
-def _if_measured(margin: Floats) -> MaskedFloats:
+        `ranges`, shape (steps, B), are the ranges of the labels. The sets drop a label there.
+        """
+        history = copy.copy(self._history)
+        kinds = history.kinds[: history.events]
+        is_measurement = np.isin(kinds, (ANGLE, RATE))
+        step_of_event = np.cumsum(kinds == PREDICTION)
+        is_beyond = (ranges >= self._min_range_m)[step_of_event[is_measurement]]
+        history.applies = history.applies[: history.events].copy()
+        history.applies[is_measurement] &= is_beyond
+        return history
+
+
+def _masked_unless_measured(margin: Floats) -> MaskedFloats:
+    """Return margins, masked where they are infinite."""
     never = np.isinf(margin)
     return np.ma.MaskedArray(np.where(never, 0.0, margin), mask=never)

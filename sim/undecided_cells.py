@@ -68,7 +68,7 @@ class UndecidedCells:
     chunk.
 
     The number of runs in the manifest of the folder is the limit of each cell, `min_runs` its
-    minimum number for a requirement. The rule is decided for each noise. A chunk is stored only if
+    minimum number. The rule is decided for each noise. A chunk is stored only if
     the chunks before it in its cell are stored and have not decided. The stored runs are therefore
     the same for any number of workers and after any interruption.
     """
@@ -78,7 +78,7 @@ class UndecidedCells:
     ) -> None:
         self._folder = folder
         self._rule = rule
-        self._min_runs = 0 if isinstance(rule, StoppingRule) else min_runs
+        self._min_runs = min_runs
         chunks: list[list[range]] = [[] for _ in range(folder.manifest.cells)]
         for cell, runs in folder.manifest.chunks():
             chunks[cell].append(runs)

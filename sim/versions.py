@@ -16,25 +16,24 @@ class VersionError(Exception):
 
 
 def versions() -> dict[str, str]:
-    """Return the versions that results, records and campaigns carry: those of the packages, and
-    that of Python.
-    """
-    return {**{name: _version(name) for name in PACKAGES}, "python": platform.python_version()}
+    """Return the versions of the packages and of Python, for results, records and campaigns."""
+    return {name: _version(name) for name in PACKAGES} | {"python": platform.python_version()}
 
 
 def need_versions(wanted: Mapping[str, str]) -> None:
-    """Raise VersionError if a package has another version than the `wanted` one."""
-    differ = [
+    """Raise VersionError if the version of a package differs from the `wanted` one."""
+    differences = [
         f"{name} {wanted.get(name)} in the campaign, {_version(name)} on the worker"
         for name in PACKAGES
         if wanted.get(name) != _version(name)
     ]
-    if differ:
-        raise VersionError("; ".join(differ))
+    if differences:
+        raise VersionError("; ".join(differences))
 
 
 @functools.cache
 def _version(name: str) -> str:
+    """Return the version of a package, or "none"."""
     try:
         return version(name)
     except PackageNotFoundError:

@@ -72,7 +72,7 @@ def fly(
         warnings += [f"{name}{line}" for line in feasibility_warnings(scenario)]
     say_warnings(warnings[: MAX_WARNINGS if campaign.cells else None], options.quiet, notes)
     with (
-        workers_of(options, campaign.engagements, partial(say, quiet=options.quiet)) as (
+        workers_of(options, campaign.max_engagements, partial(say, quiet=options.quiet)) as (
             executor,
             workers,
         ),

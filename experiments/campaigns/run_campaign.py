@@ -19,7 +19,7 @@ from infoset.experiments.common.screen import show, some_runs
 from infoset.experiments.common.units import duration_text
 from infoset.experiments.interception.strategies import own_strategy
 from infoset.experiments.interception.study import study_title
-from infoset.sim import Campaign, StoppingRule
+from infoset.sim import Campaign, RunsUntil, StoppingRule
 
 SUMMARY = "summary.json"
 
@@ -29,17 +29,18 @@ def run(options: CampaignOptions) -> None:
     with campaign_errors(RESUME_HINT), output_of(options) as written:
         scenario, model_notes = scenario_of(options)
         with input_errors("--until"):
-            rule = None if options.until is None else StoppingRule.parse(options.until)
+            runs: int | RunsUntil = options.runs
+            if options.until is not None:
+                runs = RunsUntil(StoppingRule.parse(options.until), max_runs=options.runs)
         campaign = Campaign(
             scenario,
-            options.runs,
+            runs,
             options.out,
             seed=options.seed,
             noise=noise_of(options),
             strategy=own_strategy(options.strategy),
             guarantee=options.guarantee,
             chunk=options.chunk,
-            until=rule,
         )
         stored, warnings, elapsed_s = fly(campaign, options, model_notes)
         manifest = stored.manifest

@@ -19,7 +19,8 @@ from infoset.experiments.common.input_file import to_toml
 from infoset.experiments.common.output import output_of, to_json
 from infoset.experiments.common.screen import say, show
 from infoset.experiments.interception.strategies import own_strategy
-from infoset.sim import Campaign
+from infoset.sim import Campaign, RunsUntil
+from infoset.sim.requirement import AnyRequirement
 
 MAX_RUNS_A_CELL = 2000
 """Default limit of the runs of a cell that is undecided."""
@@ -34,7 +35,7 @@ def run(options: Options) -> None:
         required = read_requirement(options.require, has_size=cells[0].body is not None)
         swept = Campaign(
             scenario,
-            options.runs,
+            _runs(options, required),
             options.out,
             axes=axes,
             cells=cells,
@@ -43,8 +44,6 @@ def run(options: Options) -> None:
             strategy=own_strategy(options.strategy),
             guarantee=options.guarantee or required.quantity == "guaranteed_miss_m",
             chunk=options.chunk,
-            until=required if options.until else None,
-            max_runs=_max_runs(options),
             require=required,
         )
         folder, _, elapsed_s = fly(swept, options, notes)
@@ -59,10 +58,11 @@ def run(options: Options) -> None:
         say("no figure: a figure can show one or two keys only", options.quiet)
 
 
-def _max_runs(options: Options) -> int | None:
-    """Return the maximum number of runs of a cell; None without --until."""
-    if options.until is None:
-        if options.max_runs is not None:
-            raise InputError("--max-runs is the limit of --until; add --until decided, or omit it")
-        return None
-    return max(options.max_runs or MAX_RUNS_A_CELL, options.runs)
+def _runs(options: Options, required: AnyRequirement) -> int | RunsUntil:
+    """Return the number of runs of a cell; with --until, the requirement with the limits."""
+    if options.until is not None:
+        max_runs = max(options.max_runs or MAX_RUNS_A_CELL, options.runs)
+        return RunsUntil(required, max_runs, min_runs=options.runs)
+    if options.max_runs is not None:
+        raise InputError("--max-runs is the limit of --until; add --until decided, or omit it")
+    return options.runs

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -61,10 +62,7 @@ class CampaignFolder:
     @property
     def stored_runs(self) -> list[int]:
         """Engagements of the result that are stored, by cell."""
-        counts = [0] * self.manifest.cells
-        for cell, runs in self.manifest.chunks():
-            counts[cell] += len(runs) if self.has(cell, runs) else 0
-        return counts
+        return [sum(len(runs) for _, runs in chunks) for chunks in self.stored_chunks()]
 
     @property
     def finished_runs(self) -> int:
@@ -82,19 +80,14 @@ class CampaignFolder:
         return self.finished_runs == self.wanted_runs
 
     def runs(self, columns: Sequence[str] | None = None, cell: int | None = None) -> pd.DataFrame:
-        """Return the stored runs, in the order of cells and runs; None is all columns, or all
-        cells.
+        """Return the stored runs, in the order of cells and runs.
 
-        Unknown numbers are NaN, unknown flags NA. StorageError, which names the file, if one cannot
-        be read.
+        None is all columns, or all cells. Unknown numbers are NaN, unknown flags NA. A
+        StorageError, which names the file, is raised if a file cannot be read.
         """
-        chosen = [
-            chunk
-            for number, chunks in enumerate(self.stored_chunks())
-            if cell in (None, number)
-            for chunk in chunks
-        ]
-        return self.read_chunks(chosen, columns)
+        stored = self.stored_chunks()
+        chosen = [chunks for number, chunks in enumerate(stored) if cell in (None, number)]
+        return self.read_chunks(itertools.chain(*chosen), columns)
 
     def stored_chunks(self) -> list[list[tuple[int, range]]]:
         """Return the cells and runs of the stored chunks, by cell and in the order of the runs."""
@@ -117,13 +110,12 @@ class CampaignFolder:
     @classmethod
     @contextlib.contextmanager
     def begin(cls, path: Path, manifest: Manifest, *, resume: bool) -> Iterator[CampaignFolder]:
-        """Start a campaign in a folder, or resume the one in it, and hold the folder's lock until
-        the context ends.
+        """Start or resume a campaign in a folder, and hold the folder's lock in the context.
 
         More runs in the `manifest` than in the folder extend the campaign. `resume` is whether the
-        folder may contain this campaign already. StorageError if the folder contains something else
-        or a campaign with different settings, another campaign is running in it, or it cannot be
-        written.
+        folder may contain this campaign already. A StorageError is raised if the folder contains
+        something else or a campaign with different settings, another campaign is running in it, or
+        it cannot be written.
         """
         from infoset.sim.storage import tables  # noqa: F401 (fails at once if a library is missing)
 
@@ -163,9 +155,7 @@ class CampaignFolder:
 
 
 def _names(manifest: Manifest) -> set[str]:
-    """Return the names of the files of all chunks, also of those after a rule has stopped their
-    cell.
-    """
+    """Return the names of the files of all chunks, also after a rule has stopped a cell."""
     return {_name(*chunk) for chunk in replace(manifest, cell_runs=()).chunks()}
 
 

@@ -1,6 +1,4 @@
-"""Frozen dataclasses as JSON and back, strictly: the one codec of manifests, record headers and
-fingerprints.
-"""
+"""Frozen dataclasses as JSON and back, for manifests, record headers and fingerprints."""
 
 from __future__ import annotations
 
@@ -18,16 +16,12 @@ _STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
 @functools.cache
 def adapter(kind: Hashable) -> TypeAdapter[Any]:
-    """Return the reader and writer of a tuple with one dataclass, which takes no values but those
-    of its fields.
-    """
+    """Return the strict reader and writer of a tuple with one dataclass."""
     return TypeAdapter(tuple[kind], config=_STRICT)  # type: ignore[valid-type]  # pydantic takes no config for a dataclass
 
 
 def to_json(value: Any) -> dict[str, Any]:
-    """Return a dataclass as JSON values: enumerations by value, a number as the type of its
-    field.
-    """
+    """Return a dataclass as JSON values: enumerations by value, numbers by the field's type."""
     # `dump_json` would replace a KeyboardInterrupt by another error. The fallback is for NumPy's
     # integers.
     codec = adapter(value.__class__)
@@ -43,7 +37,7 @@ def from_json(kind: Callable[..., Kind], value: object) -> Kind:
     """Return a dataclass from its JSON values.
 
     A ValueError is raised if a key is missing or unknown, or a value is not of its field's type;
-    the message names the key. Text with control characters, which could steer a terminal, is
+    the message names the key. Text with control characters, which a terminal would execute, is
     refused too.
     """
     if not all(map(str.isprintable, _texts(value))):
@@ -76,10 +70,11 @@ def fingerprint(value: Any) -> str:
 
     16 hexadecimal digits, the same for equal values on every machine.
     """
-    values = _exact(
-        {key: inner for key, inner in to_json(value).items() if key not in ("name", "description")}
-    )
-    return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
+    values = to_json(value)
+    values.pop("name", None)
+    values.pop("description", None)
+    text = json.dumps(_exact(values), sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def _exact(value: Any) -> Any:
@@ -89,5 +84,6 @@ def _exact(value: Any) -> Any:
     if isinstance(value, list):
         return [_exact(inner) for inner in value]
     if isinstance(value, int | float):
-        return (float(value) + 0.0).hex()  # adding zero removes the sign of a negative zero
+        # The sum removes the sign of a negative zero.
+        return (float(value) + 0.0).hex()
     return value

@@ -12,18 +12,17 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 LOCK = ".lock"
+"""Name of the lock's file in a folder."""
 _TEMPORARY = ".infoset-"
+"""Beginning of the names of temporary files."""
 
 
 class StorageError(Exception):
-    """The folder of a campaign cannot be used; the message gives the problem, the folder or file,
-    and a remedy.
-    """
+    """The folder of a campaign cannot be used; the message gives problem, file and remedy."""
 
 
 def replace_file(file: Path, content: bytes) -> None:
-    """Write a file atomically: if the process or the machine stops, the file is complete or
-    unchanged.
+    """Write a file atomically: at any time it is complete or unchanged.
 
     The content is written to a temporary file in the same folder and flushed to the disk; then the
     file is renamed, which is atomic, and the folder is flushed so that the new name is on the disk
@@ -54,17 +53,13 @@ def write_whole(file: Path, content: bytes) -> None:
 
 
 def is_leftover(file: Path) -> bool:
-    """Whether a file is a temporary one of `replace_file`, whose process may have died while
-    writing.
-    """
+    """Whether a file is a temporary one of `replace_file`, left by a process that died."""
     return file.name.startswith(_TEMPORARY) and file.suffix == ".tmp"
 
 
 @contextlib.contextmanager
 def reporting(path: Path) -> Iterator[None]:
-    """Raise an `OSError` during reading or writing of `path` as a StorageError with a message for
-    the user.
-    """
+    """Raise an `OSError` of the context as a StorageError with a message for the user."""
     try:
         yield
     except OSError as error:

@@ -1,6 +1,4 @@
-"""The manifest of a campaign: all that determines its numbers, so that it can be resumed, read and
-repeated.
-"""
+"""The manifest of a campaign, with all that determines its numbers: to resume and repeat it."""
 
 from __future__ import annotations
 
@@ -19,8 +17,11 @@ from infoset.sim.storage.codec import from_json, to_json
 from infoset.sim.storage.files import StorageError, reporting, write_whole
 
 SCHEMA = 1
+"""Version of the format; folders of other versions are refused."""
 MANIFEST = "manifest.json"
+"""Name of the manifest in the folder of a campaign."""
 MAX_CELLS = 10_000
+"""Maximum number of cells of a sweep: a map of 100 x 100 values. More are a mistake in --vary."""
 
 _MAY_DIFFER = ("runs", "until", "cell_runs", "require", "extended", "versions.python")
 """Keys that may differ between the sessions of a campaign."""
@@ -55,28 +56,26 @@ class Axis:
 
 @dataclass(frozen=True, kw_only=True)
 class Manifest:
-    """All that determines the numbers of a campaign or a sweep, its progress, and its division into
-    chunks.
+    """All that determines the numbers of a campaign or a sweep, its progress, and its chunks.
 
     A ValueError is raised if there are too many cells, or `cell_runs` does not fit.
 
     Parameters
     ----------
     runs : int
-        Engagements of each cell, numbered from 0; with `until` the maximum number.
+        Number of engagements of each cell; with `until` the maximum number.
     until : str or None
         The rule that may stop a campaign early, or the requirement that stops the cells of a sweep.
     cell_runs : tuple of int
         Engagements of each cell after the rule has stopped some of them; empty before.
     require : str or None
-        Requirement of a sweep, that of the last session; it does not change any result.
+        Requirement of a sweep in the last session; it does not change any result.
     extended : bool
         Whether runs were ever added to a sweep, by a rule or by a greater number of runs.
     scenario : Scenario
-        Scenario; for a sweep the one that is varied.
+        Scenario, in a sweep before it is varied.
     own_noise : str or None
-        Name of the user's own noise, like that of a strategy in a Python file; None is a noise of
-        `CampaignNoise`.
+        Name of the user's noise, written as `strategy` is; None is a noise of `CampaignNoise`.
     strategy : str
         Name; for a strategy in a Python file with the hash of the file: `mine.py:Mine
         sha256:0123456789abcdef`.
@@ -123,9 +122,7 @@ class Manifest:
 
     @property
     def is_watched(self) -> bool:
-        """Whether the number of runs of a sweep may depend on its results
-        (`infoset.sim.requirement.judge`).
-        """
+        """Whether the number of runs of a sweep may depend on its results, see `judge`."""
         return bool(self.axes) and (self.extended or self.until is not None)
 
     @property
@@ -139,19 +136,16 @@ class Manifest:
         return self.cell_runs[0] if self.cell_runs and not self.axes else None
 
     def wanted_runs(self, cell: int) -> int:
-        """Return the engagements of a cell that belong to the result: fewer than `runs` where a
-        rule stopped it.
-        """
+        """Return the number of engagements of a cell, without those after a rule has stopped it."""
         return self.cell_runs[cell] if self.cell_runs else self.runs
 
     def chunks(self) -> Iterator[tuple[int, range]]:
-        """Yield the cell and the runs of each chunk of the result: the first chunk of each cell,
-        then the second.
-        """
+        """Yield the cell and the runs of each chunk, the first chunk of each cell before others."""
         for first in range(0, self.runs, self.chunk):
             for cell in range(self.cells):
-                if first < self.wanted_runs(cell):
-                    yield cell, range(first, min(first + self.chunk, self.wanted_runs(cell)))
+                end = self.wanted_runs(cell)
+                if first < end:
+                    yield cell, range(first, min(first + self.chunk, end))
 
     def values_of(self, cell: int) -> dict[str, float]:
         """Return the varied values of a cell of a sweep, by key."""
@@ -168,25 +162,19 @@ class Manifest:
     @property
     def identity(self) -> str:
         """Fingerprint of `decisive`; every file of runs contains it."""
-        return hashlib.sha256(json.dumps(self.decisive(), sort_keys=True).encode()).hexdigest()[:32]
+        text = json.dumps(self.decisive(), sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:32]
 
     def continued(self, wanted: Manifest, folder: Path) -> Manifest:
-        """Return the manifest of this campaign, resumed as the `wanted` one, perhaps with more runs
-        or another rule.
+        """Return the manifest of this campaign, resumed with the runs and the rule of `wanted`.
 
-        Raise StorageError, with all differences, if they are different campaigns.
+        A StorageError, with all differences, is raised if they are different campaigns.
         """
-        there = self.decisive()
-        here = wanted.decisive()
-        lines = [
-            f"\n  {key}: {_shown(there, key)} in the folder, {_shown(here, key)} now"
-            for key in dict.fromkeys((*there, *here))
-            if there.get(key) != here.get(key)
-        ]
-        if lines:
+        differences = _differences(self.decisive(), wanted.decisive())
+        if differences:
             raise StorageError(
                 f"{folder}: contains a campaign with different settings; repeat the command with "
-                f"those of the folder, or choose another folder:{''.join(lines)}"
+                f"those of the folder, or choose another folder:{''.join(differences)}"
             )
         if wanted.runs < self.runs:
             option = "--max-runs" if wanted.axes and wanted.until else "--runs"
@@ -194,6 +182,7 @@ class Manifest:
                 f"{folder}: the {self.kind} in this folder has {self.runs} runs, more than "
                 f"{option} {wanted.runs}; give {option} {self.runs} or more"
             )
+
         is_same = wanted.runs == self.runs and wanted.until == self.until
         # Once the number of runs may depend on the results, it may in all later sessions.
         grows = bool(self.axes) and (
@@ -251,6 +240,15 @@ def _flat(value: Any, path: str = "") -> dict[str, Any]:
             for name, leaf in _flat(inner, f"{path}.{key}" if path else str(key)).items()
         }
     return {path: value}
+
+
+def _differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:
+    """Return a line for each key with different values in the folder and now."""
+    return [
+        f"\n  {key}: {_shown(there, key)} in the folder, {_shown(here, key)} now"
+        for key in dict.fromkeys((*there, *here))
+        if there.get(key) != here.get(key)
+    ]
 
 
 def _shown(flat: Mapping[str, Any], key: str) -> str:

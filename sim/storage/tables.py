@@ -1,6 +1,4 @@
-"""Files of runs: written as Arrow tables, read as pandas frames. The one module that imports
-pyarrow.
-"""
+"""Files of runs, written as Arrow tables and read as pandas frames. Only this imports pyarrow."""
 
 from __future__ import annotations
 
@@ -52,9 +50,8 @@ def to_bytes(
     values["noise"] = [noise.of_run(run).value for run in results.runs.tolist()]
     table = pa.table(values, SCHEMA.with_metadata(metadata))
     sink = pa.BufferOutputStream()
-    texts = [
-        field.name for field in SCHEMA if pa.types.is_dictionary(field.type)
-    ]  # random numbers do not repeat
+    # Only texts repeat: a dictionary of random numbers would need more space.
+    texts = [field.name for field in SCHEMA if pa.types.is_dictionary(field.type)]
     pq.write_table(table, sink, compression="zstd", use_dictionary=texts, write_page_checksum=True)
     return bytes(sink.getvalue().to_pybytes())
 
@@ -65,7 +62,7 @@ def read(
     """Return some columns of all files, one after the other; None is all columns.
 
     Each file must have the schema and its metadata in `files`. A StorageError, which names the
-    file, is raised if one cannot be read or has others.
+    file, is raised if a file cannot be read, or its schema or metadata differ.
     """
     names = SCHEMA.names if columns is None else list(columns)
     parts = [pa.schema([SCHEMA.field(name) for name in names]).empty_table()]
@@ -83,17 +80,16 @@ def read(
     frame = table.to_pandas(
         types_mapper={pa.bool_(): pd.BooleanDtype()}.get, split_blocks=True, self_destruct=True
     )
-    # Arrow keeps freed memory, here as much as that of the frame.
+    # Arrow keeps freed memory: here as much as the frame needs.
     pa.default_memory_pool().release_unused()
     return frame
 
 
 def _table(file: Path, metadata: Mapping[str, str], names: Sequence[str]) -> pa.Table:
+    wanted = {key.encode(): value.encode() for key, value in metadata.items()}
     # A dataset of pyarrow reads the same, and takes twice as long for each file.
     with pq.ParquetFile(file, page_checksum_verification=True) as stored:
         found = stored.schema_arrow
-        if not found.equals(SCHEMA) or found.metadata != {
-            k.encode(): v.encode() for k, v in metadata.items()
-        }:
+        if not found.equals(SCHEMA) or found.metadata != wanted:
             raise ValueError("it is no file of runs of this campaign")
         return stored.read(names)

@@ -24,6 +24,7 @@ from infoset.sim import (
     Campaign,
     CampaignNoise,
     QuantileName,
+    RunsUntil,
     Scenario,
     StoppingRule,
     fly_one,
@@ -415,7 +416,8 @@ def test_two_campaigns_in_one_folder_at_once(brief: Scenario, tmp_path: Path) ->
 @pytest.fixture
 def until(brief: Scenario, tmp_path: Path) -> Campaign:
     rule = StoppingRule(QuantileName("miss_m", 0.5), 1.5)
-    return replace(mixed(brief, tmp_path / "stopped", 200), noise=None, until=rule)
+    runs = RunsUntil(rule, max_runs=200)
+    return replace(mixed(brief, tmp_path / "stopped"), noise=None, runs=runs)
 
 
 def test_a_rule_stops_at_the_same_run_with_any_workers(until: Campaign, tmp_path: Path) -> None:
@@ -435,7 +437,7 @@ def test_a_rule_stops_at_the_same_run_with_any_workers(until: Campaign, tmp_path
     assert same(again.run(resume=True, workers=2).runs(), stopped)
     shards(tmp_path / "broken")[1].unlink()
     assert same(again.run(resume=True).runs(), stopped)
-    whole = replace(again, until=None).run(resume=True)
+    whole = replace(again, runs=200).run(resume=True)
     assert (whole.finished_runs, whole.manifest.stopped_after) == (200, None)
     assert same(whole.runs()[:runs], stopped)
     # A rule that comes later removes no runs.
@@ -444,7 +446,7 @@ def test_a_rule_stops_at_the_same_run_with_any_workers(until: Campaign, tmp_path
 
 def test_a_rule_that_is_never_met_leaves_all_runs(until: Campaign) -> None:
     rule = StoppingRule(QuantileName("miss_m", 0.999), 1e-6)
-    folder = replace(until, runs=40, until=rule).run()
+    folder = replace(until, runs=RunsUntil(rule, max_runs=40)).run()
     assert (folder.finished_runs, folder.manifest.stopped_after) == (40, None)
 
 

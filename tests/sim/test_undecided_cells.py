@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from infoset.sim import Campaign, CampaignNoise, QuantileName, Requirement, Scenario
+from infoset.sim import Campaign, CampaignNoise, QuantileName, Requirement, RunsUntil, Scenario
 from infoset.sim.requirement import Decision, judge
 from infoset.sim.scenario import of_model
 from infoset.sim.storage import Axis, CampaignFolder, read_manifest
@@ -42,16 +42,14 @@ def asked(brief: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Campaign
     folder = tmp_path_factory.mktemp("undecided") / "sweep"
     return Campaign(
         brief,
-        16,
+        RunsUntil(REQUIRED, max_runs=160, min_runs=16),
         folder,
         seed=3,
         noise=CampaignNoise.MIXED,
         guarantee=False,
         chunk=16,
-        until=REQUIRED,
         axes=(axis,),
         cells=cells,
-        max_runs=160,
     )
 
 
@@ -93,7 +91,7 @@ def test_cells_stop_when_they_are_decided(flown: CampaignFolder) -> None:
 def test_the_runs_of_a_cell_are_those_of_a_longer_sweep(
     asked: Campaign, flown: CampaignFolder, tmp_path: Path
 ) -> None:
-    whole = replace(asked, runs=160, until=None, max_runs=None, folder=tmp_path / "whole").run()
+    whole = replace(asked, runs=160, folder=tmp_path / "whole").run()
     for cell, size in enumerate(flown.manifest.cell_runs):
         assert flown.runs(cell=cell).equals(whole.runs(cell=cell)[:size])
 
@@ -130,7 +128,7 @@ def test_a_sweep_of_fixed_runs_is_continued_until_it_is_decided(
 ) -> None:
     for runs in (16, 10):
         folder = tmp_path / f"{runs}"
-        fixed = replace(asked, runs=runs, until=None, max_runs=None, folder=folder).run()
+        fixed = replace(asked, runs=runs, folder=folder).run()
         assert fixed.finished_runs == runs * len(ERRORS)
         replace(asked, folder=folder).run(resume=True)
         assert names(folder) == names(asked.folder)
@@ -141,8 +139,10 @@ def test_a_sweep_of_fixed_runs_is_continued_until_it_is_decided(
 def test_more_runs_in_each_cell_change_no_decision(
     asked: Campaign, flown: CampaignFolder, tmp_path: Path
 ) -> None:
-    longer = replace(asked, runs=max(flown.manifest.cell_runs), folder=tmp_path / "longer").run()
-    assert set(longer.manifest.cell_runs) == {max(flown.manifest.cell_runs)}
+    most = max(flown.manifest.cell_runs)
+    runs = RunsUntil(REQUIRED, max_runs=160, min_runs=most)
+    longer = replace(asked, runs=runs, folder=tmp_path / "longer").run()
+    assert set(longer.manifest.cell_runs) == {most}
     for cell in range(len(ERRORS)):
         for short, long in zip(samples(flown, cell), samples(longer, cell), strict=True):
             decision = judge(short, REQUIRED, watched=True).decision
@@ -151,6 +151,6 @@ def test_more_runs_in_each_cell_change_no_decision(
 
 def test_what_does_not_fit_together(asked: Campaign) -> None:
     with pytest.raises(ValueError, match="max_runs must be at least 16"):
-        replace(asked, max_runs=15)
+        RunsUntil(REQUIRED, max_runs=15, min_runs=16)
     with pytest.raises(ValueError, match="cell_runs must contain 4 numbers"):
         replace(asked.manifest(), cell_runs=(1, 2))
