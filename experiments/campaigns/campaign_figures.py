@@ -1,6 +1,4 @@
-"""Figures of a campaign: distributions with bands, convergence of quantiles, and the miss over the
-initial state.
-"""
+"""Figures of a campaign: distributions, convergence of quantiles, and miss over the start."""
 
 from __future__ import annotations
 
@@ -41,22 +39,23 @@ from infoset.sim.storage import CampaignFolder
 CONVERGING = {0.5: "-", 0.9: (0, (5, 1.5)), 0.99: (0, (1.5, 1.2))}
 """Levels of the quantiles over the number of runs, with their lines."""
 RUNS_A_BIN = 100
-"""Minimum mean number of runs in a bin of the median and the 90 % quantile over the initial
-state.
-"""
+"""Minimum mean number of runs in a bin of the initial state: ten runs are above its quantile."""
 _BINNED = (0.5, 0.9)
+"""Levels of the quantiles in the bins."""
+_BINS = 24
+"""Maximum number of bins of the initial state: narrower ones cannot be seen in a panel."""
 _LOOKS = 28
+"""Number of sizes of a sample at which its quantiles are estimated: a smooth line in a panel."""
 _DECADES_FROM = 1000
 """Number of runs from which the axis of the number of runs has labels at powers of ten only."""
-_BINS = 24
 _QUANTITIES = {"miss_m": "miss, m", "impulse_m_s": "impulse spent, m/s"}
 
 
 def draw_all(folder: CampaignFolder) -> Iterator[Figure]:
-    """Draw the figures of a campaign, one after the other; in space also the misses across the
-    approach.
+    """Draw the figures of a campaign, one after the other.
 
-    Only the columns of one figure are in memory.
+    In space the misses across the approach are the last figure. Only the columns of one figure are
+    in memory.
     """
     scenario = folder.manifest.scenario
     yield draw_samples(_distributions(folder), scenario.radius_m)
@@ -67,21 +66,24 @@ def draw_all(folder: CampaignFolder) -> Iterator[Figure]:
 
 
 def _distributions(folder: CampaignFolder) -> list[Sample]:
-    """Return what the distributions of each noise show."""
+    """Return the samples of the distributions, one for each noise."""
     scenario = folder.manifest.scenario
     sensor = "no" if scenario.range_sensor is None else "with"
-    bound = (
-        "guaranteed miss"
-        if scenario.set_model.is_guaranteed
-        else "the paper's $\\Phi$ (not a bound here)"
-    )
+    bound = "the paper's $\\Phi$ (not a bound here)"
+    if scenario.set_model.is_guaranteed:
+        bound = "guaranteed miss"
+
     samples = []
     for noise, runs in samples_of(folder, (*_QUANTITIES, "guaranteed_miss_m")).items():
-        miss_m, impulse_m_s = (runs[name].to_numpy() for name in _QUANTITIES)
-        bounds_m = runs["guaranteed_miss_m"].dropna().to_numpy()
-        title = f"{noise} noise, {sensor} range sensor, {some_runs(len(runs))}"
         samples.append(
-            Sample(title, _look(noise), miss_m, impulse_m_s, bounds_m, f"{noise} noise: {bound}")
+            Sample(
+                name=f"{noise} noise, {sensor} range sensor, {some_runs(len(runs))}",
+                look=_look(noise),
+                miss_m=runs["miss_m"].to_numpy(),
+                impulse_m_s=runs["impulse_m_s"].to_numpy(),
+                guaranteed_miss_m=runs["guaranteed_miss_m"].dropna().to_numpy(),
+                guaranteed_name=f"{noise} noise: {bound}",
+            )
         )
     return samples
 
@@ -90,26 +92,32 @@ def _clouds(folder: CampaignFolder) -> list[Cloud]:
     """Return the misses of each noise across the approach."""
     scenario = folder.manifest.scenario
     has_axes = scenario.b_plane_t_rad is not None
-    across = ("b_dot_t_m", "b_dot_r_m") if has_axes else ("miss_y_m", "miss_z_m")
+    across = ["b_dot_t_m", "b_dot_r_m"] if has_axes else ["miss_y_m", "miss_z_m"]
+
     clouds = []
     for noise, runs in samples_of(folder, ("miss_m", "guaranteed_miss_m", *across)).items():
         bounds_m = runs["guaranteed_miss_m"]
-        has_bound = scenario.set_model.is_guaranteed and bounds_m.notna().all()
-        most_m = float(bounds_m.max()) if has_bound else None
-        title = f"{noise} noise, {some_runs(len(runs))}"
+        guaranteed_m = None
+        if scenario.set_model.is_guaranteed and bounds_m.notna().all():
+            guaranteed_m = float(bounds_m.max())
         clouds.append(
-            Cloud(title, runs[[*across]].to_numpy(), runs["miss_m"].to_numpy(), most_m, has_axes)
+            Cloud(
+                title=f"{noise} noise, {some_runs(len(runs))}",
+                across_m=runs[across].to_numpy(),
+                miss_m=runs["miss_m"].to_numpy(),
+                guaranteed_m=guaranteed_m,
+                has_axes=has_axes,
+            )
         )
     return clouds
 
 
 @style()
 def draw_convergence(by_noise: dict[str, pd.DataFrame]) -> Figure:
-    """Draw quantiles of the miss and the impulse of the first n runs over n, with their confidence
-    intervals.
+    """Draw quantiles of the first n runs over n, with their confidence intervals.
 
-    A quantile is drawn from the number of runs on that shows it (`infoset.sim.statistics.shows`).
-    Each noise has a row.
+    The quantities are the miss and the impulse. A quantile is drawn from the number of runs on that
+    shows it (`infoset.sim.statistics.shows`). Each noise has a row.
     """
     figure, panels = subplots(62.0 * len(by_noise) + 14.0, len(by_noise), 2)
     for row, (noise, runs) in zip(panels, by_noise.items(), strict=True):
@@ -117,10 +125,13 @@ def draw_convergence(by_noise: dict[str, pd.DataFrame]) -> Figure:
             _draw_quantiles(axes, runs[quantity].to_numpy(), _look(noise)["color"])
             axes.set(xlabel="runs", ylabel=label)
     letters(panels.flat, [f"{noise} noise" for noise in by_noise for _ in _QUANTITIES])
+
+    title = "bands: 95 % confidence intervals"
     most = max(map(len, by_noise.values()))
     hidden = [level_name(level) for level in CONVERGING if not shows(most, level)]
-    few = f"; too few runs for {', '.join(hidden)}" if hidden else ""
-    legend_below(figure, 3, title=f"bands: 95 % confidence intervals{few}")
+    if hidden:
+        title += f"; too few runs for {', '.join(hidden)}"
+    legend_below(figure, 3, title=title)
     return figure
 
 
@@ -132,30 +143,39 @@ def _draw_quantiles(axes: Axes, sample: Floats, colour: str) -> None:
     for index, (level, dashes) in enumerate(CONVERGING.items()):
         found = pd.DataFrame([look[index] for look in looks], index=counts, dtype=np.float64)
         found = found[[shows(count, level) for count in counts]]
+        line: dict[str, Any] = {"color": colour, "linestyle": dashes, "zorder": 3.0}
         if len(found):
             axes.plot([], [], color=INK, linestyle=dashes, label=level_name(level))
-        point: dict[str, Any] = {"marker": "o", "markersize": 3.0} if len(found) == 1 else {}
-        axes.plot(found.index, found["value"], color=colour, linestyle=dashes, zorder=3.0, **point)
+        if len(found) == 1:
+            # A line of one point is invisible.
+            line |= {"marker": "o", "markersize": 3.0}
+        axes.plot(found.index, found["value"], **line)
         axes.fill_between(
             found.index, found["lower"], found["upper"], color=colour, alpha=0.18, linewidth=0.0
         )
+
     axes.set(xlim=(0.9 * counts[0], 1.1 * counts[-1]), xscale="log")
     plain_ticks(axes.xaxis, TICKS if sample.size < _DECADES_FROM else TICKS[:1])
+    # From zero, unless the quantiles would be in the upper half of the axis.
     bottom, top = axes.get_ylim()
-    axes.set_ylim(bottom if bottom > 0.5 * top else 0.0, top)
+    if bottom <= 0.5 * top:
+        bottom = 0.0
+    axes.set_ylim(bottom, top)
 
 
 @style()
 def draw_dispersion(by_noise: dict[str, pd.DataFrame]) -> Figure:
-    """Draw the miss over each component of the initial state: the runs, their median and their 90 %
-    quantile.
+    """Draw the miss of the runs over each component of the initial state.
 
-    Each noise has a row, in space one of positions and one of velocities.
+    Lines show the median and the 90 % quantile of the miss. Each noise has a row, in space one row
+    of positions and one of velocities.
     """
     start = next(iter(by_noise.values())).filter(like="start_").dropna(axis="columns", how="all")
+    # In a plane x, z and their rates; in space three positions above three velocities.
     columns = 4 if start.shape[1] == 4 else 3
-    shape = len(by_noise) * (start.shape[1] // columns), columns
-    figure, panels = subplots(50.0 * shape[0] + 12.0, *shape, sharey="row")
+    rows = len(by_noise) * (start.shape[1] // columns)
+    figure, panels = subplots(50.0 * rows + 12.0, rows, columns, sharey="row")
+
     over = [(noise, name) for noise in by_noise for name in start]
     for axes, (noise, name) in zip(panels.flat, over, strict=True):
         _draw_cloud(axes, name, by_noise[noise], _look(noise)["color"])
@@ -174,24 +194,24 @@ def _draw_cloud(axes: Axes, name: str, runs: pd.DataFrame, colour: str) -> None:
     """Draw the miss over a component of the start, with quantiles if the runs are enough."""
     letter = name.removeprefix("start_").split("_")[0]
     miss_m = runs["miss_m"].to_numpy()
-    is_speed = letter.startswith("v")
-    start = runs[name].to_numpy() * (1.0 if is_speed else 1e-3)
-    axes.set_xlabel(f"initial $V_{letter[1:]}$, m/s" if is_speed else f"initial ${letter}$, km")
+    if letter.startswith("v"):
+        start = runs[name].to_numpy()
+        axes.set_xlabel(f"initial $V_{letter[1:]}$, m/s")
+    else:
+        start = runs[name].to_numpy() * 1e-3
+        axes.set_xlabel(f"initial ${letter}$, km")
     axes.ticklabel_format(axis="x", useOffset=False)
     axes.locator_params(axis="x", nbins=3)
     axes.tick_params(axis="x", pad=7.0)  # apart from the lowest label of the miss
     limit = 1.04 * axis_limit([miss_m]) or 1.0
     axes.set_ylim(0.0, limit)
-    if beyond := int((miss_m > limit).sum()):
-        place: dict[str, Any] = {
-            "xycoords": "axes fraction",
-            "ha": "right",
-            "va": "top",
-            "path_effects": HALO,
-        }
-        axes.annotate(f"{beyond} runs above", (0.97, 0.97), fontsize="small", **place)
+    _note_beyond(axes, int((miss_m > limit).sum()))
+
+    # Fewer points are larger and darker.
     step = -(-miss_m.size // MAX_POINTS)
-    size = min(2.2, (MAX_POINTS / miss_m.size) ** 0.25) if step == 1 else 1.0
+    size = 1.0
+    if step == 1:
+        size = min(2.2, (MAX_POINTS / miss_m.size) ** 0.25)
     look: dict[str, Any] = {
         "color": colour,
         "alpha": 0.4 * size,
@@ -199,20 +219,38 @@ def _draw_cloud(axes: Axes, name: str, runs: pd.DataFrame, colour: str) -> None:
         "markeredgewidth": 0.0,
     }
     axes.plot(start[::step], miss_m[::step], ".", rasterized=True, zorder=2.0, label="runs", **look)
+    _draw_bins(axes, start, miss_m)
+
+
+def _note_beyond(axes: Axes, count: int) -> None:
+    """Write the number of runs above the axis, if there are any."""
+    if not count:
+        return
+    place: dict[str, Any] = {
+        "xycoords": "axes fraction",
+        "ha": "right",
+        "va": "top",
+        "path_effects": HALO,
+    }
+    axes.annotate(f"{count} runs above", (0.97, 0.97), fontsize="small", **place)
+
+
+def _draw_bins(axes: Axes, start: Floats, miss_m: Floats) -> None:
+    """Draw quantiles of the miss in bins of a component of the start."""
     bins = min(_BINS, miss_m.size // RUNS_A_BIN)
-    if bins > 1 and np.ptp(start) > 0.0:
-        by_bin = pd.Series(miss_m).groupby(pd.cut(start, bins), observed=True)
-        for level in _BINNED:
-            values = by_bin.quantile(level)
-            middles = [each.mid for each in values.index]
-            dashes = CONVERGING[level]
-            axes.plot(
-                middles, values, color=INK, linestyle=dashes, zorder=3.0, label=level_name(level)
-            )
+    if bins < 2 or not np.ptp(start) > 0.0:
+        return
+    by_bin = pd.Series(miss_m).groupby(pd.cut(start, bins), observed=True)
+    for level in _BINNED:
+        values = by_bin.quantile(level)
+        middles = [each.mid for each in values.index]
+        line: dict[str, Any] = {"color": INK, "linestyle": CONVERGING[level], "zorder": 3.0}
+        axes.plot(middles, values, label=level_name(level), **line)
 
 
 def _look(noise: str) -> dict[str, Any]:
-    """Return the line style: dark and solid, or light and dashed, which differ also without
-    colours.
+    """Return the line style of a noise.
+
+    Game noise is dark and solid, the others are light and dashed: they differ without colours too.
     """
     return CURVE_LOOKS[4 if noise == "game" else 1]

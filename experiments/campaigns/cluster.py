@@ -17,19 +17,23 @@ PATIENCE_S = 8.0
 """Time limit for the scheduler's answer, and then for its workers, s."""
 
 RETRIES = 3
+"""Number of repetitions of a chunk whose worker has stopped; then the chunk is at fault."""
 RUNS_OF_A_PROCESS = 1500
-"""Minimum number of runs for each process. Processes take a second to start; later they are up to
-1.2 times as fast as threads, which share the interpreter's lock."""
+"""Minimum number of runs for each process: a process takes as long to start as a second of runs.
+
+Later, processes are up to 1.2 times as fast as threads, which share the interpreter's lock.
+"""
+LOCAL = ("localhost", "127.0.0.1", "::1")
+"""Hosts to which a connection does not leave the machine."""
 
 
 @contextlib.contextmanager
 def workers_of(
     options: FlightOptions, runs: int, note: Callable[[str], None]
 ) -> Iterator[tuple[Executor | None, int | None]]:
-    """Start the workers that the options choose for a number of runs; yield the arguments of
-    `Campaign.run`.
+    """Start the workers that the options choose for a number of runs.
 
-    `note` prints a line.
+    Yield the arguments of `Campaign.run`. `note` prints a line.
     """
     if options.dask is not None and options.workers is not None:
         raise InputError(
@@ -38,8 +42,8 @@ def workers_of(
     workers = options.workers or os.cpu_count() or 1
     if options.dask is not None:
         with cluster(options.dask, note) as (executor, threads):
-            # With two chunks per thread all threads have work while results are sent, and workers
-            # can join later.
+            # With two chunks per thread all threads have work while results are sent. With 16,
+            # workers can join later.
             yield executor, max(2 * threads, 16)
     elif workers > 1 and runs >= RUNS_OF_A_PROCESS * workers:
         with worker_processes(workers) as pool:
@@ -50,33 +54,27 @@ def workers_of(
 
 @contextlib.contextmanager
 def cluster(address: str, note: Callable[[str], None]) -> Iterator[tuple[Executor, int]]:
-    """Connect to the Dask scheduler at an address such as tcp://host:8786; yield its executor and
-    number of threads.
+    """Connect to a Dask scheduler; yield its executor and number of threads.
 
-    Raise `InputError` if the scheduler does not answer in time, or it has no workers.
+    The address is for example tcp://host:8786. Raise `InputError` if the scheduler does not answer
+    in time, or has no workers.
     """
     from distributed import Client
 
-    if not address.startswith("tls://") and urlsplit(address).hostname not in (
-        "localhost",
-        "127.0.0.1",
-        "::1",
-    ):
+    if not address.startswith("tls://") and urlsplit(address).hostname not in LOCAL:
         note(
             f"warning: --dask: the connection to {address} is not encrypted, and everyone who "
             "reaches that address can run programs there: use a private network, or tls:// (see "
             "the documentation, campaigns)"
         )
-    # The failure of a scheduler is one message of the command, without tracebacks of the client's
-    # threads.
+    # A failure is one message of the command, without tracebacks of the threads of the client.
     for name in ("distributed", "distributed.client", "tornado.application", "asyncio"):
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+
     with contextlib.ExitStack() as stack:
         try:
             client = stack.enter_context(Client(address, timeout=PATIENCE_S, set_as_default=False))
-        except (
-            Exception
-        ) as error:  # another program may send anything, and reading it may fail in any way
+        except Exception as error:  # another program sends anything; reading it fails in any way
             raise InputError(
                 f"--dask: no Dask scheduler answers at {address} ({str(error)[:150]}); start one "
                 "with: dask scheduler, and check the address that it prints"
@@ -88,6 +86,7 @@ def cluster(address: str, note: Callable[[str], None]) -> Iterator[tuple[Executo
                 f"--dask: the scheduler at {address} has no workers; start some with: dask worker "
                 f"{address}"
             ) from None
+
         threads = client.nthreads()
         note(f"{len(threads)} Dask workers, {sum(threads.values())} threads")
         yield client.get_executor(pure=False, retries=RETRIES), sum(threads.values())

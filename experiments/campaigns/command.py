@@ -27,18 +27,23 @@ from infoset.experiments.interception.command import (
 )
 
 MAX_WORKERS = 1024
+"""Maximum number of workers: more cores than a machine has; more would be a typing error."""
 MAX_AT_ONCE = 1_000_000
+"""Maximum number of runs in a shard, which a worker keeps in memory: 0.2 GB."""
 
 Required = Annotated[
     str | None,
     typer.Option(
         "--require",
         metavar="RULE",
-        help='Requirement: the upper bound of a quantile, "miss_m p99<10" (without a quantile p99: "miss_m<10"), or '
-        'the minimum probability of a hit, "hit>=0.95", or of no miss of a cause (engine, budget, knowledge, '
-        'saturated, guidance), "no-engine>=0.99". Each cell meets it, does not meet it, or is undecided, with '
-        "95 % confidence. Default: in a report, that of the sweep; otherwise hit>=0.95 if the body has a size, else "
-        "miss_m p99<10.",
+        help=(
+            'Requirement: the upper bound of a quantile, "miss_m p99<10" (without a quantile p99: '
+            '"miss_m<10"), or the minimum probability of a hit, "hit>=0.95", or of no miss of a '
+            'cause (engine, budget, knowledge, saturated, guidance), "no-engine>=0.99". Each cell '
+            "meets it, does not meet it, or is undecided, with 95 % confidence. Default: in a "
+            "report, that of the sweep; otherwise hit>=0.95 if the body has a size, else miss_m "
+            "p99<10."
+        ),
     ),
 ]
 
@@ -119,8 +124,10 @@ class CampaignOptions(FlightOptions):
         str | None,
         typer.Option(
             metavar="RULE",
-            help="Stop when the 95 % confidence interval of a quantile is narrow enough, for example "
-            '"miss_m p99 ci<0.5" (m).',
+            help=(
+                "Stop when the 95 % confidence interval of a quantile is narrow enough, for "
+                'example "miss_m p99 ci<0.5" (m).'
+            ),
         ),
     ] = None
     guarantee: Annotated[

@@ -14,6 +14,7 @@ from infoset.experiments.common.errors import InputError
 from infoset.experiments.common.output import need_writable
 from infoset.experiments.common.screen import NOT_FINITE, progress_bar, say, say_warnings
 from infoset.experiments.interception.scenario_file import (
+    all_warnings,
     feasibility_warnings,
     scenario_warnings,
     study_scenario,
@@ -31,15 +32,18 @@ MAX_WARNINGS = 5
 
 
 def scenario_of(options: FlightOptions) -> tuple[Scenario, list[str]]:
-    """Return the scenario that the options describe, with the campaign's noise, and lines about it
-    for the screen.
+    """Return the scenario of the options, and lines about it for the screen.
+
+    It has the campaign's noise.
     """
     resumed = None
     if options.resume and (options.out / MANIFEST).is_file():
         resumed = read_manifest(options.out).scenario.information_set.model
     scenario, notes = study_scenario(options, resumed)
     noise = noise_of(options)
-    return (noise.applied_to(scenario) if isinstance(noise, CampaignNoise) else scenario), notes
+    if isinstance(noise, CampaignNoise):
+        scenario = noise.applied_to(scenario)
+    return scenario, notes
 
 
 def noise_of(options: FlightOptions) -> CampaignNoise | OwnNoise | None:
@@ -54,28 +58,21 @@ def noise_of(options: FlightOptions) -> CampaignNoise | OwnNoise | None:
 def fly(
     campaign: Campaign, options: FlightOptions, notes: Sequence[str]
 ) -> tuple[CampaignFolder, list[str], float]:
-    """Simulate the engagements that the folder of a campaign does not contain yet, with messages on
-    stderr.
+    """Simulate the engagements that the folder of a campaign does not contain yet.
+
+    Messages are printed on stderr.
 
     Return the folder, the warnings about the scenarios, and the time of this session, s.
     """
     need_free(options.out, resume=options.resume)
     need_writable(options.out)
-    scenarios = campaign.cells or (campaign.scenario,)
-    warnings = list(
-        dict.fromkeys(line for scenario in scenarios for line in scenario_warnings(scenario))
-    )
-    corners = dict.fromkeys((scenarios[0], scenarios[-1]))
-    for name, scenario in zip(
-        ("first cell: ", "last cell: ") if campaign.cells else ("",), corners, strict=False
-    ):
-        warnings += [f"{name}{line}" for line in feasibility_warnings(scenario)]
-    say_warnings(warnings[: MAX_WARNINGS if campaign.cells else None], options.quiet, notes)
+    warnings = _warnings(campaign)
+    most = MAX_WARNINGS if campaign.cells else None
+    say_warnings(warnings[:most], options.quiet, notes)
+
+    note = partial(say, quiet=options.quiet)
     with (
-        workers_of(options, campaign.max_engagements, partial(say, quiet=options.quiet)) as (
-            executor,
-            workers,
-        ),
+        workers_of(options, campaign.max_engagements, note) as (executor, workers),
         progress_bar(options.quiet) as begin,
     ):
         began_s = time.perf_counter()
@@ -87,6 +84,21 @@ def fly(
             within_chunks=True,
         )
     return folder, warnings, time.perf_counter() - began_s
+
+
+def _warnings(campaign: Campaign) -> list[str]:
+    """Return the warnings about a scenario, or about the cells of a sweep.
+
+    The feasibility, which takes long, is examined in the first and in the last cell only.
+    """
+    if not campaign.cells:
+        return all_warnings(campaign.scenario)
+    lines = [line for cell in campaign.cells for line in scenario_warnings(cell)]
+    warnings = [*dict.fromkeys(lines)]
+    corners = dict.fromkeys((campaign.cells[0], campaign.cells[-1]))
+    for name, cell in zip(("first", "last"), corners, strict=False):
+        warnings += [f"{name} cell: {line}" for line in feasibility_warnings(cell)]
+    return warnings
 
 
 @contextlib.contextmanager

@@ -45,27 +45,27 @@ def run(options: CampaignOptions) -> None:
         stored, warnings, elapsed_s = fly(campaign, options, model_notes)
         manifest = stored.manifest
         table = summary(stored)
-        results = {
-            **heading(stored),
-            **({"warnings": warnings} if warnings else {}),
-            "elapsed_s": elapsed_s,
-            "samples": records(table.drop(columns="cell")),
-        }
-        stopped = (
-            ""
-            if manifest.stopped_after is None
-            else f" of {manifest.runs}, stopped by the rule {manifest.until}"
-        )
+        results = heading(stored)
+        if warnings:
+            results["warnings"] = warnings
+        results["elapsed_s"] = elapsed_s
+        results["samples"] = records(table.drop(columns="cell"))
+
+        runs = some_runs(stored.finished_runs)
+        limits = "95 % confidence limits"
+        if manifest.stopped_after is not None:
+            runs += f" of {manifest.runs}, stopped by the rule {manifest.until}"
+            limits = "confidence limits"  # less than 95 %: see the note of the summary
         parts = [
             study_title(manifest.scenario, manifest.strategy, manifest.seed),
-            f"{some_runs(stored.finished_runs)}{stopped}, {duration_text(elapsed_s)}; "
-            f"quantiles with {'' if stopped else '95 % '}confidence limits",
+            f"{runs}, {duration_text(elapsed_s)}; quantiles with {limits}",
             *summary_parts(stored, table),
         ]
         if manifest.until is not None and manifest.stopped_after is None:
             parts.append(
                 f"the rule {manifest.until} is not met; continue with --resume and a greater --runs"
             )
+
         written.enter(options.out, "shards")
         written.save(SCENARIO_FILE, to_toml(scenario))
         written.save(SUMMARY, to_json(results), "--json")

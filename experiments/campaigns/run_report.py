@@ -48,20 +48,25 @@ def run(options: ReportOptions) -> None:
     with campaign_errors():
         folder = _read(options)
         swept = bool(folder.manifest.axes)
-        figures = (
-            [*figure_files(*figure_names(noises_of(folder))), TABLE]
-            if swept
-            else figure_files(*_figures(folder))
-        )
-        with output_of(options, [*figures, "report.json", SCENARIO_FILE]) as written:
-            parts = (_report_sweep if swept else _report_campaign)(folder, options, written)
+        if swept:
+            files = [*figure_files(*figure_names(noises_of(folder))), TABLE]
+        else:
+            files = figure_files(*_figures(folder))
+
+        with output_of(options, [*files, "report.json", SCENARIO_FILE]) as written:
+            if swept:
+                parts = _report_sweep(folder, options, written)
+            else:
+                parts = _report_campaign(folder, options, written)
             written.save(SCENARIO_FILE, to_toml(folder.manifest.scenario))
             show(parts, options.quiet or written.stdout_taken)
 
 
 def _figures(folder: CampaignFolder) -> Sequence[str]:
-    names = ("figure-distributions", "figure-convergence", "figure-dispersion", "figure-b-plane")
-    return names if folder.manifest.scenario.is_spatial else names[:-1]
+    names = ["figure-distributions", "figure-convergence", "figure-dispersion"]
+    if folder.manifest.scenario.is_spatial:
+        names.append("figure-b-plane")
+    return names
 
 
 def _read(options: ReportOptions) -> CampaignFolder:
@@ -76,8 +81,10 @@ def _read(options: ReportOptions) -> CampaignFolder:
             f"{path}: contains no runs yet; continue with: infoset {folder.manifest.kind} --resume"
         )
     if not folder.complete:
-        most = "at most " if folder.manifest.until else ""
-        stored = f"{folder.finished_runs} of {most}{folder.wanted_runs} runs are stored"
+        wanted = f"{folder.wanted_runs} runs"
+        if folder.manifest.until:
+            wanted = f"at most {wanted}"
+        stored = f"{folder.finished_runs} of {wanted} are stored"
         say(f"warning: {stored}; --resume adds runs", options.quiet)
     return folder
 
@@ -131,26 +138,36 @@ def _report_campaign(
 
 
 def _scenario_file(folder: CampaignFolder, out: Path | None) -> Path:
-    """Return the file that the commands of single runs name: in the folder, or the one that the
-    report writes.
+    """Return the scenario file that the commands of single runs name.
+
+    It is the file of the folder or, if that is missing, the file that the report writes.
     """
     stored = folder.path / SCENARIO_FILE
-    return stored if out is None or stored.is_file() else out / SCENARIO_FILE
+    if out is None or stored.is_file():
+        return stored
+    return out / SCENARIO_FILE
 
 
 def _parts(
     folder: CampaignFolder, table: pd.DataFrame, related: pd.DataFrame, worst: pd.DataFrame
 ) -> Iterator[Part]:
     manifest = folder.manifest
-    stopped = "" if manifest.stopped_after is None else f", stopped by the rule {manifest.until}"
+    runs = some_runs(folder.finished_runs)
+    if manifest.stopped_after is not None:
+        runs += f", stopped by the rule {manifest.until}"
     yield study_title(manifest.scenario, manifest.strategy, manifest.seed)
-    yield f"{some_runs(folder.finished_runs)}{stopped}"
+    yield runs
     yield from summary_parts(folder, table)
-    yield from ("", "correlation of the miss with the initial state (95 % CI by Fisher's z):")
+
+    yield ""
+    yield "correlation of the miss with the initial state (95 % CI by Fisher's z):"
+    # Two lines for pearson_lower and the like.
     yield screen_table(
         related.rename(columns=lambda name: name.replace("_l", "\nl").replace("_u", "\nu")), 2
     )
-    yield from ("", "the worst runs, each with the command that simulates it again:")
+
+    yield ""
+    yield "the worst runs, each with the command that simulates it again:"
     for row in records(worst):
         miss = number(row["miss_m"])
         impulse = number(row["impulse_m_s"])

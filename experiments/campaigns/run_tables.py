@@ -1,6 +1,4 @@
-"""Tables of the stored runs of a campaign or a sweep: their summary, correlations with the start,
-the worst runs.
-"""
+"""Tables of stored runs: their summary, correlations with the start, and the worst runs."""
 
 from __future__ import annotations
 
@@ -44,7 +42,9 @@ from infoset.sim.storage import CampaignFolder, fingerprint
 from infoset.sim.versions import versions
 
 LEVELS = (0.1, 0.5, 0.9, 0.99, 0.999)
+"""Levels of the quantiles: the central ones, and the tails that large campaigns are run for."""
 WORST = 10
+"""Number of the runs with the largest miss that are listed: they fit a screen."""
 OUTCOMES = {outcome.value.replace("-", "_"): outcome.value for outcome in Outcome}
 """Columns of the numbers of runs with each outcome."""
 
@@ -69,14 +69,14 @@ def summary(
     steps = [
         Step(("outcome", "hit", "truth_kept", "set_emptied", "phi_held"), _counts),
         Step(("cause",), _causes),
-        *(
-            Step(("cause", column), partial(_explained, name))
-            for name, (_, column) in EXPLAINED.items()
-        ),
-        Step(("redraws",), _redrawn_share),
-        *(Step((quantity,), partial(_quantiles, levels=levels)) for quantity in QUANTITIES),
-        *more,
     ]
+    for name, (_, column) in EXPLAINED.items():
+        steps.append(Step(("cause", column), partial(_explained, name)))
+    steps.append(Step(("redraws",), _redrawn_share))
+    for quantity in QUANTITIES:
+        steps.append(Step((quantity,), partial(_quantiles, levels=levels)))
+    steps += more
+
     rows = []
     for row in rows_of_samples(folder, steps):
         values = folder.manifest.values_of(row["cell"])
@@ -86,18 +86,28 @@ def summary(
 
 
 def _counts(runs: pd.DataFrame) -> dict[str, Any]:
-    sized = int(runs["hit"].count())
-    hits = vars(estimate_hits(int(runs["hit"].sum()), sized)) if sized else {}
+    row: dict[str, Any] = {"runs": len(runs)}
+    for name, outcome in OUTCOMES.items():
+        row[name] = int((runs["outcome"] == outcome).sum())
+    row["truth_kept"] = int(runs["truth_kept"].sum())
+    row["set_emptied"] = int(runs["set_emptied"].sum())
+    row["set_failed"] = int((runs["set_emptied"] | ~runs["truth_kept"]).sum())
+    row["phi_known"] = int(runs["phi_held"].count())
+    row["phi_held"] = int(runs["phi_held"].sum())
+    return row | _hits(runs["hit"])
+
+
+def _hits(hit: pd.Series[bool]) -> dict[str, Any]:
+    """Return the number of hits, and their share with its interval; NaN without a known hit."""
+    sized = int(hit.count())
+    if not sized:
+        return dict.fromkeys(("hits", "hit_probability", "hit_lower", "hit_upper"), math.nan)
+    estimate = estimate_hits(int(hit.sum()), sized)
     return {
-        "runs": len(runs),
-        **{name: int((runs["outcome"] == outcome).sum()) for name, outcome in OUTCOMES.items()},
-        "truth_kept": int(runs["truth_kept"].sum()),
-        "set_emptied": int(runs["set_emptied"].sum()),
-        "set_failed": int((runs["set_emptied"] | ~runs["truth_kept"]).sum()),
-        "phi_known": int(runs["phi_held"].count()),
-        "phi_held": int(runs["phi_held"].sum()),
-        "hits": hits.get("hits", math.nan),
-        **{f"hit_{name}": hits.get(name, math.nan) for name in ("probability", "lower", "upper")},
+        "hits": estimate.hits,
+        "hit_probability": estimate.probability,
+        "hit_lower": estimate.lower,
+        "hit_upper": estimate.upper,
     }
 
 
@@ -109,11 +119,8 @@ def _causes(runs: pd.DataFrame) -> dict[str, Any]:
 
 def _explained(name: str, runs: pd.DataFrame) -> dict[str, float]:
     cause, column = EXPLAINED[name]
-    return {
-        f"missed_{name}": or_nan(
-            max_of_cause(runs["cause"].to_numpy(), runs[column].to_numpy(), cause)
-        )
-    }
+    maximum = max_of_cause(runs["cause"].to_numpy(), runs[column].to_numpy(), cause)
+    return {f"missed_{name}": or_nan(maximum)}
 
 
 def _redrawn_share(runs: pd.DataFrame) -> dict[str, float]:
@@ -126,37 +133,42 @@ def _redrawn_share(runs: pd.DataFrame) -> dict[str, float]:
 def _quantiles(runs: pd.DataFrame, levels: Sequence[float]) -> dict[str, float]:
     (quantity,) = runs
     known = runs[quantity].dropna().to_numpy()
+    names = [f"{quantity}_{level_name(level)}" for level in levels]
+    if not known.size:
+        columns = [f"{name}{end}" for name in names for end in ("", "_lower", "_upper")]
+        return dict.fromkeys([*columns, f"{quantity}_max"], math.nan)
+
     row = {}
-    estimates = estimate_quantiles(known, levels) if known.size else [None] * len(levels)
-    for level, estimate in zip(levels, estimates, strict=True):
-        name = f"{quantity}_{level_name(level)}"
-        row[name] = (
-            estimate.value if estimate is not None and shows(known.size, level) else math.nan
-        )
-        row |= {f"{name}_{end}": or_nan(getattr(estimate, end, None)) for end in ("lower", "upper")}
-    return row | {f"{quantity}_max": float(known.max()) if known.size else math.nan}
+    estimates = estimate_quantiles(known, levels)
+    for name, level, estimate in zip(names, levels, estimates, strict=True):
+        row[name] = estimate.value
+        if not shows(known.size, level):
+            row[name] = math.nan
+        row[f"{name}_lower"] = or_nan(estimate.lower)
+        row[f"{name}_upper"] = or_nan(estimate.upper)
+    row[f"{quantity}_max"] = float(known.max())
+    return row
 
 
 def start_columns(scenario: Scenario) -> tuple[str, ...]:
-    """Return the columns of the runs with the components of the initial state, in a plane without
-    y.
-    """
+    """Return the columns of the components of the initial state; in a plane without y."""
     columns = [column for column in columns_of(Results) if column.name.startswith("start_")]
     return tuple(column.name for column in columns if scenario.is_spatial or not column.optional)
 
 
 def correlations(folder: CampaignFolder) -> pd.DataFrame:
-    """Return Pearson's and Spearman's correlation of the miss with each component of the initial
-    state, by noise.
+    """Return the correlations of the miss with the components of the initial state.
 
-    Each has the ends of its 95 % confidence interval. The moduli of the lateral components are
-    included, for example `|start_z_m|`. A correlation is NaN where the component or the miss does
-    not vary, and so are its ends with fewer than 4 runs.
+    The table has a row for each noise and component, with Pearson's and Spearman's correlation and
+    the ends of their 95 % confidence intervals. The moduli of the lateral components are included,
+    for example `|start_z_m|`. A correlation is NaN where the component or the miss does not vary,
+    and the ends are NaN with fewer than 4 runs.
     """
     # Components of one step share the ranks of the miss.
     start = start_columns(folder.manifest.scenario)
-    is_small = fits(("miss_m", *start), folder.finished_runs)
-    groups = [start] if is_small else [(name,) for name in start]
+    groups = [(name,) for name in start]
+    if fits(("miss_m", *start), folder.finished_runs):
+        groups = [start]
     steps = [Step(("miss_m", *names), _correlations_with_miss) for names in groups]
 
     rows = []
@@ -167,16 +179,14 @@ def correlations(folder: CampaignFolder) -> pd.DataFrame:
         for component in sorted(sample, key=lambda name: name.startswith("|")):  # moduli last
             row = {"noise": noise, "component": component}
             for kind, value in sample[component].items():
-                ends = correlation_interval(value, size, ranks=kind == "spearman")
-                row |= {kind: value, f"{kind}_lower": ends[0], f"{kind}_upper": ends[1]}
+                lower, upper = correlation_interval(value, size, ranks=kind == "spearman")
+                row |= {kind: value, f"{kind}_lower": lower, f"{kind}_upper": upper}
             rows.append(row)
     return pd.DataFrame(rows)
 
 
 def _correlations_with_miss(runs: pd.DataFrame) -> dict[str, Any]:
-    """Return the number of runs, and both correlations of each component that is known, and of its
-    modulus.
-    """
+    """Return the number of runs, and the correlations of components and their moduli."""
     miss_m = runs["miss_m"]
     ranks = pd.Series(average_ranks(miss_m.to_numpy()))
 
@@ -196,21 +206,24 @@ def _correlations_with_miss(runs: pd.DataFrame) -> dict[str, Any]:
 
 
 def worst_runs(folder: CampaignFolder, scenario_file: Path) -> pd.DataFrame:
-    """Return the runs with the largest miss, the worst first; `replay` is the command that
-    simulates a run again.
+    """Return the runs with the largest miss, the worst first.
+
+    The column `replay` has the command that simulates the run again.
     """
+    manifest = folder.manifest
     # The manifest's name of a strategy or a noise in a file: mine.py:Mine sha256:...
-    file, _, version = folder.manifest.strategy.rpartition(" sha256:")
-    own = f" --strategy {shlex.quote(file)}" if version and file else ""
-    own_noise = shlex.quote((folder.manifest.own_noise or "").partition(" sha256:")[0])
+    file, _, version = manifest.strategy.rpartition(" sha256:")
+    strategy = ""
+    if version and file:
+        strategy = f" --strategy {shlex.quote(file)}"
+    own_noise = shlex.quote((manifest.own_noise or "").partition(" sha256:")[0])
+
     worst = _rows_of_worst(folder)
-    command = (
-        f"infoset engage {shlex.quote(str(scenario_file))} --noise {{}} --seed "
-        f"{folder.manifest.seed} --run {{}}"
-    )
     noises = worst["noise"].astype(str).replace(CampaignNoise.OWN.value, own_noise)
+    scenario = shlex.quote(str(scenario_file))
     replay = [
-        command.format(noise, run) + own for noise, run in zip(noises, worst["run"], strict=True)
+        f"infoset engage {scenario} --noise {noise} --seed {manifest.seed} --run {run}{strategy}"
+        for noise, run in zip(noises, worst["run"], strict=True)
     ]
     return worst.assign(replay=replay)
 
@@ -221,12 +234,14 @@ def _rows_of_worst(folder: CampaignFolder) -> pd.DataFrame:
     miss_m = folder.read_chunks(chunks, ["miss_m"])["miss_m"]
     positions = miss_m.nlargest(WORST).index.to_numpy()
 
+    # Find the run at each position; position 0 is the first run of the first file.
     ends = np.cumsum([len(runs) for _, runs in chunks])
     files = np.searchsorted(ends, positions, side="right")
-    numbers = [
-        chunks[file][1][position - ends[file] + len(chunks[file][1])]
-        for file, position in zip(files, positions, strict=True)
-    ]
+    numbers = []
+    for file, position in zip(files, positions, strict=True):
+        _, runs = chunks[file]
+        numbers.append(runs[position - ends[file] + len(runs)])
+
     columns = ["run", "noise", "outcome", "hit", "cause", "miss_m", "impulse_m_s"]
     read = folder.read_chunks([chunks[file] for file in np.unique(files)], columns)
     return read.set_index("run", drop=False).loc[numbers]
@@ -235,7 +250,7 @@ def _rows_of_worst(folder: CampaignFolder) -> pd.DataFrame:
 def heading(folder: CampaignFolder) -> dict[str, Any]:
     """Return the keys with which every JSON file of a campaign or a sweep begins."""
     manifest = folder.manifest
-    return {
+    keys = {
         "versions": versions(),
         "kind": manifest.kind,
         "scenario": manifest.scenario.name,
@@ -243,7 +258,10 @@ def heading(folder: CampaignFolder) -> dict[str, Any]:
         "model": manifest.scenario.information_set.model.value,
         "strategy": manifest.strategy,
         "noise": manifest.noise.value,
-        **({"own_noise": manifest.own_noise} if manifest.own_noise else {}),
+    }
+    if manifest.own_noise:
+        keys["own_noise"] = manifest.own_noise
+    keys |= {
         "range_sensor": manifest.scenario.range_sensor is not None,
         "seed": manifest.seed,
         "runs": folder.finished_runs,
@@ -251,28 +269,31 @@ def heading(folder: CampaignFolder) -> dict[str, Any]:
         "complete": folder.complete,
         "until": manifest.until,
         "stopped_after": manifest.stopped_after,
-        **({"notes": notes} if (notes := campaign_notes(folder)) else {}),
     }
+    notes = campaign_notes(folder)
+    if notes:
+        keys["notes"] = notes
+    return keys
 
 
 def campaign_notes(folder: CampaignFolder) -> list[str]:
-    """Return a line for each noise about what its results are; none for random noise."""
+    """Return a line for each noise that says how its results are to be read."""
     return noise_notes(folder.manifest.scenario, noises_of(folder))
 
 
 def summary_parts(folder: CampaignFolder, table: pd.DataFrame) -> Iterator[Part]:
-    """Yield the summary of a campaign for the screen: the quantiles, and lines about hits, sets and
-    outcomes.
-    """
+    """Yield the summary of a campaign for the screen: quantiles, hits, sets and outcomes."""
     manifest = folder.manifest
     samples = [row for row in records(table) if row["runs"]]
     yield screen_table(_quantile_table(samples, bound_name(manifest.scenario)), 2)
+
     sets = SetCounts()
     for row in samples:
         counts = SetCounts(row["runs"], row["truth_kept"], row["set_emptied"], row["set_failed"])
         for text in _notes(folder, row, counts, len(samples)):
             yield f"{row['noise']} noise: {text}"
         sets += counts
+
     yield from set_warnings(manifest.scenario.information_set.model, sets)
     yield from campaign_notes(folder)
     if manifest.stopped_after is not None:
@@ -299,11 +320,14 @@ def _quantile_table(samples: Sequence[Mapping[str, Any]], phi: str) -> pd.DataFr
 def _notes(
     folder: CampaignFolder, row: Mapping[str, Any], sets: SetCounts, noises: int
 ) -> Iterator[str]:
-    """Yield lines about the quantiles that are not shown, hits, sets and outcomes of a noise."""
+    """Yield lines about hidden quantiles, hits, sets and outcomes of a noise."""
     yield from quantile_notes(row["runs"], LEVELS, noises)
+
     if row["hits"] is not None:
-        ends = (row["hit_probability"], row["hit_lower"], row["hit_upper"])
-        yield hit_text(HitEstimate(row["runs"], row["hits"], *ends), folder.manifest.scenario)
+        hits = HitEstimate(
+            row["runs"], row["hits"], row["hit_probability"], row["hit_lower"], row["hit_upper"]
+        )
+        yield hit_text(hits, folder.manifest.scenario)
         missed = {
             name.removeprefix("missed_"): value
             for name, value in row.items()
@@ -311,6 +335,7 @@ def _notes(
         }
         if causes := miss_text(missed, row["runs"], folder.manifest.scenario):
             yield causes
+
     if started := redrawn_text(row.get("redrawn_share")):
         yield started
     outcomes = ", ".join(
@@ -328,17 +353,24 @@ def records(table: pd.DataFrame) -> list[dict[str, Any]]:
 
 
 def screen_table(table: pd.DataFrame, left: int) -> Table:
-    """Return a table for the screen, with the first `left` columns as text and numbers rounded; NaN
-    is `-`.
+    """Return a table for the screen, numbers rounded; NaN is `-`.
+
+    The first `left` columns are text.
     """
     printed = number_table(*table.columns, left=left)
     for row in records(table):
-        printed.add_row(
-            *(value if isinstance(value, str) else number(value) for value in row.values())
-        )
+        printed.add_row(*map(_cell, row.values()))
     return printed
 
 
+def _cell(value: str | float | None) -> str:
+    if isinstance(value, str):
+        return value
+    return number(value)
+
+
 def or_nan(value: float | None) -> float:
-    """Return a number for a table, NaN if it is unknown."""
-    return math.nan if value is None else value
+    """Return a number for a table; NaN if it is unknown."""
+    if value is None:
+        return math.nan
+    return value

@@ -1,6 +1,4 @@
-"""Rows of tables from the stored runs of a campaign or a sweep, with a few columns in memory at a
-time.
-"""
+"""Rows of tables from stored runs, with a few columns in memory at a time."""
 
 from __future__ import annotations
 
@@ -30,8 +28,9 @@ _BYTES_A_RUN = {column.name: _BYTES.get(column.kind, _TEXT_BYTES) for column in 
 
 @dataclass(frozen=True)
 class Step:
-    """A part of the rows of a table: `keys_of` returns keys and values from these columns of a
-    sample.
+    """A part of the rows of a table.
+
+    `keys_of` returns the keys and values of a sample from these columns.
     """
 
     columns: tuple[str, ...]
@@ -44,11 +43,10 @@ def noises_of(folder: CampaignFolder) -> list[str]:
 
 
 def rows_of_samples(folder: CampaignFolder, steps: Sequence[Step]) -> Iterator[dict[str, Any]]:
-    """Yield the keys of all steps for each cell and noise, whose sample may be empty; a campaign
-    has one cell.
+    """Yield the keys of all steps for each cell and noise, whose sample may be empty.
 
-    Only the columns of a few steps of one cell are in memory, at most about `PASS_BYTES` or one
-    step.
+    A campaign has one cell. Only the columns of a few steps of one cell are in memory, at most
+    about `PASS_BYTES` or one step.
     """
     noises = noises_of(folder)
     for cell, chunks in enumerate(folder.stored_chunks()):

@@ -1,5 +1,6 @@
-"""The keys of a scenario file that a sweep varies, each over a range of values in the unit of the
-file.
+"""The keys of a scenario file that a sweep varies, each over a range of values.
+
+The values are in the unit of the file.
 
 A cell is valid exactly when a file with its values is, and has the same error messages.
 """
@@ -20,7 +21,9 @@ from infoset.sim.scenario import Scenario
 from infoset.sim.storage import MAX_CELLS, Axis
 
 MAX_AXES = 4
+"""Maximum number of axes: with ten values each, four axes have `MAX_CELLS` cells."""
 MAX_VALUES = 1000
+"""Maximum number of values of an axis: more than a figure can show."""
 SCALE = "scale"
 """Name, after the table of a sensor, of the factor of its error bounds."""
 _NUMBER = r"([+-]?(?:[0-9]{1,20}\.?[0-9]{0,20}|\.[0-9]{1,20})(?:[eE][+-]?[0-9]{1,4})?)"
@@ -28,13 +31,13 @@ _RANGE = re.compile(rf"(log:)?\s*{_NUMBER}\s*:\s*{_NUMBER}\s*:\s*([0-9]{{1,9}})"
 
 
 def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
-    """Read the value of --vary: `table.key=FROM:TO:COUNT` or `table.key=log:FROM:TO:COUNT`,
-    separated by commas.
+    """Read the value of --vary: axes, separated by commas.
 
-    Of a key that is an interval, `table.key.min` or `table.key.max` is varied.
-    `one.key=other.key=FROM:TO:COUNT` gives both keys the same values. `sensor.scale` is a factor of
-    all error bounds of a sensor. Raise `InputError` if the text has another form, or scenarios have
-    no such key; the message suggests the most similar key.
+    An axis is `table.key=FROM:TO:COUNT` or `table.key=log:FROM:TO:COUNT`. Of a key that is an
+    interval, `table.key.min` or `table.key.max` is varied. `one.key=other.key=FROM:TO:COUNT` gives
+    both keys the same values. `sensor.scale` is a factor of all error bounds of a sensor. Raise
+    `InputError` if the text has another form, or scenarios have no such key; the message suggests
+    the most similar key.
     """
     pieces = text.split(",")
     if len(pieces) > MAX_AXES:
@@ -43,19 +46,20 @@ def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
             "some out"
         )
     axes = tuple(_axis(piece.strip(), scenario) for piece in pieces)
+
+    # A key may be varied once, also by the factor of its sensor.
     bounds = _error_bounds(scenario)
-    varied = [
-        (key, tied)
-        for axis in axes
-        for tied in tied_keys(axis.key)
-        for key in bounds.get(tied, {tied: 0.0})
-    ]
-    for key, _ in varied:
-        names = [tied for other, tied in varied if other == key]
+    varied: dict[str, list[str]] = {}
+    for axis in axes:
+        for tied in tied_keys(axis.key):
+            for key in bounds.get(tied, {tied: 0.0}):
+                varied.setdefault(key, []).append(tied)
+    for names in varied.values():
         if len(names) > 1:
             raise InputError(
                 f"--vary: {' and '.join(names)} vary the same value; name each key once"
             )
+
     cells = math.prod(len(axis.values) for axis in axes)
     if cells > MAX_CELLS:
         raise InputError(
@@ -75,49 +79,39 @@ def sweep_cells(scenario: Scenario, axes: Sequence[Axis]) -> tuple[Scenario, ...
         changes: dict[str, float] = {}
         for axis, value in zip(axes, values, strict=True):
             for key in tied_keys(axis.key):
-                scaled = {name: value * bound for name, bound in bounds.get(key, {}).items()}
-                changes |= {name: float(f"{number:.12g}") for name, number in scaled.items()} or {
-                    key: value
-                }
-        changes = {
-            key: round(value) if numeric_key(Scenario, key) is int else value
-            for key, value in changes.items()
-        }
+                if bounds.get(key):
+                    for name, bound in bounds[key].items():
+                        changes[name] = float(f"{value * bound:.12g}")
+                else:
+                    changes[key] = value
+        for key, value in changes.items():
+            if numeric_key(Scenario, key) is int:
+                changes[key] = round(value)
         text = ", ".join(f"{key} = {value:.12g}" for key, value in changes.items())
         cells.append(changed(scenario, changes, f"{scenario.name} with {text}"))
     return tuple(cells)
 
 
 def _error_bounds(scenario: Scenario) -> dict[str, dict[str, float]]:
-    """Return the error bounds of each sensor by key, under the name of their common factor:
-    `angle_sensor.scale`.
+    """Return the error bounds of each sensor by key, under the name of their common factor.
+
+    The name is for example `angle_sensor.scale`.
     """
-    return {
-        f"{sensor.table}.{SCALE}": {
+    factors: dict[str, dict[str, float]] = {}
+    for sensor in scenario.sensors.values():
+        factors[f"{sensor.table}.{SCALE}"] = {
             f"{sensor.table}.{name}": value
             for name, value in vars(sensor).items()
-            if "error" in name and value
-            if isinstance(value, float)
+            if "error" in name and value and isinstance(value, float)
         }
-        for sensor in scenario.sensors.values()
-    }
+    return factors
 
 
 def _axis(piece: str, scenario: Scenario) -> Axis:
+    """Read one axis of --vary."""
     *keys, written = (part.strip() for part in piece.split("="))
     factors = _error_bounds(scenario)
-    for key in keys:
-        if key not in factors and numeric_key(Scenario, key) is None:
-            guess = similar_key(
-                key, [known for known in [*keys_of(Scenario), *factors] if known != key]
-            )
-            remedy = f"; did you mean {guess}?" if guess else ""
-            raise InputError(f"--vary: a scenario has no numeric key {shown(key)}{remedy}")
-    if len({unit_of(key) for key in keys}) > 1:
-        units = ", ".join(f"{key} in {unit_of(key) or 'no unit'}" for key in keys)
-        raise InputError(
-            f"--vary: keys with the same values must have the same unit, found {units}"
-        )
+    _check_keys(keys, [*factors])
     match = _RANGE.fullmatch(written)
     if not keys or match is None:
         raise InputError(
@@ -138,7 +132,10 @@ def _axis(piece: str, scenario: Scenario) -> Axis:
             f"--vary: {keys[0]}: factors and logarithmic values must be greater than 0, found "
             f"{match[2]}"
         )
-    between = (np.geomspace if is_log else np.linspace)(first, last, count)[1:-1]
+
+    # The ends are exactly as written; the values between them have 12 digits.
+    spaced = np.geomspace if is_log else np.linspace
+    between = spaced(first, last, count)[1:-1]
     values = [first, *(float(f"{value:.12g}") for value in between), last]
     if any(numeric_key(Scenario, key) is int for key in keys):
         values = [float(round(value)) for value in values]
@@ -149,6 +146,22 @@ def _axis(piece: str, scenario: Scenario) -> Axis:
         )
     with input_errors("--vary"):
         return Axis("=".join(keys), tuple(values), "log" if is_log else "linear")
+
+
+def _check_keys(keys: Sequence[str], factors: Sequence[str]) -> None:
+    """Raise `InputError` unless keys are numeric keys or factors, all in the same unit."""
+    for key in keys:
+        if key not in factors and numeric_key(Scenario, key) is None:
+            known = [known for known in [*keys_of(Scenario), *factors] if known != key]
+            message = f"--vary: a scenario has no numeric key {shown(key)}"
+            if guess := similar_key(key, known):
+                message += f"; did you mean {guess}?"
+            raise InputError(message)
+    if len({unit_of(key) for key in keys}) > 1:
+        units = ", ".join(f"{key} in {unit_of(key) or 'no unit'}" for key in keys)
+        raise InputError(
+            f"--vary: keys with the same values must have the same unit, found {units}"
+        )
 
 
 def tied_keys(key: str) -> list[str]:
@@ -162,13 +175,20 @@ def unit_of(key: str) -> str:
 
 
 def key_label(key: str, factor: str = "") -> str:
-    """Return a key as the label of an axis, with a factor of its unit: `angle sensor: error at
-    nominal range, rad`.
+    """Return a key as the label of an axis, with a factor of its unit.
+
+    For example ``angle sensor: error at nominal range, rad``.
     """
     names = []
     for single in tied_keys(key):
-        end = single[-4:] if single.endswith((".min", ".max")) else ""
+        end = ""
+        if single.endswith((".min", ".max")):
+            end = single[-4:]
         name = split_unit(single.removesuffix(end))[0] + end.replace(".", " ")
         names.append(name.replace(f".{SCALE}", ".factor of the error bounds").replace(".", ": "))
+
+    label = " = ".join(names)
     unit = f"{factor}{unit_of(tied_keys(key)[0])}".strip()
-    return " = ".join(names) + (f", {unit}" if unit else "")
+    if unit:
+        label += f", {unit}"
+    return label

@@ -1,5 +1,4 @@
-"""Figures of a sweep: the decisions about the requirement, and quantiles as lines (one key) or heat
-maps (two keys).
+"""Figures of a sweep: decisions and quantiles as lines (one key) or maps (two keys).
 
 The values of a key are drawn at the positions 0, 1, 2, ...: those of `--vary` are equally spaced on
 its scale, linear or logarithmic, and lines between them interpolate on this scale, as
@@ -51,7 +50,7 @@ DECISION_COLOURS = {
 }
 """Colours that differ in grey too, and for colour-blind readers."""
 MAX_NUMBERS = 120
-"""Maximum number of cells for which numbers are drawn in the cells."""
+"""Maximum number of cells for which numbers are drawn in the cells: more would be too small."""
 QUANTITY_NAMES = {
     "miss_m": "miss, m",
     "impulse_m_s": "impulse spent, m/s",
@@ -59,11 +58,16 @@ QUANTITY_NAMES = {
     "hit": "probability of a hit",
     "cause": "probability of no miss by this cause",
 }
-_PANEL_MM, _LEGEND_MM = 66.0, 24.0
-_TICK_LETTERS, _LABEL_LETTERS = 32, 40
-"""Maximum numbers of letters of all tick labels of an axis, and of a line of its label."""
+_PANEL_MM = 66.0
+"""Height of a row of panels."""
+_LEGEND_MM = 24.0
+"""Height of the legend with its title."""
+_TICK_LETTERS = 32
+"""Maximum number of letters of all tick labels of an axis: more would touch each other."""
+_LABEL_LETTERS = 40
+"""Maximum number of letters of a line of an axis label: the width of a panel."""
 _DARK = 0.55
-"""Part of the scale of colours from which numbers are white."""
+"""Part of the scale of colours from which numbers are white: black is hard to read there."""
 _NO_VALUE = "\N{EN DASH}"
 """Text in the cells whose runs do not show the quantile."""
 
@@ -76,34 +80,27 @@ def draw_sweep(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> 
     there is a map of the decisions, and a heat map for each other quantile that the runs show. The
     panel of the requirement is the first.
     """
-    figure = (_lines if len(table.axes) == 1 else _maps)(table, table.of_noise(noise), shown)
+    draw = _lines if len(table.axes) == 1 else _maps
+    figure = draw(table, table.of_noise(noise), shown)
     figure.suptitle(f"{noise} noise")
     return figure
 
 
 def _panels(count: int) -> tuple[Figure, Any]:
+    """Return a figure of so many panels, two in a row; a single panel is narrower."""
     rows = -(-count // 2)
-    columns = min(2, count)
-    figure, grid = subplots(
-        rows * _PANEL_MM + _LEGEND_MM,
-        rows,
-        columns,
-        width_mm=WIDTH_MM if columns > 1 else 0.7 * WIDTH_MM,
-    )
+    height_mm = rows * _PANEL_MM + _LEGEND_MM
+    if count == 1:
+        figure, grid = subplots(height_mm, 1, 1, width_mm=0.7 * WIDTH_MM)
+    else:
+        figure, grid = subplots(height_mm, rows, 2, width_mm=WIDTH_MM)
     return figure, first_panels(grid, count)
 
 
 def _lines(table: SweepTable, cells: pd.DataFrame, shown: Sequence[QuantileName]) -> Figure:
-    (axis,), required = table.axes, table.required
-    levels = sorted({quantile.level for quantile in shown}, reverse=True)
-    lines: dict[str, list[tuple[str, dict[str, Any]]]] = {required.quantity: []}
-    if not isinstance(required, Requirement):
-        lines[required.quantity].append(("required_value", {"color": INK, "marker": "o"}))
-    for quantile in shown:
-        look = LINE_LOOKS[levels.index(quantile.level) % len(LINE_LOOKS)] | {
-            "label": level_name(quantile.level)
-        }
-        lines.setdefault(quantile.quantity, []).append((_column(table, quantile), look))
+    """Draw a panel for each quantity, with its quantiles as lines over the varied key."""
+    (axis,) = table.axes
+    lines = _lines_by_quantity(table, shown)
     figure, panels = _panels(len(lines))
     for axes, (quantity, columns) in zip(panels, lines.items(), strict=True):
         for column, look in columns:
@@ -115,23 +112,8 @@ def _lines(table: SweepTable, cells: pd.DataFrame, shown: Sequence[QuantileName]
             plain_ticks(axes.yaxis, TICKS)
         else:
             axes.set_ylim(0.0)
-        if quantity == required.quantity:
-            _shade_decisions(axes, cells)
-            axes.axhline(
-                required.bound,
-                color=IMPULSE,
-                linewidth=1.0,
-                label=f"required: {requirement_words(required)}",
-            )
-        if (
-            quantity == "miss_m"
-            and required.quantity == "hit"
-            and cells["limit_bound"].nunique() == 1
-        ):
-            radius_m = float(cells["limit_bound"].iloc[0])
-            axes.axhline(
-                radius_m, color=LIMIT, linewidth=1.0, linestyle="--", label="radius of the body"
-            )
+
+        _draw_requirement(axes, table.required, cells, quantity)
         _name_values(axes.xaxis, axis)
         axes.set(xlim=(-0.5, len(axis.values) - 0.5), ylabel=QUANTITY_NAMES[quantity])
     letters(panels)
@@ -141,23 +123,56 @@ def _lines(table: SweepTable, cells: pd.DataFrame, shown: Sequence[QuantileName]
     return figure
 
 
-def _draw_estimates(axes: Axes, cells: pd.DataFrame, column: str, look: dict[str, Any]) -> None:
-    """Draw a column with its intervals, with an arrow up where there are too few runs for an upper
-    end.
+def _lines_by_quantity(
+    table: SweepTable, shown: Sequence[QuantileName]
+) -> dict[str, list[tuple[str, dict[str, Any]]]]:
+    """Return the columns of each quantity, with their line styles; the required one is first."""
+    required = table.required
+    levels = sorted({quantile.level for quantile in shown}, reverse=True)
+    lines: dict[str, list[tuple[str, dict[str, Any]]]] = {required.quantity: []}
+    if not isinstance(required, Requirement):
+        lines[required.quantity].append(("required_value", {"color": INK, "marker": "o"}))
+    for quantile in shown:
+        look = LINE_LOOKS[levels.index(quantile.level) % len(LINE_LOOKS)]
+        look = look | {"label": level_name(quantile.level)}
+        lines.setdefault(quantile.quantity, []).append((_column(table, quantile), look))
+    return lines
+
+
+def _draw_requirement(
+    axes: Axes, required: AnyRequirement, cells: pd.DataFrame, quantity: str
+) -> None:
+    """Draw the decisions and the bound in the panel of the requirement.
+
+    A required probability of hits has the radius of the body as its bound of the miss.
     """
-    at = np.arange(len(cells))
+    if quantity == required.quantity:
+        _shade_decisions(axes, cells)
+        label = f"required: {requirement_words(required)}"
+        axes.axhline(required.bound, color=IMPULSE, linewidth=1.0, label=label)
+    is_one_radius = required.quantity == "hit" and cells["limit_bound"].nunique() == 1
+    if quantity == "miss_m" and is_one_radius:
+        radius_m = float(cells["limit_bound"].iloc[0])
+        dashed: dict[str, Any] = {"color": LIMIT, "linewidth": 1.0, "linestyle": "--"}
+        axes.axhline(radius_m, label="radius of the body", **dashed)
+
+
+def _draw_estimates(axes: Axes, cells: pd.DataFrame, column: str, look: dict[str, Any]) -> None:
+    """Draw a column with its intervals; an arrow up means too few runs for an upper end."""
     name = column.removesuffix("_value")
-    value, lower, upper = (
-        cells[each].to_numpy(np.float64) for each in (column, f"{name}_lower", f"{name}_upper")
-    )
+    value = cells[column].to_numpy(np.float64)
+    lower = cells[f"{name}_lower"].to_numpy(np.float64)
+    upper = cells[f"{name}_upper"].to_numpy(np.float64)
+
+    at = np.arange(len(cells))
+    colour = look["color"]
     axes.plot(at, value, markersize=3.5, zorder=3.0, **look)
     top = np.where(np.isnan(upper), np.fmax(value, lower), upper)
-    colour = look["color"]
     axes.vlines(at, lower, top, color=colour, linewidth=0.8, zorder=2.0)
+
+    arrow: dict[str, Any] = {"linestyle": "", "marker": "$\\uparrow$", "markersize": 7.0}
     arrows = np.where(np.isnan(upper), top, np.nan)
-    axes.plot(
-        at, arrows, color=colour, linestyle="", marker="$\\uparrow$", markersize=7.0, zorder=2.0
-    )
+    axes.plot(at, arrows, color=colour, zorder=2.0, **arrow)
 
 
 def _shade_decisions(axes: Axes, cells: pd.DataFrame) -> None:
@@ -174,16 +189,16 @@ def _shade_decisions(axes: Axes, cells: pd.DataFrame) -> None:
 
 
 def _maps(table: SweepTable, cells: pd.DataFrame, shown: Sequence[QuantileName]) -> Figure:
+    """Draw a map of the decisions, and a heat map for each other quantile that the runs show."""
     columns = {quantile: _column(table, quantile) for quantile in shown}
     drawn = {
-        name: column
-        for name, column in columns.items()
+        quantile: column
+        for quantile, column in columns.items()
         if column != "required_value" and cells[column].count()
     }
     figure, panels = _panels(1 + len(drawn))
     _draw_decisions(panels[0], table, cells)
     titles = [requirement_words(table.required)]
-    notes = []
     for axes, (quantile, column) in zip(panels[1:], drawn.items(), strict=True):
         _draw_heat(figure, axes, _grid(table, cells[column]))
         name, unit = QUANTITY_NAMES[quantile.quantity].split(", ")
@@ -193,13 +208,13 @@ def _maps(table: SweepTable, cells: pd.DataFrame, shown: Sequence[QuantileName])
         _name_values(axes.xaxis, table.axes[0])
         _name_values(axes.yaxis, table.axes[1])
     letters(panels, titles)
+
+    notes = []
     if len(cells) <= MAX_NUMBERS:
-        level = (
-            f", {level_name(table.required.share)}"
-            if isinstance(table.required, Requirement)
-            else ""
-        )
-        notes.append(f"numbers in (a): {QUANTITY_NAMES[table.required.quantity]}{level}")
+        note = f"numbers in (a): {QUANTITY_NAMES[table.required.quantity]}"
+        if isinstance(table.required, Requirement):
+            note += f", {level_name(table.required.share)}"
+        notes.append(note)
     if cells[["required_value", *columns.values()]].isna().any(axis=None):
         notes.append(f"{_NO_VALUE} or no map: too few runs for the quantile")
     legend_below(figure, 2, title="; ".join(notes))
@@ -207,40 +222,25 @@ def _maps(table: SweepTable, cells: pd.DataFrame, shown: Sequence[QuantileName])
 
 
 def _draw_decisions(axes: Axes, table: SweepTable, cells: pd.DataFrame) -> None:
-    """Draw decision and estimate of each cell, and the lines on which quantiles equal their
-    bound.
-    """
-    codes = cells["requirement"].map(
-        {decision.value: code for code, decision in enumerate(DECISION_COLOURS)}
-    )
-    _draw_cells(
-        axes,
-        _grid(table, codes),
-        cmap=ListedColormap([*DECISION_COLOURS.values()]),
-        vmin=-0.5,
-        vmax=2.5,
-    )
+    """Draw decision and estimate of each cell, and the lines of the limits."""
+    codes = {decision.value: code for code, decision in enumerate(DECISION_COLOURS)}
+    look = {"cmap": ListedColormap([*DECISION_COLOURS.values()]), "vmin": -0.5, "vmax": 2.5}
+    _draw_cells(axes, _grid(table, cells["requirement"].map(codes)), **look)
+    found = set(cells["requirement"])
     for decision, colour in DECISION_COLOURS.items():
-        if decision.value in set(cells["requirement"]):
+        if decision.value in found:
             axes.fill([], [], color=colour, label=str(decision))
+
     values = _grid(table, cells["required_value"])
     _write_numbers(axes, values, np.zeros(values.shape, dtype=bool), path_effects=HALO)
-    if {Decision.MET.value, Decision.NOT_MET.value} <= set(cells["requirement"]):
-        _draw_zero(
-            axes,
-            table,
-            cells,
-            "limit_quantile",
-            color=INK,
-            label="limit, interpolated between cells",
-        )
+
+    if {Decision.MET.value, Decision.NOT_MET.value} <= found:
+        limit = {"color": INK, "label": "limit, interpolated between cells"}
+        _draw_zero(axes, table, cells, "limit_quantile", **limit)
     if "closed_form_m" in cells:
-        look = {
-            "color": GUARANTEED,
-            "linestyle": "--",
-            "label": "closed form: worst errors, no later images",
-        }
-        _draw_zero(axes, table, cells, "closed_form_m", **look)
+        dashed = {"color": GUARANTEED, "linestyle": "--"}
+        name = "closed form: worst errors, no later images"
+        _draw_zero(axes, table, cells, "closed_form_m", label=name, **dashed)
 
 
 def _draw_zero(
@@ -257,18 +257,21 @@ def _draw_zero(
 
 
 def _draw_heat(figure: Figure, axes: Axes, values: Floats) -> None:
-    """Draw a quantile as a heat map, with a logarithmic scale of colours if it varies by more than
-    a factor of 10.
+    """Draw a quantile as a heat map.
+
+    The scale of colours is logarithmic if it varies by more than a factor of 10.
     """
     low = float(np.nanmin(values))
     high = float(np.nanmax(values))
-    norm = LogNorm(low, high) if high > 10.0 * low > 0.0 else Normalize(low, max(high, low + 1e-9))
+    norm = Normalize(low, max(high, low + 1e-9))  # equal values need a scale, too
+    if high > 10.0 * low > 0.0:
+        norm = LogNorm(low, high)
     bar = figure.colorbar(_draw_cells(axes, values, cmap="Blues", norm=norm), ax=axes)
     if isinstance(norm, LogNorm):
         plain_ticks(bar.ax.yaxis, TICKS)
-    _write_numbers(
-        axes, values, np.ma.filled(norm(np.ma.masked_invalid(values)) > _DARK, fill_value=False)
-    )
+
+    is_dark = np.ma.filled(norm(np.ma.masked_invalid(values)) > _DARK, fill_value=False)
+    _write_numbers(axes, values, is_dark)
 
 
 def _grid(table: SweepTable, values: Any) -> Floats:
@@ -288,51 +291,50 @@ def _write_numbers(axes: Axes, values: Floats, is_dark: Any, **look: Any) -> Non
     if values.size > MAX_NUMBERS:
         return
     size = min(7.0, 54.0 / values.shape[1])
+    place: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": size, "zorder": 4.0}
     for (row, column), value in np.ndenumerate(values):
-        text = (
-            _NO_VALUE if np.isnan(value) else f"{value:.3g}" if value < 1000.0 else f"{value:.0f}"
-        )
         colour = "white" if is_dark[row, column] else INK
-        axes.text(
-            column,
-            row,
-            text,
-            color=colour,
-            ha="center",
-            va="center",
-            fontsize=size,
-            zorder=4.0,
-            **look,
-        )
+        axes.text(column, row, _number(value), color=colour, **place, **look)
+
+
+def _number(value: float) -> str:
+    if np.isnan(value):
+        return _NO_VALUE
+    if value < 1000.0:
+        return f"{value:.3g}"
+    return f"{value:.0f}"
 
 
 def _name_values(one: MatplotlibAxis, axis: Axis) -> None:
-    """Label an axis with its key, and its positions 0, 1, 2, ... with the values, a few of them if
-    they are many.
-    """
+    """Label an axis with its key, and some of its positions 0, 1, 2, ... with their values."""
+    # Very large and very small values have a power of ten in the label.
     maximum = max(map(abs, axis.values))
-    power = 0 if 0.01 <= maximum < 1e5 else math.floor(math.log10(maximum))
+    power = 0
+    factor = ""
+    if not 0.01 <= maximum < 1e5:
+        power = math.floor(math.log10(maximum))
+    if power:
+        factor = f"$10^{{{power}}}$\N{NO-BREAK SPACE}"
+
     names = [f"{value / 10.0**power:.4g}" for value in axis.values]
     step = -(-len(names) * max(map(len, names)) // _TICK_LETTERS)
     one.set_ticks(range(0, len(names), step), names[::step])
-    one.set_label_text(
-        textwrap.fill(
-            key_label(axis.key, f"$10^{{{power}}}$\N{NO-BREAK SPACE}" if power else ""),
-            _LABEL_LETTERS,
-        )
-    )
+    one.set_label_text(textwrap.fill(key_label(axis.key, factor), _LABEL_LETTERS))
 
 
 def _column(table: SweepTable, quantile: QuantileName) -> str:
-    """Return the column of a quantile: for the required one, that of the estimate that decides."""
-    is_required = isinstance(table.required, Requirement) and quantile == table.required.quantile
-    return "required_value" if is_required else f"{quantile.quantity}_{level_name(quantile.level)}"
+    """Return the column of a quantile; the required one has the estimate that decides."""
+    if isinstance(table.required, Requirement) and quantile == table.required.quantile:
+        return "required_value"
+    return f"{quantile.quantity}_{level_name(quantile.level)}"
 
 
 def requirement_words(required: AnyRequirement) -> str:
     """Return a requirement in words: `miss p99 under 10 m`."""
-    if not isinstance(required, Requirement):
-        what = "a hit" if required.cause is None else f"no miss by {required.cause.value}"
-        return f"probability of {what} at least {number_text(required.share)}"
-    name, unit = QUANTITY_NAMES[required.quantity].split(", ")
-    return f"{name} {level_name(required.quantile.level)} under {required.bound:g} {unit}"
+    if isinstance(required, Requirement):
+        name, unit = QUANTITY_NAMES[required.quantity].split(", ")
+        return f"{name} {level_name(required.quantile.level)} under {required.bound:g} {unit}"
+    event = "a hit"
+    if required.cause is not None:
+        event = f"no miss by {required.cause.value}"
+    return f"probability of {event} at least {number_text(required.share)}"

@@ -1,6 +1,4 @@
-"""The table of a sweep: the summary and the decision of each cell, and the limits of the values
-that decide.
-"""
+"""The table of a sweep: summaries and decisions of cells, and limits of the values that decide."""
 
 from __future__ import annotations
 
@@ -25,7 +23,12 @@ from infoset.sim.statistics import shows
 from infoset.sim.storage import Axis, CampaignFolder
 
 _LOG_FROM = 30.0
-"""Ratio of the maximum to the minimum value from which the values have a logarithmic axis."""
+"""Ratio of the maximum to the minimum value from which the values have a logarithmic axis.
+
+On a linear axis the smallest value would be at most 3 % of the axis above its end.
+"""
+_ESTIMATE = ("required_value", "required_lower", "required_upper", "required_known")
+"""Columns of the estimate that decides."""
 
 
 @dataclass(frozen=True)
@@ -62,9 +65,7 @@ class SweepTable:
 
 
 def sweep_table(folder: CampaignFolder, required: AnyRequirement) -> SweepTable:
-    """Return the table of a sweep, finished or not, with the levels `LEVELS` and that of the
-    required quantile.
-    """
+    """Return the table of a sweep, finished or not, with the required quantile."""
     levels = set(LEVELS)
     if isinstance(required, Requirement):
         levels.add(required.quantile.level)
@@ -73,34 +74,43 @@ def sweep_table(folder: CampaignFolder, required: AnyRequirement) -> SweepTable:
     rows = summary(folder, sorted(levels), [decided]).astype(
         {"required_known": "Int64", "runs_needed": "Int64"}
     )
-    axes = folder.manifest.axes
+
     noises = noises_of(folder)
-    rows["limit_bound"] = (
-        required.bound if isinstance(required, Requirement) else _radii_m(folder, rows)
-    )
+    if isinstance(required, Requirement):
+        rows["limit_bound"] = required.bound
+    else:
+        rows["limit_bound"] = _radii_m(folder, rows)
     if required.quantity == "guaranteed_miss_m" and folder.manifest.scenario.camera is not None:
+        # The rows of a cell follow each other, one for each noise.
         rows["closed_form_m"] = np.repeat(_closed_forms(folder), len(noises))
-    return SweepTable(axes, tuple(noises), required, rows)
+    return SweepTable(folder.manifest.axes, tuple(noises), required, rows)
 
 
 def _decision(
     runs: pd.DataFrame, required: AnyRequirement, folder: CampaignFolder
 ) -> dict[str, Any]:
+    """Return the decision of a cell with its estimate, and the quantile that shows its limit."""
+    row: dict[str, Any] = {
+        "requirement": None,
+        **dict.fromkeys((*_ESTIMATE, "runs_needed"), math.nan),
+    }
     values = required.numbers(runs[required.quantity])
-    verdict = judge(values, required, watched=folder.manifest.is_watched) if values.size else None
-    row: dict[str, Any] = {"requirement": None if verdict is None else verdict.decision.value}
-    row |= {
-        f"required_{name}": or_nan(getattr(verdict, name, None))
-        for name in ("value", "lower", "upper", "known")
-    }
-    # Numbers of runs are those of all noises, like --runs and --max-runs.
-    row["runs_needed"] = len(noises_of(folder)) * or_nan(getattr(verdict, "runs_needed", None))
+    if values.size:
+        verdict = judge(values, required, watched=folder.manifest.is_watched)
+        row["requirement"] = verdict.decision.value
+        row["required_value"] = or_nan(verdict.value)
+        row["required_lower"] = or_nan(verdict.lower)
+        row["required_upper"] = or_nan(verdict.upper)
+        row["required_known"] = or_nan(verdict.known)
+        # Numbers of runs count the runs of all noises, like --runs and --max-runs.
+        row["runs_needed"] = len(noises_of(folder)) * or_nan(verdict.runs_needed)
+
+    row["limit_quantile"] = math.nan
     if isinstance(required, Requirement):
-        return row | {"limit_quantile": row["required_value"]}
-    shown = required.cause is None and shows(len(runs), required.share) and len(runs)
-    return row | {
-        "limit_quantile": float(np.quantile(runs["miss_m"], required.share)) if shown else math.nan
-    }
+        row["limit_quantile"] = row["required_value"]
+    elif required.cause is None and len(runs) and shows(len(runs), required.share):
+        row["limit_quantile"] = float(np.quantile(runs["miss_m"], required.share))
+    return row
 
 
 def _radii_m(folder: CampaignFolder, table: pd.DataFrame) -> Any:
@@ -113,8 +123,9 @@ def _radii_m(folder: CampaignFolder, table: pd.DataFrame) -> Any:
 
 
 def _closed_forms(folder: CampaignFolder) -> list[float]:
-    """Return the closed form of the guaranteed miss of each cell, m; NaN in cells with fewer than
-    two images.
+    """Return the closed form of the guaranteed miss of each cell, m.
+
+    NaN in cells with fewer than two images.
     """
     values = []
     for cell in sweep_cells(folder.manifest.scenario, folder.manifest.axes):
@@ -126,8 +137,9 @@ def _closed_forms(folder: CampaignFolder) -> list[float]:
 
 
 def limits(table: SweepTable) -> pd.DataFrame:
-    """Return the limits along the first axis: a row for each noise, combination of the other
-    values, and limit.
+    """Return the limits along the first axis.
+
+    The table has a row for each noise, combination of the other values, and limit.
 
     A limit lies between the values `met` and `not_met` of two decided cells; cells without runs are
     undecided. `interpolated` has no confidence. It is where the interpolated `limit_quantile` of
@@ -136,13 +148,11 @@ def limits(table: SweepTable) -> pd.DataFrame:
     or is on the other side of the bound than the decision. A probability of hits is not
     interpolated: between two cells it can be a step.
     """
-    axis = table.axes[0]
     others = ["noise", *table.keys[1:]]
-    rows = [
-        {**dict(zip(others, at, strict=True)), **limit}
-        for at, cells in table.rows.groupby(others, sort=False)
-        for limit in _limits_along(axis, cells)
-    ]
+    rows = []
+    for at, cells in table.rows.groupby(others, sort=False):
+        where = dict(zip(others, at, strict=True))
+        rows += [where | limit for limit in _limits_along(table.axes[0], cells)]
     return pd.DataFrame(rows, columns=[*others, "met", "not_met", "interpolated"])
 
 
@@ -150,33 +160,46 @@ def _limits_along(axis: Axis, cells: pd.DataFrame) -> Iterator[dict[str, float]]
     above = above_bound(cells)
     met = (cells["requirement"] == Decision.MET.value).to_numpy()
     decided = np.flatnonzero(met | (cells["requirement"] == Decision.NOT_MET.value))
+
     for left, right in itertools.pairwise(decided):
         if met[left] == met[right]:
             continue
-        near = axis.values[left]
-        far = axis.values[right]
-        good, bad = (left, right) if met[left] else (right, left)
-        value = math.nan
+        good, bad = right, left
+        if met[left]:
+            good, bad = left, right
+
+        interpolated = math.nan
         if right == left + 1 and above[good] < 0.0 <= above[bad]:
             share = above[left] / (above[left] - above[right])
-            value = (
-                near * (far / near) ** share if axis.scale == "log" else near + share * (far - near)
-            )
-        yield {"met": axis.values[good], "not_met": axis.values[bad], "interpolated": value}
+            interpolated = _between(axis, left, right, share)
+        yield {
+            "met": axis.values[good],
+            "not_met": axis.values[bad],
+            "interpolated": interpolated,
+        }
+
+
+def _between(axis: Axis, left: int, right: int, share: float) -> float:
+    """Return the value at a share of the way between two values, on the scale of the axis."""
+    near = axis.values[left]
+    far = axis.values[right]
+    if axis.scale == "log":
+        return near * (far / near) ** share
+    return near + share * (far - near)
 
 
 def above_bound(cells: pd.DataFrame, quantile: str = "limit_quantile") -> Floats:
-    """Return how far a quantile is above its bound in each cell, or the difference of their
-    logarithms; NaN unknown.
+    """Return the difference of a quantile and its bound in each cell; NaN if it is unknown.
+
+    If the quantiles span decades, it is the difference of the logarithms.
     """
     values = cells[quantile].to_numpy(np.float64)
     bounds = cells["limit_bound"].to_numpy(np.float64)
-    is_log = spans_decades(cells["limit_quantile"])
-    return np.asarray(np.log(values) - np.log(bounds) if is_log else values - bounds)
+    if spans_decades(cells["limit_quantile"]):
+        return np.asarray(np.log(values) - np.log(bounds))
+    return np.asarray(values - bounds)
 
 
 def spans_decades(values: pd.Series) -> bool:
-    """Return whether values are positive and differ so much that they are drawn on a logarithmic
-    axis.
-    """
+    """Return whether values are positive and need a logarithmic axis."""
     return bool(values.max() > _LOG_FROM * values.min() > 0.0)

@@ -1,11 +1,9 @@
-"""Scenarios of commands: files, the options that replace their values, and warnings about these
-values.
-"""
+"""Scenarios of commands: files, options that replace their values, warnings about values."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,15 +16,25 @@ from infoset.experiments.interception.study import percent
 from infoset.guidance import strategy_names
 from infoset.model import Model, SetModel
 from infoset.sim.closed_form import PossibleMiss
-from infoset.sim.feasibility import feasibility
+from infoset.sim.feasibility import Feasibility, feasibility
 from infoset.sim.gravity import on_board_model
 from infoset.sim.scenario import MAX_STEPS, Scenario, Target
 from infoset.sim.schedule import images_until, schedule
 
 FAR = 10.0
-"""Ratio of the nominal range to the possible ranges from which `scenario_warnings` reports it."""
-FEW_STEPS, MANY_STEPS, MANY_SECTIONS = 20, 20_000, 100
-"""Numbers of decisions, steps and sections that are reported as probably not intended."""
+"""Ratio of the nominal range to the possible ranges from which a warning reports it.
+
+Wrong units differ by more, usually by 1000.
+"""
+FEW_STEPS = 20
+"""Number of decisions below which a warning reports the step.
+
+Flights with free impulse times have 200 and more in the built-in scenarios.
+"""
+MANY_STEPS = 20_000
+"""Number of steps above which a warning reports the step: a run takes more than 0.2 s."""
+MANY_SECTIONS = 100
+"""Number of sections above which a warning reports them: built-in scenarios have up to 41."""
 FEW_TIMES = 3
 """Number of times of a key that a line lists; JSON has all of them."""
 STEP_COST_S = 1e-5
@@ -55,9 +63,7 @@ def load_scenario(
 
 
 def with_model(scenario: Scenario, model: Model) -> Scenario:
-    """Return a scenario with a set model; another model than the scenario's starts from its default
-    initial set.
-    """
+    """Return a scenario with another set model, and with its default initial set."""
     settings = scenario.information_set
     if model is settings.model:
         return scenario
@@ -70,11 +76,11 @@ def with_model(scenario: Scenario, model: Model) -> Scenario:
 
 
 def scenario_with(options: Any) -> Scenario:
-    """Read the scenario of a command and replace what its options set; None keeps the value of the
-    scenario.
+    """Read the scenario of a command and replace the values that its options set.
 
-    The command may have the options `strategy`, `model` and `range_sensor`. A strategy of a Python
-    file leaves that of the scenario. `InputError` if an option does not fit the scenario.
+    The command may have the options `strategy`, `model` and `range_sensor`; None keeps the value of
+    the scenario, and a strategy of a Python file keeps its strategy. Raise `InputError` if an
+    option does not fit the scenario.
     """
     strategy, model, range_sensor = (
         getattr(options, name, None) for name in ("strategy", "model", "range_sensor")
@@ -95,12 +101,12 @@ def scenario_with(options: Any) -> Scenario:
 
 
 def study_scenario(options: Any, resumed: Model | None = None) -> tuple[Scenario, list[str]]:
-    """Return the scenario of a study, whose default model is the guaranteed one, whatever the
-    scenario file says.
+    """Return the scenario of a study, and lines about its model for the screen.
 
-    With the model `paper`, quantiles can include runs whose set lost the true state. ``--model``
-    and ``--set`` may choose the model; if a folder is resumed, its model is the default. The list
-    contains a line for the screen if the default replaces the model of the file.
+    The default model of a study is the guaranteed one, whatever the scenario file says: with the
+    model `paper`, quantiles can include runs whose set lost the true state. ``--model`` and
+    ``--set`` may choose the model; if a folder is resumed, its model is the default. There is a
+    line if the default replaces the model of the file.
     """
     scenario = scenario_with(options)
     is_set = any(
@@ -110,7 +116,10 @@ def study_scenario(options: Any, resumed: Model | None = None) -> tuple[Scenario
     default = resumed or Model.GUARANTEED
     if is_set or options.model is not None or default is of_file:
         return scenario, []
-    reason = "the model of the resumed folder" if resumed else "the default of studies"
+
+    reason = "the default of studies"
+    if resumed:
+        reason = "the model of the resumed folder"
     note = f"model: {default.value}, {reason}; to use that of the file, add --model {of_file.value}"
     return with_model(scenario, default), [note]
 
@@ -121,65 +130,87 @@ def all_warnings(scenario: Scenario) -> list[str]:
 
 
 def scenario_warnings(scenario: Scenario) -> list[str]:
-    """Return warnings about values of a scenario that are allowed but probably not intended, one
-    line each.
-    """
-    lines = []
-    model = scenario.set_model
-    target = scenario.target
-    uncertainty = model.bounds
-    dispersion = scenario.dispersion
-    speed = model.closing_speed_m_s
+    """Return a line for each value that is allowed but probably not intended."""
+    return [
+        *_dispersion_warnings(scenario),
+        *_approach_warnings(scenario),
+        *_angle_warnings(scenario),
+        *_target_warnings(scenario),
+        *_timing_warnings(scenario),
+    ]
+
+
+def _dispersion_warnings(scenario: Scenario) -> Iterator[str]:
+    """Yield a line for each end of the dispersion that is outside the uncertainty."""
     for prefix, unit in (("", "m"), ("v", "m_s")):
-        for axis in (*model.axes, "x"):
+        for axis in (*scenario.set_model.axes, "x"):
             name = f"{prefix}{axis}_{unit}"
-            known, true = (getattr(box, name) for box in (uncertainty, dispersion))
+            known = getattr(scenario.set_model.bounds, name)
+            true = getattr(scenario.dispersion, name)
             for excess, side in ((known[0] - true[0], "below"), (true[1] - known[1], "above")):
                 if excess > 0:
-                    lines.append(
+                    yield (
                         f"dispersion.{name} reaches {excess:.6g} {unit.replace('_', '/')} {side} "
                         f"uncertainty.{name}: the true state may start outside the uncertainty on "
                         "board, and the set may lose it"
                     )
+
+
+def _approach_warnings(scenario: Scenario) -> Iterator[str]:
+    """Yield lines about a nominal speed and a nominal range outside the uncertainty."""
+    uncertainty = scenario.set_model.bounds
+    speed = scenario.set_model.closing_speed_m_s
     outside = max(-uncertainty.vx_m_s[1] - speed, speed + uncertainty.vx_m_s[0])
     if outside > 0:
-        lines.append(
+        yield (
             f"closing_speed_m_s is {outside:.6g} m/s outside uncertainty.vx_m_s: "
             "the on-board model uses a speed that is known to be wrong"
         )
     if not uncertainty.x_m[0] / FAR <= scenario.nominal_range_m <= uncertainty.x_m[1] * FAR:
-        lines.append(
+        yield (
             f"nominal_range_m is {scenario.nominal_range_m:g} m, far outside uncertainty.x_m: the "
             "times of impulses and images count from the arrival at this range; check its unit"
         )
+
+
+def _angle_warnings(scenario: Scenario) -> Iterator[str]:
+    """Yield a line if the model `paper` is used with angles that are not small."""
+    model = scenario.set_model
+    boxes = (model.bounds, scenario.dispersion)
     steepest = max(
-        max(box.offset_m for box in (uncertainty, dispersion))
-        / min(uncertainty.x_m[0], dispersion.x_m[0]),
-        max(box.lateral_speed_m_s for box in (uncertainty, dispersion)) / speed,
+        max(box.offset_m for box in boxes) / min(box.x_m[0] for box in boxes),
+        max(box.lateral_speed_m_s for box in boxes) / model.closing_speed_m_s,
     )
     if steepest > SMALL_ANGLE_RAD and not model.is_guaranteed:
-        lines.append(
+        yield (
             "information_set.model is paper, which replaces tangents by their angles, and the "
             f"line of sight may be {steepest:.3g} rad off the x axis: beyond {SMALL_ANGLE_RAD:g} "
             "rad the set may lose the true state; write model = guaranteed"
         )
-    for axis in model.axes if target is not None and model.is_guaranteed else ():
+
+
+def _target_warnings(scenario: Scenario) -> list[str]:
+    """Return a line for each acceleration of the target that exceeds its bound."""
+    model = scenario.set_model
+    target = scenario.target
+    if target is None or not model.is_guaranteed:
+        return []
+
+    lines = []
+    for axis in model.axes:
         key, acceleration = _along(axis, target, "acceleration")
         bound_key, bound = _along(axis, model, "disturbance")
-        line = (
-            f"target.{key}, {acceleration:g}, exceeds information_set.{bound_key}, {bound:g}: "
-            "the guaranteed model does not allow for it and may lose the true state"
-        )
-        if acceleration > bound and line not in lines:
-            lines.append(line)
-    lines += _timing_warnings(scenario)
-    return lines
+        if acceleration > bound:
+            lines.append(
+                f"target.{key}, {acceleration:g}, exceeds information_set.{bound_key}, {bound:g}: "
+                "the guaranteed model does not allow for it and may lose the true state"
+            )
+    # Without a key for y, both axes have the same line.
+    return list(dict.fromkeys(lines))
 
 
 def flight_facts(scenario: Scenario) -> list[str]:
-    """Return lines about the flight, its schedule, what its impulses correct, and what its images
-    leave open.
-    """
+    """Return lines about the flight: schedule, impulses and images."""
     found = feasibility(scenario)
     if found is None:
         return []
@@ -189,65 +220,79 @@ def flight_facts(scenario: Scenario) -> list[str]:
             f"{scenario.step_s:g} s"
         ),
         *schedule_lines(scenario),
-        f"miss without impulses: up to {length_text(found.unguided_miss_m)}; all impulses "
-        f"correct up to {length_text(found.budget_corrects_m)}",
+        (
+            f"miss without impulses: up to {length_text(found.unguided_miss_m)}; all impulses "
+            f"correct up to {length_text(found.budget_corrects_m)}"
+        ),
     ]
+
     possible = found.possible_miss
-    if possible is not None and possible.images_m is not None:
+    if possible is None:
+        return lines
+    if possible.images_m is not None:
         lines.append(
             "miss that the images alone leave possible, with errors at their bounds (closed "
             f"form): up to {length_text(possible.images_m)}"
         )
-    if possible is not None:
-        lines.append(
-            "miss that the images and the speeds of [uncertainty] leave possible, with errors at "
-            f"their bounds: up to {length_text(possible.images_and_speeds_m)}"
-        )
+    lines.append(
+        "miss that the images and the speeds of [uncertainty] leave possible, with errors at "
+        f"their bounds: up to {length_text(possible.images_and_speeds_m)}"
+    )
     return lines
 
 
 def schedule_lines(scenario: Scenario) -> list[str]:
-    """Return lines about the images and impulses that will happen, and where the file asks for
-    other times.
+    """Return lines about the images and impulses that will happen, and about moved times.
+
+    The times in a file are moved to the nearest steps.
     """
     times = schedule(scenario)
     if times is None:
         return []
-    lines = []
-    decided = f"; {times.images_before_last_decision} before the last decision of an impulse"
-    for name, before_s, more in (
-        ("images", times.images_s, decided),
-        ("possible impulses", times.impulses_s, ""),
-    ):
-        span = ""
-        if before_s:
-            span = (
-                f", from {_seconds(before_s[0])} s to {_seconds(before_s[-1])} s before the "
-                "nominal arrival"
-            )
-        lines.append(f"{name}: {len(before_s)}{span}{more}")
+    lines = [
+        (
+            f"images: {_span(times.images_s)}; {times.images_before_last_decision} before the "
+            "last decision of an impulse"
+        ),
+        f"possible impulses: {_span(times.impulses_s)}",
+    ]
+
     by_key: dict[str, list[str]] = {}
     for each in times.differences:
         by_key.setdefault(each.key, []).append(
             f"{_seconds(each.scheduled_s)} s instead of {_seconds(each.asked_s)} s"
         )
     for key, texts in by_key.items():
-        rest = f", and {len(texts) - FEW_TIMES} more" if len(texts) > FEW_TIMES else ""
-        lines.append(f"{key}: {'; '.join(texts[:FEW_TIMES])}{rest} (nearest possible times)")
+        line = f"{key}: {'; '.join(texts[:FEW_TIMES])}"
+        if len(texts) > FEW_TIMES:
+            line += f", and {len(texts) - FEW_TIMES} more"
+        lines.append(f"{line} (nearest possible times)")
     return lines
 
 
+def _span(before_s: Sequence[float]) -> str:
+    """Return the number of some times before the arrival, with the first and the last one."""
+    if not before_s:
+        return "0"
+    return (
+        f"{len(before_s)}, from {_seconds(before_s[0])} s to {_seconds(before_s[-1])} s before the "
+        "nominal arrival"
+    )
+
+
 def schedule_json(scenario: Scenario) -> dict[str, Any] | None:
-    """Return the key `schedule` of JSON: times before the nominal arrival, s; None if the arrival
-    is too far away.
+    """Return the key `schedule` of JSON: times before the nominal arrival, s.
+
+    None if the arrival is too far away.
     """
     times = schedule(scenario)
     if times is None:
         return None
 
     def ends(before_s: Sequence[float]) -> dict[str, float | int | None]:
-        first_s, last_s = (before_s[0], before_s[-1]) if before_s else (None, None)
-        return {"number": len(before_s), "first_s": first_s, "last_s": last_s}
+        if not before_s:
+            return {"number": 0, "first_s": None, "last_s": None}
+        return {"number": len(before_s), "first_s": before_s[0], "last_s": before_s[-1]}
 
     return {
         "nominal_arrival_s": scenario.nominal_arrival_s,
@@ -262,11 +307,14 @@ def schedule_json(scenario: Scenario) -> dict[str, Any] | None:
 
 
 def possible_miss_json(scenario: Scenario) -> PossibleMiss | None:
-    """Return the key `possible_miss` of JSON; None with fewer than two images, or if the arrival is
-    too far away.
+    """Return the key `possible_miss` of JSON.
+
+    None with fewer than two images, or if the arrival is too far away.
     """
     found = feasibility(scenario)
-    return None if found is None else found.possible_miss
+    if found is None:
+        return None
+    return found.possible_miss
 
 
 def _seconds(time_s: float) -> str:
@@ -275,65 +323,87 @@ def _seconds(time_s: float) -> str:
 
 
 def feasibility_warnings(scenario: Scenario) -> list[str]:
-    """Return warnings about an engine, a budget, images, steps or sections that do not fit the
-    flight, a line each.
+    """Return a line for each part of a scenario that does not fit its flight.
+
+    The parts are engine, budget, images, radius of the body, steps and sections.
     """
     found = feasibility(scenario)
-    lines = []
-    before = 0.0
-    if found is None:  # `scenario_warnings` reports the nominal range
+    if found is None:
+        # The nominal range is too large, which `scenario_warnings` reports.
         return []
-    hit = "hit" if scenario.body else "have a miss of zero"
+    return [
+        *_authority_warnings(scenario, found),
+        *_body_warnings(scenario, found),
+        *_step_warnings(scenario, found),
+    ]
+
+
+def _authority_warnings(scenario: Scenario, found: Feasibility) -> Iterator[str]:
+    """Yield lines about starts that the engine or its budget cannot correct."""
+    aim = "have a miss of zero"
+    if scenario.body:
+        aim = "hit"
+    before = 0.0
     for share, corrected_m, name, key in (
         (found.beyond_engine, found.engine_corrects_m, "engine", "max_impulse_m_s"),
         (found.beyond_budget, found.budget_corrects_m, "budget", "budget_m_s"),
     ):
+        # The budget has a line only if it excludes more starts than the engine.
         if share > before:
-            lines.append(
+            yield (
                 f"the {name} corrects at most {length_text(corrected_m)}, and the starts of "
                 f"[dispersion] miss by up to {length_text(found.unguided_miss_m)}: "
-                f"{percent(share)} of them cannot {hit}, whatever the guidance does; a greater "
+                f"{percent(share)} of them cannot {aim}, whatever the guidance does; a greater "
                 f"thruster.{key}, earlier impulses or a narrower dispersion would change it"
             )
         before = share
-    possible = found.possible_miss
+
+
+def _body_warnings(scenario: Scenario, found: Feasibility) -> Iterator[str]:
+    """Yield lines about a radius that is small beside the possible misses, or very large."""
     radius_m = scenario.radius_m
-    if possible is not None and radius_m is not None and possible.images_and_speeds_m > radius_m:
-        lines.append(
+    if radius_m is None:
+        return
+    possible = found.possible_miss
+    if possible is not None and possible.images_and_speeds_m > radius_m:
+        yield (
             "the images before the last decision and the speeds of [uncertainty] leave misses of "
             f"up to {length_text(possible.images_and_speeds_m)} possible, and body.radius_m is "
             f"{radius_m:g}: no hit is certain before the flight; smaller errors of the images or a "
             "later last impulse would change it"
         )
-    if radius_m is not None and found.unguided_miss_m <= radius_m:
-        lines.append(
+    if found.unguided_miss_m <= radius_m:
+        yield (
             f"body.radius_m is {radius_m:g}, and the starts of [dispersion] miss by at most "
             f"{length_text(found.unguided_miss_m)}: all of them hit without impulses; check the "
             "unit of the radius"
         )
-    elif radius_m is not None and radius_m > LARGEST_BODY_M:
-        lines.append(
+    elif radius_m > LARGEST_BODY_M:
+        yield (
             f"body.radius_m is {radius_m:g}: no near-Earth asteroid and hardly a comet is so "
             "large; check its unit"
         )
+
+
+def _step_warnings(scenario: Scenario, found: Feasibility) -> Iterator[str]:
+    """Yield lines about too few decisions, too many steps and too many sections."""
     if found.decisions < FEW_STEPS and not scenario.thruster.is_scheduled:
-        lines.append(
+        yield (
             f"step_s is {scenario.step_s:g} s: impulses can be decided in only {found.decisions} "
             "steps of the flight; check its unit, or write a shorter step (at most "
             f"{scenario.nominal_arrival_s / 100:.3g} s for 100 steps)"
         )
     if found.steps > MANY_STEPS:
         duration = duration_text(round(STEP_COST_S * found.steps * len(scenario.set_model.axes), 1))
-        lines.append(
+        yield (
             f"the flight has {found.steps} steps of {scenario.step_s:g} s, and a run takes about "
             f"{duration}; check the unit of step_s, or write a longer step"
         )
     if scenario.information_set.sections > MANY_SECTIONS:
-        lines.append(
+        yield (
             f"information_set.sections is {scenario.information_set.sections}: more than 10 to 30 "
             "take time and hardly change a result"
         )
-    return lines
 
 
 def _timing_warnings(scenario: Scenario) -> list[str]:
@@ -341,26 +411,36 @@ def _timing_warnings(scenario: Scenario) -> list[str]:
     model = scenario.set_model
     arrival_s = scenario.nominal_arrival_s
     if arrival_s > FAR * MAX_STEPS * model.step_s:
-        return []  # the nominal range has a warning, and its steps are too many to be searched
-    sensor = model.angle_sensor
-    steps = scenario.impulse_steps
-    last_step = int(arrival_s / model.step_s) if steps is None else steps[-1]
-    if any(True for _ in images_until(scenario, last_step - scenario.thruster.delay_steps)):
+        # The nominal range has a warning, and the steps are too many to be searched.
         return []
-    first_s = arrival_s if sensor.first_image_s is None else sensor.first_image_s
+
+    sensor = model.angle_sensor
+    delay_steps = scenario.thruster.delay_steps
+    steps = scenario.impulse_steps
+    last_step = int(arrival_s / model.step_s)
+    if steps is not None:
+        last_step = steps[-1]
+    has_image = any(True for _ in images_until(scenario, last_step - delay_steps))
+    if has_image:
+        return []
+
+    first_s = sensor.first_image_s
+    if first_s is None:
+        first_s = arrival_s
     fired_s = arrival_s - last_step * model.step_s
     return [
         f"no impulse follows a measurement: images are taken from {first_s:g} s to "
         f"{sensor.last_image_s:g} s before the nominal arrival every {sensor.period_s:g} s, the "
-        f"last impulse is {fired_s:g} s before it, decided {scenario.thruster.delay_steps} steps "
-        "earlier"
+        f"last impulse is {fired_s:g} s before it, decided {delay_steps} steps earlier"
     ]
 
 
-def _along(axis: str, owner: Target | SetModel | None, name: str) -> tuple[str, float]:
-    """Return an acceleration along an axis, m/s^2, after its key; without a key for y it is that of
-    z.
+def _along(axis: str, owner: Target | SetModel, name: str) -> tuple[str, float]:
+    """Return the key of an acceleration along an axis, and its value, m/s^2.
+
+    An object without a key for y has the same acceleration along y and z.
     """
-    own = f"{name}_y_m_s2"
-    key = own if axis == "y" and getattr(owner, own) is not None else f"{name}_m_s2"
+    key = f"{name}_{axis}_m_s2"
+    if axis != "y" or getattr(owner, key) is None:
+        key = f"{name}_m_s2"
     return key, getattr(owner, key)

@@ -1,6 +1,4 @@
-"""Studies of many runs: curves of the experiment, comparisons of strategies, and what is reported
-about their sets.
-"""
+"""Studies of many runs: curves of an experiment, comparisons of strategies, lines about results."""
 
 from __future__ import annotations
 
@@ -32,21 +30,20 @@ def summary(sample: Floats) -> dict[str, float | None]:
 
 
 WANTED_SHARES = tuple(1.0 - 10.0**-digits for digits in range(2, 8))
-"""Probabilities of a hit that a study may have to show: from 99 % to one miss in the number of runs
-of a campaign.
+"""Probabilities of a hit that a study may have to show: 99 %, 99.9 %, ... 99.99999 %.
+
+The last one allows one miss in ten million runs, the largest campaigns.
 """
 OF_PAPER = ("asteroid-1997", "asteroid-1997-single")
-"""Scenarios of the paper of 1997. Only their results have its names: curves 1 to 4, figures 2 to
-4.
-"""
+"""Scenarios of the paper of 1997; only their results have the numbers of its curves and figures."""
 
 
 @dataclass(frozen=True)
 class Curve:
-    """Curve of the experiment: 1 random noise, 2 random with range sensor, 3 game noise, 4 game
-    with range sensor.
+    """Results with one noise, with or without the range sensor.
 
-    Curves 1 and 2 may have another noise instead.
+    The paper numbers its curves: 1 random noise, 2 random noise with range sensor, 3 game noise, 4
+    game noise with range sensor. Curves 1 and 2 can have another noise.
     """
 
     number: int
@@ -55,14 +52,10 @@ class Curve:
     results: Results
 
     def title(self, scenario: Scenario) -> str:
-        """Return the name of the curve in lines and tables: its number only for a scenario of the
-        paper.
-        """
-        return (
-            f"curve {self.number}"
-            if is_of_paper(scenario)
-            else case_title(self.noise, self.range_sensor)
-        )
+        """Return the name of the curve: its number only for a scenario of the paper."""
+        if is_of_paper(scenario):
+            return f"curve {self.number}"
+        return case_title(self.noise, self.range_sensor)
 
 
 def is_of_paper(scenario: Scenario) -> bool:
@@ -72,14 +65,17 @@ def is_of_paper(scenario: Scenario) -> bool:
 
 def case_title(noise: str, range_sensor: bool) -> str:
     """Return the name of a case of the experiment: ``random``, ``game + range sensor``."""
-    return f"{noise}{' + range sensor' if range_sensor else ''}"
+    if range_sensor:
+        return f"{noise} + range sensor"
+    return noise
 
 
 def curve_scenarios(
     scenario: Scenario, noise: NoiseKind = NoiseKind.RANDOM
 ) -> Sequence[tuple[int, Scenario]]:
-    """Return number and scenario of each curve, as in the paper's figure 4; without a range sensor
-    curves 1 and 3.
+    """Return number and scenario of each curve of the paper's figure 4.
+
+    Without a range sensor there are only the curves 1 and 3.
     """
     numbered = (
         (1, replace(scenario, noise=noise, range_sensor=None)),
@@ -96,8 +92,9 @@ def curve_scenarios(
 
 @dataclass(frozen=True)
 class Comparison:
-    """One strategy with one noise: results by tie rule of the game noise, or one result with
-    another noise.
+    """Results of one strategy with one noise, by tie rule of the game noise.
+
+    Another noise has one result, with the tie rule None.
 
     All strategies have the same runs.
     """
@@ -109,13 +106,18 @@ class Comparison:
     @property
     def noise_title(self) -> str:
         """The noise in figures."""
-        return f"{self.noise} noise{', worst tie rule' if len(self.results) > 1 else ''}"
+        title = f"{self.noise} noise"
+        if len(self.results) > 1:
+            title += ", worst tie rule"
+        return title
 
     def worst(self, column: str) -> Any:
-        """Return a column of the results, shape (N,), of each run with its worst tie rule: see
-        `_WORST`.
+        """Return a column of the results, of each run with its worst tie rule, shape (N,).
+
+        `_WORST` declares which value of a column is the worst.
         """
         columns = [getattr(each, column) for each in self.results.values()]
+        # `np.stack` would drop the masks.
         stack = np.ma.stack if np.ma.isMaskedArray(columns[0]) else np.stack
         return _WORST[column](stack(columns), axis=0)
 
@@ -123,15 +125,17 @@ class Comparison:
     def hits(self) -> HitEstimate | None:
         """Runs that hit with every tie rule; None if the body has no size."""
         hit = self.worst("hit")
-        return estimate_hits(int(hit.sum()), len(hit)) if hit.count() else None
+        if not hit.count():
+            return None
+        return estimate_hits(int(hit.sum()), len(hit))
 
     @property
     def missed(self) -> dict[str, Any]:
-        """Number of misses of each cause (`infoset.sim.miss_cause`), of each run with its worst tie
-        rule.
-        """
+        """Number of misses by cause, of each run with its worst tie rule."""
         results = [*self.results.values()]
         worst = np.argmax([each.miss_m for each in results], axis=0)
+
+        # The joined results contain all runs of the first tie rule, then all of the second, ...
         runs = len(results[0])
         return join(results).take(worst * runs + np.arange(runs)).missed
 
@@ -141,6 +145,7 @@ _WORST: Mapping[str, Callable[..., Any]] = {
     **dict.fromkeys(("truth_kept", "hit", "phi_held"), np.ma.all),
     "set_emptied": np.any,
 }
+"""Functions that return the worst value of each column."""
 Compared = tuple[str, str, TieRule | None]
 """Strategy, noise and tie rule, None without game noise."""
 
@@ -150,19 +155,26 @@ def compared_scenarios(
     strategies: Mapping[str, Strategy | None],
     noises: Mapping[str, NoiseSource | None],
 ) -> dict[Compared, Scenario]:
-    """Return the scenarios of a comparison; strategies and noises of Python files are not in
-    them.
+    """Return the scenarios of a comparison.
+
+    Strategies and noises of Python files are not part of a scenario.
     """
     flown: dict[Compared, Scenario] = {}
     for name, own in strategies.items():
-        guided = scenario if own is not None else replace(scenario, strategy=name)
+        guided = scenario
+        if own is None:
+            guided = replace(scenario, strategy=name)
+
         for noise, own_noise in noises.items():
-            noisy = guided if own_noise is not None else replace(guided, noise=NoiseKind(noise))
-            ties = TieRule if noise == NoiseKind.GAME.value else (None,)
-            flown |= {
-                (name, noise, tie): noisy if tie is None else replace(noisy, tie=tie)
-                for tie in ties
-            }
+            noisy = guided
+            if own_noise is None:
+                noisy = replace(guided, noise=NoiseKind(noise))
+
+            if noise == NoiseKind.GAME.value:
+                for tie in TieRule:
+                    flown[name, noise, tie] = replace(noisy, tie=tie)
+            else:
+                flown[name, noise, None] = noisy
     return flown
 
 
@@ -176,10 +188,10 @@ def comparisons(flown: Mapping[Compared, Results]) -> list[Comparison]:
 
 @dataclass(frozen=True)
 class SetCounts:
-    """Numbers of runs: all, with the true state inside the set at every step, with an empty set,
-    and with a failed set.
+    """Numbers of runs by the history of their sets.
 
-    A set has failed if it became empty or lost the true state.
+    All runs; runs with the true state inside the set at every step; runs whose set became empty;
+    and runs whose set failed, that is, became empty or lost the true state.
     """
 
     runs: int = 0
@@ -189,20 +201,19 @@ class SetCounts:
 
     def __add__(self, other: SetCounts) -> SetCounts:
         return SetCounts(
-            *(
-                mine + more
-                for mine, more in zip(vars(self).values(), vars(other).values(), strict=True)
-            )
+            self.runs + other.runs,
+            self.truth_kept + other.truth_kept,
+            self.set_emptied + other.set_emptied,
+            self.failed + other.failed,
         )
 
     def __str__(self) -> str:
-        kept, emptied = (
-            f"{count} of {some_runs(self.runs)}" for count in (self.truth_kept, self.set_emptied)
-        )
+        every = some_runs(self.runs)
+        kept_share = percent(self.truth_kept / self.runs)
+        emptied_share = percent(self.set_emptied / self.runs)
         return (
-            f"true state inside the set at every step: {kept} "
-            f"({percent(self.truth_kept / self.runs)}); set became empty: {emptied} "
-            f"({percent(self.set_emptied / self.runs)})"
+            f"true state inside the set at every step: {self.truth_kept} of {every} "
+            f"({kept_share}); set became empty: {self.set_emptied} of {every} ({emptied_share})"
         )
 
 
@@ -215,8 +226,9 @@ def set_counts(truth_kept: Flags, set_emptied: Flags) -> SetCounts:
 
 
 def set_warnings(model: Model, counts: SetCounts) -> list[str]:
-    """Return a warning if sets failed in some runs: the quantiles then describe the failures of the
-    model too.
+    """Return a warning if sets failed in some runs.
+
+    The quantiles then also describe these failures of the model.
     """
     if not counts.failed:
         return []
@@ -243,46 +255,48 @@ def scenario_title(scenario: Scenario) -> str:
 
 
 def study_title(scenario: Scenario, strategy: str, seed: int) -> str:
-    """Return what the numbers of a study rest on: scenario, model, strategy and seed, and a line
-    with its settings.
+    """Return the heading of a study: scenario, model, strategy and seed.
+
+    A second line is the description of the scenario, if it has one.
     """
     head = f"{scenario_title(scenario)}, strategy {strategy}, seed {seed}"
-    return "\n".join(line for line in (head, scenario.description) if line)
+    if not scenario.description:
+        return head
+    return f"{head}\n{scenario.description}"
 
 
 def game_note(scenario: Scenario, rule: str | None = None) -> str:
-    """Return a line about what a result with game noise is; `rule` is its tie rule, None that of
-    the scenario.
+    """Return a line that says how results with game noise are to be read.
+
+    `rule` is the tie rule in words; None means the tie rule of the scenario.
     """
-    is_guaranteed = scenario.set_model.is_guaranteed
-    bound = (
-        "; the miss of a run is at most its Phi, and other errors can give a greater Phi"
-        if is_guaranteed
-        else ""
-    )
-    worse = "" if rule else "; infoset compare shows the worst of all tie rules"
-    return (
+    note = (
         f"game noise ({rule or f'tie rule {scenario.tie.value}'}) is one adversary, not the worst "
         "case: infoset bound --budget 0 prints a miss, from the worst start, that no strategy can "
-        f"prevent{bound}{worse}"
+        "prevent"
     )
+    if scenario.set_model.is_guaranteed:
+        note += "; the miss of a run is at most its Phi, and other errors can give a greater Phi"
+    if rule is None:
+        note += "; infoset compare shows the worst of all tie rules"
+    return note
 
 
 def random_note(scenario: Scenario) -> str:
-    """Return a line about what a result with random noise is."""
-    constant = scenario.set_model.angle_sensor.has_constant_bias
+    """Return a line that says how results with random noise are to be read."""
+    errors = "independent from one measurement to the next"
+    if scenario.set_model.angle_sensor.has_constant_bias:
+        errors += ", with a constant centroid error"
     return (
-        "random noise (uniform errors within the bounds, independent from one measurement to the "
-        f"next{', with a constant centroid error' if constant else ''}) is one model of many: a "
+        f"random noise (uniform errors within the bounds, {errors}) is one model of many: a "
         "decision holds for it only"
     )
 
 
 def noise_notes(scenario: Scenario, noises: Iterable[str], rule: str | None = None) -> list[str]:
-    """Return a line for each noise, except random noise and the user's own, about what its results
-    are.
+    """Return a line for each noise that says how its results are to be read.
 
-    `rule` is that of `game_note`.
+    Random noise and the user's own noises have none. `rule` is passed to `game_note`.
     """
     sigma = scenario.noise_sigma
     gaussian = (
@@ -304,17 +318,18 @@ def hit_text(hits: HitEstimate | None, scenario: Scenario) -> str:
     """Return the share of hits with its interval; an empty text if the body has no size."""
     if hits is None or scenario.body is None:
         return ""
+    interval = f"{percent(hits.lower)} to {percent(hits.upper)}"
     return (
         f"hit (miss at most {scenario.body.radius_m:g} m): {hits.hits} of {some_runs(hits.runs)} "
-        f"({percent(hits.probability)}), 95 % CI {percent(hits.lower)} to {percent(hits.upper)}"
+        f"({percent(hits.probability)}), 95 % CI {interval}"
     )
 
 
 def outlook_text(hits: HitEstimate | None) -> str:
-    """Return what shows a greater probability of a hit than a sample does; an empty text if the
-    sample excludes it.
+    """Return a line about the runs that would show a greater probability of a hit.
 
-    The probability is the first of 99 %, 99.9 % and so on that the sample does not show yet.
+    The probability is the first of 99 %, 99.9 % and so on that the sample does not show yet. The
+    text is empty if the sample excludes it.
     """
     if hits is None:
         return ""
@@ -322,31 +337,45 @@ def outlook_text(hits: HitEstimate | None) -> str:
     share = next(share for share in WANTED_SHARES if hits.runs < runs_for_hits(share, misses))
     if hits.upper < share:
         return ""
-    needed = runs_for_hits(share, misses)
-    allowed = (
-        "without a miss"
-        if misses == 0
-        else f"with at most {misses} miss{'' if misses == 1 else 'es'}"
-    )
-    requirement = HitRequirement(share)
+
+    allowed = "without a miss"
+    if misses == 1:
+        allowed = "with at most 1 miss"
+    elif misses > 1:
+        allowed = f"with at most {misses} misses"
     text = (
-        f"for {percent(share)} with {percent(CONFIDENCE)} confidence: at least {needed} runs {allowed}; "
-        f'infoset sweep --vary KEY=FROM:TO:COUNT --require "{requirement}" --until decided decides it'
+        f"for {percent(share)} with {percent(CONFIDENCE)} confidence: at least "
+        f"{runs_for_hits(share, misses)} runs {allowed}; infoset sweep --vary KEY=FROM:TO:COUNT "
+        f'--require "{HitRequirement(share)}" --until decided decides it'
     )
+
     until_decided = runs_needed(hits.hits, hits.runs, share)
-    return f"{text}, after about {until_decided} runs" if until_decided is not None else text
+    if until_decided is not None:
+        text += f", after about {until_decided} runs"
+    return text
 
 
 def miss_text(missed: Mapping[str, Any], runs: int, scenario: Scenario) -> str:
-    """Return the numbers of misses by cause (`infoset.sim.miss_cause`) as text, empty without
-    misses.
+    """Return the numbers of misses by cause as text; an empty text without misses.
+
+    The keys of `missed` are the causes (`infoset.sim.miss_cause`) and the lengths in the text.
     """
+    count = sum(missed[cause.value] for cause in MissCause)
+    if not count:
+        return ""
+
     thruster = scenario.thruster
     reasons = {
-        MissCause.ENGINE: "by the engine (it corrects {corrected_m}, the starts need up to {needed_m})",
+        MissCause.ENGINE: (
+            "by the engine (it corrects {corrected_m}, the starts need up to {needed_m})"
+        ),
         MissCause.BUDGET: f"by the budget of {thruster.budget_m_s:g} m/s",
-        MissCause.KNOWLEDGE: "by knowledge (at the last decision misses of +-{possible_m} are still possible)",
-        MissCause.SATURATED: f"saturated (known too late for impulses of {thruster.max_impulse_m_s:g} m/s)",
+        MissCause.KNOWLEDGE: (
+            "by knowledge (at the last decision misses of +-{possible_m} are still possible)"
+        ),
+        MissCause.SATURATED: (
+            f"saturated (known too late for impulses of {thruster.max_impulse_m_s:g} m/s)"
+        ),
         MissCause.GUIDANCE: "by the guidance (to compare strategies: infoset compare)",
     }
     lengths = {
@@ -359,31 +388,30 @@ def miss_text(missed: Mapping[str, Any], runs: int, scenario: Scenario) -> str:
         for cause, text in reasons.items()
         if missed[cause.value]
     ]
-    count = sum(missed[cause.value] for cause in MissCause)
-    return f"missed {count} of {some_runs(runs)}: {', '.join(parts)}" if parts else ""
+    return f"missed {count} of {some_runs(runs)}: {', '.join(parts)}"
 
 
 def redrawn_text(share: float | None) -> str:
-    """Return the share of the normal starts that were drawn again; an empty text for uniform
-    starts.
-    """
-    return (
-        ""
-        if share is None
-        else f"normal starts: {percent(share)} were outside the dispersion and drawn again"
-    )
+    """Return the share of normal starts that were drawn again; an empty text for uniform starts."""
+    if share is None:
+        return ""
+    return f"normal starts: {percent(share)} were outside the dispersion and drawn again"
 
 
 def max_guarantee_m(results: Results) -> float | None:
     """Return the maximum guaranteed miss of runs, m; None if a run has no guarantee."""
     bounds = results.guaranteed_miss_m
-    known = results.guarantees and not np.ma.getmaskarray(bounds).any()
-    return float(bounds.max()) if known else None
+    if not results.guarantees or np.ma.getmaskarray(bounds).any():
+        return None
+    return float(bounds.max())
 
 
 def percent(share: float) -> str:
-    """Return a share as a percentage with four digits; only the shares 0 and 1 become 0 % and 100
-    %.
+    """Return a share as a percentage with four digits, for example ``99.95 %``.
+
+    Only the share 1 becomes ``100 %``: a share just below it has more digits.
     """
     text = f"{100.0 * share:.4g}"
-    return f"{f'{100.0 * share:.12g}' if text == '100' and share < 1.0 else text} %"
+    if text == "100" and share < 1.0:
+        text = f"{100.0 * share:.12g}"
+    return f"{text} %"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,9 +51,7 @@ STRATEGY_TITLES = (
 
 @dataclass(frozen=True)
 class WorstOfStrategy:
-    """Simulations of one strategy: the pairs of the bound, and the worst engagements of the
-    searches.
-    """
+    """Simulations of one strategy: the pairs of the bound, and the worst engagements found."""
 
     name: str
     flights: tuple[tuple[TruthPair, PairFlight], ...]
@@ -62,12 +61,8 @@ class WorstOfStrategy:
     @property
     def results(self) -> Results:
         """Results of all simulations."""
-        return join(
-            [
-                *(flight.results for _, flight in self.flights),
-                *(record.result for record in self.records),
-            ]
-        )
+        of_pairs = [flight.results for _, flight in self.flights]
+        return join([*of_pairs, *(record.result for record in self.records)])
 
     @property
     def pairs_m(self) -> float:
@@ -81,51 +76,39 @@ class WorstOfStrategy:
 
     @property
     def set_kept_m(self) -> float | None:
-        """Maximum miss of the engagements whose set never became empty, m; None if there is
-        none.
-        """
+        """Maximum miss with the set never empty, m; None without such an engagement."""
         results = self.results
         return max(results.miss_m[~results.set_emptied].tolist(), default=None)
 
     def over(self, lower: LowerBound) -> float | None:
-        """Return the maximum miss with the set never empty, divided by the bound; None if one of
-        them is missing.
+        """Return the maximum miss with the set never empty, divided by the bound.
+
+        None if there is no such miss, or the bound is zero.
         """
-        return (
-            self.set_kept_m / lower.bound_m
-            if lower.bound_m > 0.0 and self.set_kept_m is not None
-            else None
-        )
+        if self.set_kept_m is None or lower.bound_m <= 0.0:
+            return None
+        return self.set_kept_m / lower.bound_m
 
 
 def run(options: Bound) -> None:
     """Compute the bound, simulate the strategies, write the files and print the tables."""
     scenario, notes = study_scenario(options)
-    only_bound = options.budget == 0 and options.strategies is None
-    strategies = {} if only_bound else chosen_strategies(scenario, options.strategies)
+    strategies: Mapping[str, Strategy | None] = {}
+    if options.budget > 0 or options.strategies is not None:
+        strategies = chosen_strategies(scenario, options.strategies)
     with work_of(options, scenario, figure_files(FIGURE), notes=notes) as work:
+        # The bound is printed at once, before the strategies are simulated.
         lower = lower_bound(scenario, progress=work.begin("lower bound"))
         nominal = _nominal(scenario)
         quiet = options.quiet or work.written.stdout_taken
         show(_bound_parts(scenario, lower, nominal), quiet)
-        worst = _worst_of_strategies(
-            scenario, lower, strategies, options, work.begin("strategies"), quiet
-        )
-        (reserve, reasons), best = _value(scenario, lower), _best(worst)
-        parts_m = (
-            {}
-            if reserve is None
-            else {name.removesuffix("_m"): part for name, part in asdict(reserve).items()}
-        )
-        value = {
-            "at_least_m": lower.bound_m,
-            "at_most_m": reserve and lower.bound_m + reserve.total_m,
-            "reserve_m": reserve and {"total": reserve.total_m, **parts_m},
-            "not_proved_because": list(reasons),
-            "best_strategy": best and best.name,
-            "best_strategy_worst_found_m": best and best.worst_m,
-        }
-        work.save({**_summary(scenario, lower, nominal, worst), "value": value})
+
+        progress = work.begin("strategies")
+        worst = _worst_of_strategies(scenario, lower, strategies, options, progress, quiet)
+        value = _value(scenario, lower)
+        best = _best(worst)
+        summary = _summary(scenario, lower, nominal, worst)
+        work.save({**summary, "value": _value_json(lower, value, best)})
         if options.out is not None:
             from infoset.experiments.interception.figures.bound import draw_bound
 
@@ -133,7 +116,7 @@ def run(options: Bound) -> None:
             work.written.figure(FIGURE, draw_bound(scenario, lower, worst_m))
     show(
         [
-            *_value_lines(lower.bound_m, reserve, reasons, best),
+            *_value_lines(lower.bound_m, value, best),
             *_notes(scenario, lower, options, worst),
         ],
         quiet,
@@ -156,13 +139,12 @@ def _worst_of_strategies(
     worst = []
     for (name, own), report in zip(strategies.items(), reports, strict=True):
         strategy = _simulate(scenario, lower, name, own, options, report)
-        searched = strategy.searched.misses().values()
-        values = (
+        values = [
             strategy.pairs_m,
-            *searched,
+            *strategy.searched.misses().values(),
             strategy.over(lower),
             max_guarantee_m(strategy.results),
-        )
+        ]
         rows.add(name, *map(number, values))
         worst.append(strategy)
     show([""], quiet)
@@ -177,10 +159,14 @@ def _simulate(
     options: Bound,
     report: Progress,
 ) -> WorstOfStrategy:
-    flown = scenario if own is not None else replace(scenario, strategy=name)
+    """Simulate a strategy against the pairs of the bound, and search for its worst engagements."""
+    flown = scenario
+    if own is None:
+        flown = replace(scenario, strategy=name)
     flights = [(pair, fly_pair(flown, pair, own)) for pair in lower.pairs]
     for _, flight in flights:
         need_finite(flight.results)
+
     searched = WorstMisses(None, None)
     if options.budget > 0:
         searched = find_worst_misses(
@@ -192,64 +178,68 @@ def _simulate(
 
 
 def _nominal(scenario: Scenario) -> TruthPair:
-    """Return the best pair at the nominal range and closing speed, or at the possible ones nearest
-    to them.
+    """Return the best pair at the nominal range and closing speed.
+
+    If these are impossible, the nearest possible ones are taken.
     """
     box = scenario.set_model.bounds
     label_m = float(np.clip(scenario.nominal_range_m, *box.x_m))
-    return pair_at(
-        scenario, label_m, float(np.clip(-scenario.set_model.closing_speed_m_s, *box.vx_m_s))
-    )
+    vx_m_s = float(np.clip(-scenario.set_model.closing_speed_m_s, *box.vx_m_s))
+    return pair_at(scenario, label_m, vx_m_s)
 
 
 def _summary(
     scenario: Scenario, lower: LowerBound, nominal: TruthPair, worst: Sequence[WorstOfStrategy]
 ) -> dict[str, object]:
+    """Return the bound, its pairs and the strategies in JSON."""
     model = scenario.set_model
-    return {
+    keys: dict[str, object] = {
         "disturbance_m_s2": {axis: model.axis(axis).disturbance_m_s2 for axis in model.axes},
         "lower_bound_m": lower.bound_m,
-        **(
-            {}
-            if scenario.radius_m is None
-            else {"hit_cannot_be_guaranteed": lower.bound_m > scenario.radius_m}
-        ),
-        "reached_at": _where(lower.pair, scenario),
-        "at_nominal_range": {**_where(nominal, scenario), "bound_m": nominal.bound_m},
-        "by_label": [
-            {
-                "label_m": label.label_m,
-                "closing_speed_m_s": -label.vx_m_s,
-                "last_common_step": label.last_common_step,
-                "bound_m": label.bound_m,
-            }
-            for label in lower.by_label
-        ],
-        "strategies": [
-            {
-                "name": strategy.name,
-                "worst_found_m": strategy.worst_m,
-                "worst_found_set_kept_m": strategy.set_kept_m,
-                "guaranteed_m": max_guarantee_m(strategy.results),
-                "worst_over_bound": strategy.over(lower),
-                "outcome": strategy.results.outcomes[int(strategy.results.miss_m.argmax())].value,
-                "worst_of_pairs_m": strategy.pairs_m,
-                **strategy.searched.misses(),
-                "flights": [
-                    {
-                        **_where(pair, scenario),
-                        "bound_m": pair.bound_m,
-                        "miss_m": flight.results.miss_m.tolist(),
-                        **_by_axis("miss", flight.results.lateral_miss_m.T, scenario),
-                        "impulse_m_s": flight.results.impulse_m_s.tolist(),
-                        "outcomes": [outcome.value for outcome in flight.results.outcomes],
-                        "truth_kept": flight.results.truth_kept.tolist(),
-                    }
-                    for pair, flight in strategy.flights
-                ],
-            }
-            for strategy in worst
-        ],
+    }
+    if scenario.radius_m is not None:
+        keys["hit_cannot_be_guaranteed"] = lower.bound_m > scenario.radius_m
+    keys["reached_at"] = _where(lower.pair, scenario)
+    keys["at_nominal_range"] = {**_where(nominal, scenario), "bound_m": nominal.bound_m}
+    keys["by_label"] = [
+        {
+            "label_m": label.label_m,
+            "closing_speed_m_s": -label.vx_m_s,
+            "last_common_step": label.last_common_step,
+            "bound_m": label.bound_m,
+        }
+        for label in lower.by_label
+    ]
+    keys["strategies"] = [_strategy_json(strategy, lower, scenario) for strategy in worst]
+    return keys
+
+
+def _strategy_json(
+    strategy: WorstOfStrategy, lower: LowerBound, scenario: Scenario
+) -> dict[str, object]:
+    results = strategy.results
+    flights = [
+        {
+            **_where(pair, scenario),
+            "bound_m": pair.bound_m,
+            "miss_m": flight.results.miss_m.tolist(),
+            **_by_axis("miss", flight.results.lateral_miss_m.T, scenario),
+            "impulse_m_s": flight.results.impulse_m_s.tolist(),
+            "outcomes": [outcome.value for outcome in flight.results.outcomes],
+            "truth_kept": flight.results.truth_kept.tolist(),
+        }
+        for pair, flight in strategy.flights
+    ]
+    return {
+        "name": strategy.name,
+        "worst_found_m": strategy.worst_m,
+        "worst_found_set_kept_m": strategy.set_kept_m,
+        "guaranteed_m": max_guarantee_m(results),
+        "worst_over_bound": strategy.over(lower),
+        "outcome": results.outcomes[int(results.miss_m.argmax())].value,
+        "worst_of_pairs_m": strategy.pairs_m,
+        **strategy.searched.misses(),
+        "flights": flights,
     }
 
 
@@ -277,13 +267,41 @@ def _equal_until_s(pair: TruthPair, scenario: Scenario) -> float:
     return pair.arrival_s - pair.last_common_step * scenario.set_model.step_s
 
 
-def _value(scenario: Scenario, lower: LowerBound) -> tuple[ValueReserve | None, tuple[str, ...]]:
-    """Return how much greater than the bound the value of the game can be, or None and why this is
-    not proved.
+class _GameValue(NamedTuple):
+    """The reserve up to which the bound is the value of the game; None if it is not proved.
+
+    `reasons` say why it is not proved.
     """
+
+    reserve: ValueReserve | None
+    reasons: Sequence[str]
+
+
+def _value(scenario: Scenario, lower: LowerBound) -> _GameValue:
+    """Return how much greater than the bound the value of the game can be."""
     reasons = why_no_value(scenario)
-    reserve = None if reasons else value_reserve(scenario, lower)
-    return (None, (reserve,)) if isinstance(reserve, str) else (reserve, reasons)
+    if reasons:
+        return _GameValue(None, reasons)
+    reserve = value_reserve(scenario, lower)
+    if isinstance(reserve, str):
+        return _GameValue(None, [reserve])
+    return _GameValue(reserve, [])
+
+
+def _value_json(
+    lower: LowerBound, value: _GameValue, best: WorstOfStrategy | None
+) -> dict[str, object]:
+    keys: dict[str, object] = {"at_least_m": lower.bound_m, "at_most_m": None, "reserve_m": None}
+    if value.reserve is not None:
+        keys["at_most_m"] = lower.bound_m + value.reserve.total_m
+        reserve_m = {"total": value.reserve.total_m}
+        for name, part in asdict(value.reserve).items():
+            reserve_m[name.removesuffix("_m")] = part
+        keys["reserve_m"] = reserve_m
+    keys["not_proved_because"] = list(value.reasons)
+    keys["best_strategy"] = best and best.name
+    keys["best_strategy_worst_found_m"] = best and best.worst_m
+    return keys
 
 
 def _best(worst: Sequence[WorstOfStrategy]) -> WorstOfStrategy | None:
@@ -292,12 +310,8 @@ def _best(worst: Sequence[WorstOfStrategy]) -> WorstOfStrategy | None:
     return min(searched, key=lambda strategy: strategy.worst_m, default=None)
 
 
-def _value_lines(
-    lower_m: float,
-    reserve: ValueReserve | None,
-    reasons: Sequence[str],
-    best: WorstOfStrategy | None,
-) -> Iterator[str]:
+def _value_lines(lower_m: float, value: _GameValue, best: WorstOfStrategy | None) -> Iterator[str]:
+    reserve = value.reserve
     if reserve is not None:
         parts = ", ".join(
             f"{name.removesuffix('_m').replace('_', ' ')} {number(part)}"
@@ -310,31 +324,17 @@ def _value_lines(
         )
         yield f"reserve, m: {parts}"
         return
-    found = (
-        f"; minimum of the maximum misses found: {number(best.worst_m)} m, of {best.name}"
-        if best
-        else ""
-    )
-    yield f"the value of the game is at least {number(lower_m)} m{found}"
-    yield f"no upper end is proved, because of: {', '.join(reasons)}"
+
+    line = f"the value of the game is at least {number(lower_m)} m"
+    if best is not None:
+        line += f"; minimum of the maximum misses found: {number(best.worst_m)} m, of {best.name}"
+    yield line
+    yield f"no upper end is proved, because of: {', '.join(value.reasons)}"
 
 
 def _bound_parts(scenario: Scenario, lower: LowerBound, nominal: TruthPair) -> Iterator[Part]:
+    """Yield the bound, its pairs by closing speed, and the bound at the nominal range."""
     model = scenario.set_model
-    titles = (
-        "closing speed\nkm/s",
-        "bound\nm",
-        "range at t = 0\nkm",
-        "equal measurements until\ns before arrival",
-    )
-    bounds = number_table(*titles)
-    for pair in lower.pairs:
-        bounds.add_row(
-            f"{-pair.vx_m_s / M_PER_KM:g}",
-            number(pair.bound_m),
-            f"{pair.label_m / M_PER_KM:.1f}",
-            "one motion" if pair.is_single else f"{_equal_until_s(pair, scenario):.2f}",
-        )
     bound_m = number(lower.bound_m)
     yield (
         f"{scenario.name}, model {model.model.value}: no strategy can guarantee a miss below "
@@ -353,18 +353,39 @@ def _bound_parts(scenario: Scenario, lower: LowerBound, nominal: TruthPair) -> I
     for axis in model.axes:
         maximum = model.axis(axis).disturbance_m_s2
         yield f"acceleration of the object along {axis} in these pairs: at most {maximum:.3g} m/s^2"
-    yield from (bounds, "")
+
+    bounds = number_table(
+        "closing speed\nkm/s",
+        "bound\nm",
+        "range at t = 0\nkm",
+        "equal measurements until\ns before arrival",
+    )
+    for pair in lower.pairs:
+        equal_until = "one motion"
+        if not pair.is_single:
+            equal_until = f"{_equal_until_s(pair, scenario):.2f}"
+        bounds.add_row(
+            f"{-pair.vx_m_s / M_PER_KM:g}",
+            number(pair.bound_m),
+            f"{pair.label_m / M_PER_KM:.1f}",
+            equal_until,
+        )
+    yield bounds
+    yield ""
 
 
 def _notes(
     scenario: Scenario, lower: LowerBound, options: Bound, worst: Sequence[WorstOfStrategy]
 ) -> Iterator[str]:
+    """Yield lines that explain the tables."""
     if any(strategy.results.set_emptied.any() for strategy in worst):
-        hint = "" if scenario.set_model.is_guaranteed else "; try --model guaranteed"
-        yield (
+        note = (
             "in some engagements a measurement contradicted all states of the set, which became "
-            f"empty{hint}"
+            "empty"
         )
+        if not scenario.set_model.is_guaranteed:
+            note += "; try --model guaranteed"
+        yield note
     if any(pair.is_single for pair in lower.pairs):
         yield (
             "one motion: a start that all impulses together do not bring nearer, whatever is "
@@ -372,12 +393,15 @@ def _notes(
         )
     if not worst:
         return
+
     yield "pairs: maximum miss of the states that prove the bound"
-    search = (
-        "maximum misses found by `infoset adversary --objective fixed-truth --budget "
-        f"{options.budget}`"
-    )
-    yield f"set never empty, also empty: {search if options.budget else 'not searched'}"
+    search = "not searched"
+    if options.budget:
+        search = (
+            "maximum misses found by `infoset adversary --objective fixed-truth --budget "
+            f"{options.budget}`"
+        )
+    yield f"set never empty, also empty: {search}"
     yield (
         "miss / bound: maximum miss of pairs and search, without sets that became empty, divided "
         "by the bound"

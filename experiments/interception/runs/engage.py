@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from time import perf_counter
 
 import numpy as np
@@ -24,7 +25,7 @@ from infoset.experiments.interception.study import is_of_paper
 from infoset.guidance import NoiseKind
 from infoset.guidance.noise import NoiseSource
 from infoset.guidance.thruster import modulus
-from infoset.sim import Record, fly_one
+from infoset.sim import Record, Scenario, fly_one
 from infoset.sim.columns import Cell, csv_text
 
 
@@ -33,43 +34,32 @@ def run(options: Engage) -> None:
     scenario = scenario_with(options)
     own = own_strategy(options.strategy)
     both = options.noise == "both"
-    chosen = chosen_noise(options.noise or scenario.noise.value, [*NOISES, "both"])
-    wanted: dict[str, NoiseSource | str] = (
-        {noise: noise for noise in ("random", "game")}
-        if both
-        else {chosen if isinstance(chosen, str) else chosen.name: chosen}
-    )
+    wanted = _noises_of(options, scenario)
     noises = [*wanted]
-    if isinstance(chosen, str) and not both:
-        scenario = replace(scenario, noise=NoiseKind(chosen))
-    files = {f"--record of {noise}": options.record for noise in noises}
-    if both and (file := options.record) is not None:
-        files = {
-            f"--record of {noise}": file.with_name(f"{file.stem}-{noise}{file.suffix}")
-            for noise in noises
-        }
+    if not both and isinstance(wanted[noises[0]], str):
+        scenario = replace(scenario, noise=NoiseKind(noises[0]))
     names = [
         "steps.csv",
         *(f"record-{noise}.npz" for noise in noises),
         *figure_files(*engagement_figures(scenario)),
     ]
-    with work_of(options, scenario, names, files) as work:
+    with work_of(options, scenario, names, _record_files(options, noises)) as work:
         records = []
         summaries = {}
         for noise in noises:
             began_s = perf_counter()
-            progress = work.begin(f"{noise} noise")
             record = fly_one(
                 scenario,
                 options.run,
                 seed=options.seed,
                 strategy=own,
                 noise=wanted[noise],
-                progress=progress,
+                progress=work.begin(f"{noise} noise"),
             )
             need_finite(record.result)
             records.append(record)
             summaries[noise] = _summary(record, perf_counter() - began_s)
+
         work.save(summaries if both else summaries[noises[0]])
         work.written.save("steps.csv", steps_csv(records), "--csv")
         for noise, record in zip(noises, records, strict=True):
@@ -78,42 +68,68 @@ def run(options: Engage) -> None:
     show(engagement_parts(records), options.quiet or work.written.stdout_taken)
 
 
-def _summary(record: Record, elapsed_s: float) -> dict[str, object]:
-    scenario = record.scenario
-    first = record.inconsistency
-    contradiction = first and {
-        "step": first.step,
-        "time_s": float(record.time_s[first.step]),
-        "label_m": first.label_m,
-    }
-    published = {}
-    if is_of_paper(scenario):
-        is_game = record.noise_name == NoiseKind.GAME.value
-        published["published_curve"] = 1 + (scenario.range_sensor is not None) + 2 * is_game
+def _noises_of(options: Engage, scenario: Scenario) -> dict[str, NoiseSource | str]:
+    """Return the noises of the engagements by name: a built-in name, or a noise of a file."""
+    chosen = chosen_noise(options.noise or scenario.noise.value, [*NOISES, "both"])
+    if chosen == "both":
+        return {"random": "random", "game": "game"}
+    if isinstance(chosen, str):
+        return {chosen: chosen}
+    return {chosen.name: chosen}
+
+
+def _record_files(options: Engage, noises: Sequence[str]) -> dict[str, Path | None]:
+    """Return the files of ``--record``; two engagements have their noises in the names."""
+    file = options.record
+    if len(noises) == 1 or file is None:
+        return {f"--record of {noise}": file for noise in noises}
     return {
+        f"--record of {noise}": file.with_name(f"{file.stem}-{noise}{file.suffix}")
+        for noise in noises
+    }
+
+
+def _summary(record: Record, elapsed_s: float) -> dict[str, object]:
+    """Return the results of an engagement in JSON."""
+    keys: dict[str, object] = {
         "seed": record.seed,
         "run": record.run,
         "runs": 1,
         "elapsed_s": elapsed_s,
-        **published,
-        "noise": record.noise_name,
-        "strategy": record.strategy,
-        **{name: values[0] for name, values in outcome_columns(record.result).items()},
-        "hit": record.result.hit.tolist()[0],
-        "inconsistency": contradiction,
-        "steps": _step_rows(record),
     }
+    if is_of_paper(record.scenario):
+        is_game = record.noise_name == NoiseKind.GAME.value
+        has_range_sensor = record.scenario.range_sensor is not None
+        keys["published_curve"] = 1 + has_range_sensor + 2 * is_game
+    keys["noise"] = record.noise_name
+    keys["strategy"] = record.strategy
+    for name, values in outcome_columns(record.result).items():
+        keys[name] = values[0]
+    keys["hit"] = record.result.hit.tolist()[0]
+
+    keys["inconsistency"] = None
+    first = record.inconsistency
+    if first is not None:
+        keys["inconsistency"] = {
+            "step": first.step,
+            "time_s": float(record.time_s[first.step]),
+            "label_m": first.label_m,
+        }
+    keys["steps"] = _step_rows(record)
+    return keys
 
 
 def steps_csv(records: Sequence[Record]) -> str:
-    """Return a line for each step of engagements of one scenario, as CSV; columns name the lateral
-    axis.
+    """Return a line for each step of engagements of one scenario, as CSV.
+
+    Columns of a lateral axis have its name.
     """
     rows = [{"noise": record.noise_name, **row} for record in records for row in _step_rows(record)]
     return csv_text([*rows[0]], [[*row.values()] for row in rows])
 
 
 def _step_rows(record: Record) -> list[dict[str, Cell]]:
+    """Return the values of each step; None where they are not known."""
     unknown = np.full((record.steps, len(record.scenario.set_model.axes)), np.nan)
     columns = {
         "time_s": record.time_s,
@@ -132,14 +148,12 @@ def _step_rows(record: Record) -> list[dict[str, Cell]]:
             f"predicted_miss_{axis}_upper_m": record.predicted_miss_m[:, number, 1],
         }
     columns["truth_margin_m"] = record.truth_margin_m
-    return [
-        {
-            "step": step,
-            **{
-                name: None if np.isnan(values[step]) else float(values[step])
-                for name, values in columns.items()
-            },
-            "sections": len(record.sections[step]),
-        }
-        for step in range(record.steps)
-    ]
+
+    rows = []
+    for step in range(record.steps):
+        row: dict[str, Cell] = {"step": step}
+        for name, values in columns.items():
+            row[name] = None if np.isnan(values[step]) else float(values[step])
+        row["sections"] = len(record.sections[step])
+        rows.append(row)
+    return rows

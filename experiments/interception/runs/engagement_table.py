@@ -15,7 +15,6 @@ FIGURES = ("figure-process", "figure-sets", "figure-approach")
 FIGURES_OF_PAPER = ("figure-2-process", "figure-3-sets", "figure-approach")
 """Names of the figures of engagements, and with their numbers in the paper."""
 
-
 PRINTED_NOTE = (
     "the paper prints impulses of one run with each noise, from z = -8 km and without a range "
     "sensor; docs/interception.md says which variants were tried, and that the difference to ours "
@@ -25,42 +24,33 @@ PRINTED_NOTE = (
 
 def engagement_figures(scenario: Scenario) -> Sequence[str]:
     """Return the names of the figures of engagements of a scenario."""
-    return FIGURES_OF_PAPER if is_of_paper(scenario) else FIGURES
+    if is_of_paper(scenario):
+        return FIGURES_OF_PAPER
+    return FIGURES
 
 
 def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
-    """Yield the results of engagements side by side, with the paper's for its scenario, for the
-    screen.
+    """Yield the results of engagements side by side, for the screen.
+
+    Engagements of the paper's scenario are beside its printed numbers.
     """
+    printed: Mapping[str, tuple[float, float]] = {}
+    if any(is_of_paper(record.scenario) for record in records):
+        printed = printed_single_runs()
     bounds = sorted({bound_name(record.scenario).removesuffix(", m") for record in records})
     lateral = sorted({axis for record in records for axis in record.scenario.set_model.axes})
-    printed = (
-        printed_single_runs() if any(is_of_paper(record.scenario) for record in records) else {}
-    )
-    columns: list[tuple[str, dict[str, str]]] = []
+    titles = []
+    columns = []
     for record in records:
-        result = {name: values[0] for name, values in record.result.to_dict().items()}
-        meter = " + range sensor" if record.scenario.range_sensor is not None else ""
-        values = {
-            "miss, m": number(result["miss_m"]),
-            **{f"miss along {axis}, m": number(result.get(f"miss_{axis}_m")) for axis in lateral},
-            "impulse, m/s": number(result["impulse_m_s"]),
-            **_printed_impulse(record, printed),
-            f"{' / '.join(bounds)}, m": number(result["guaranteed_miss_m"]),
-            "outcome": _outcome(record),
-            "true state inside the set\nat every step": _yes(result["truth_kept"]),
-            "smallest distance from the true\nstate to the set's boundary, m": number(
-                result["truth_margin_m"]
-            ),
-            "miss within the bound Phi": _yes(result["phi_held"]),
-            "steps": str(record.steps),
-            "seed, run": f"{record.seed}, {record.run}",
-            "strategy": record.strategy,
-        }
-        columns.append((f"{record.noise_name}{meter}", values))
-    table = number_table("", *(title for title, _ in columns))
-    for name in columns[0][1]:
-        table.add_row(name, *(values.get(name, "") for _, values in columns))
+        title = record.noise_name
+        if record.scenario.range_sensor is not None:
+            title += " + range sensor"
+        titles.append(title)
+        columns.append(_column(record, lateral, f"{' / '.join(bounds)}, m", printed))
+
+    table = number_table("", *titles)
+    for name in columns[0]:
+        table.add_row(name, *(column.get(name, "") for column in columns))
     yield " | ".join(dict.fromkeys(record.scenario.name for record in records))
     yield table
     if printed:
@@ -68,18 +58,41 @@ def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
     yield from dict.fromkeys(filter(None, (allowance(record.scenario) for record in records)))
 
 
-def _printed_impulse(record: Record, printed: Mapping[str, tuple[float, float]]) -> dict[str, str]:
-    """Return the row with the impulse that the paper prints for a noise; no row without printed
-    numbers.
-    """
-    if not printed:
-        return {}
-    of_noise = printed.get(record.noise_name) if is_of_paper(record.scenario) else None
-    return {"impulse that the paper prints, m/s": number(None if of_noise is None else of_noise[1])}
+def _column(
+    record: Record,
+    lateral: Sequence[str],
+    bound: str,
+    printed: Mapping[str, tuple[float, float]],
+) -> dict[str, str]:
+    """Return the results of an engagement as text, by their titles."""
+    result = {name: values[0] for name, values in record.result.to_dict().items()}
+    column = {"miss, m": number(result["miss_m"])}
+    for axis in lateral:
+        column[f"miss along {axis}, m"] = number(result.get(f"miss_{axis}_m"))
+    column["impulse, m/s"] = number(result["impulse_m_s"])
+    if printed:
+        impulse_m_s = None
+        if is_of_paper(record.scenario) and record.noise_name in printed:
+            _, impulse_m_s = printed[record.noise_name]
+        column["impulse that the paper prints, m/s"] = number(impulse_m_s)
+    column[bound] = number(result["guaranteed_miss_m"])
+    return column | {
+        "outcome": _outcome(record),
+        "true state inside the set\nat every step": _yes(result["truth_kept"]),
+        "smallest distance from the true\nstate to the set's boundary, m": number(
+            result["truth_margin_m"]
+        ),
+        "miss within the bound Phi": _yes(result["phi_held"]),
+        "steps": str(record.steps),
+        "seed, run": f"{record.seed}, {record.run}",
+        "strategy": record.strategy,
+    }
 
 
 def _yes(value: bool | None) -> str:
-    return "-" if value is None else "yes" if value else "no"
+    if value is None:
+        return "-"
+    return "yes" if value else "no"
 
 
 def _outcome(record: Record) -> str:

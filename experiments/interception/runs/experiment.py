@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 from rich.table import Table
 
@@ -22,6 +23,7 @@ from infoset.experiments.interception.command import Experiment
 from infoset.experiments.interception.course import Courses
 from infoset.experiments.interception.remedy import Remedy, find_remedies
 from infoset.experiments.interception.runs.shared import (
+    Work,
     allowance,
     b_plane_figures,
     bound_name,
@@ -30,7 +32,12 @@ from infoset.experiments.interception.runs.shared import (
     work_of,
 )
 from infoset.experiments.interception.scenario_file import scenario_with
-from infoset.experiments.interception.strategies import NOISES, chosen_noise, own_strategy
+from infoset.experiments.interception.strategies import (
+    NOISES,
+    OwnNoise,
+    chosen_noise,
+    own_strategy,
+)
 from infoset.experiments.interception.study import (
     QUANTILES,
     Curve,
@@ -47,172 +54,202 @@ from infoset.experiments.interception.study import (
     set_warnings,
     summary,
 )
-from infoset.guidance import NoiseKind
+from infoset.guidance import NoiseKind, Strategy
 from infoset.sim import Results, Scenario
 from infoset.sim.columns import csv_text
 from infoset.sim.parallel import Task
 from infoset.sim.scenario import strategy_name
 from infoset.sim.statistics import shown_quantiles
 
-FIGURE, FIGURE_OF_PAPER = "figure-distributions", "figure-4-distributions"
+FIGURE = "figure-distributions"
+FIGURE_OF_PAPER = "figure-4-distributions"
 CORRIDOR = "figure-corridor"
 LEVELS = {"p50_m_s": 0.5, "p99_m_s": 0.99}
 """Levels of the quantiles of a burn, by key in JSON."""
 MAX_BURN_ROWS = 20
-"""Maximum number of burns of a curve in the table: the four curves of an experiment are two
-screens.
-"""
+"""Maximum number of burns of a curve in the table: four curves then fill two screens."""
+
+
+class _ChosenNoise(NamedTuple):
+    """The noise of the curves 1 and 2: its name, and the noise of a Python file or None.
+
+    `kind` is the noise of the scenario, which a noise of a Python file replaces.
+    """
+
+    name: str
+    own: OwnNoise | None
+    kind: NoiseKind
 
 
 def run(options: Experiment) -> None:
     """Simulate the curves, write the files and print the table."""
     scenario = scenario_with(options)
     own = own_strategy(options.strategy)
-    of_file = scenario.noise if scenario.noise is not NoiseKind.GAME else NoiseKind.RANDOM
-    noise = chosen_noise(
-        options.noise or of_file.value, [name for name in NOISES if name != NoiseKind.GAME.value]
-    )
-    name, own_noise, kind = (
-        (noise, None, NoiseKind(noise))
-        if isinstance(noise, str)
-        else (noise.name, noise, NoiseKind.RANDOM)
-    )
-    names = {1: name, 2: name, 3: NoiseKind.GAME.value, 4: NoiseKind.GAME.value}
+    noise = _noise_of(options, scenario)
+    noises = [*dict.fromkeys((noise.name, NoiseKind.GAME.value))]
     figures = [
         FIGURE_OF_PAPER if is_of_paper(scenario) else FIGURE,
         CORRIDOR,
-        *b_plane_figures(scenario, dict.fromkeys(names.values())),
+        *b_plane_figures(scenario, noises),
     ]
     with work_of(options, scenario, ["results.csv", *figure_files(*figures)]) as work:
         if scenario.range_sensor is None:
-            cases = (
-                "curves 1 and 3 only" if is_of_paper(scenario) else f"{name} and game noise only"
-            )
+            cases = f"{noise.name} and game noise only"
+            if is_of_paper(scenario):
+                cases = "curves 1 and 3 only"
             say(f"{scenario.name} has no [range_sensor]: {cases}", options.quiet)
-        slowest_first = [
-            (
-                curve,
-                flown,
-                _progress_title(
-                    scenario, curve, case_title(names[curve], flown.range_sensor is not None)
-                ),
-            )
-            for curve, flown in reversed(curve_scenarios(scenario, kind))
-        ]
-        courses = [Courses(flown, options.runs) for _, flown, _ in slowest_first]
-        tasks = [
-            Task(
-                *(flown, range(options.runs), options.seed),
-                noise=own_noise if names[curve] == name else None,
-                strategy=own,
-                progress=work.begin(title),
-                observe=course.observe if options.out is not None else None,
-            )
-            for (curve, flown, title), course in zip(slowest_first, courses, strict=True)
-        ]
-        results = simulate_all(tasks)
+
+        flights = _flights(options, scenario, own, noise, work)
+        results = simulate_all([flight.task for flight in flights])
         curves = [
-            Curve(curve, names[curve], flown.range_sensor is not None, result)
-            for (curve, flown, _), result in zip(slowest_first, results, strict=True)
-        ][::-1]
+            Curve(flight.curve, flight.noise, flight.task.scenario.range_sensor is not None, result)
+            for flight, result in zip(flights, results, strict=True)
+        ]
+        # The slowest flights began first; the results are in the order of the paper.
+        flights.reverse()
+        curves.reverse()
+
         remedies: dict[int, list[Remedy]] = {curve.number: [] for curve in curves}
         if options.remedy and scenario.body is not None:
-            for task, curve in zip(tasks[::-1], curves, strict=True):
-                found = find_remedies(
-                    task, curve.results, work.begin(f"remedies of {curve.title(scenario)}")
-                )
-                remedies[curve.number] = found
+            for flight, curve in zip(flights, curves, strict=True):
+                progress = work.begin(f"remedies of {curve.title(scenario)}")
+                remedies[curve.number] = find_remedies(flight.task, curve.results, progress)
+
         work.save(
             {
                 "strategy": strategy_name(scenario, own),
                 "seed": options.seed,
                 "runs": options.runs,
                 "curves": [
-                    {
-                        **_key(scenario, curve),
-                        **hit_key(curve.results.hits, curve.results.missed),
-                        **(
-                            {"redrawn_share": share}
-                            if (share := curve.results.redrawn_share) is not None
-                            else {}
-                        ),
-                        **burns_key(scenario, curve.results),
-                        **({"remedies": remedies[curve.number]} if options.remedy else {}),
-                        **outcome_columns(curve.results),
-                    }
+                    _curve_json(scenario, curve, remedies[curve.number] if options.remedy else None)
                     for curve in curves
                 ],
-                "notes": noise_notes(scenario, dict.fromkeys(names.values())),
+                "notes": noise_notes(scenario, noises),
             }
         )
         work.written.save("results.csv", _csv(scenario, curves), "--csv")
         if options.out is not None:
             from infoset.experiments.interception.figures.commands import draw_experiment
 
+            courses = [flight.course for flight in flights]
             work.written.draw(
-                figures, draw_experiment(scenario, curves, courses[::-1]), work.begin("figure")
+                figures, draw_experiment(scenario, curves, courses), work.begin("figure")
             )
     show(_parts(scenario, curves, remedies), options.quiet or work.written.stdout_taken)
 
 
-def _progress_title(scenario: Scenario, curve: int, case: str) -> str:
-    return f"curve {curve}: {case}" if is_of_paper(scenario) else case
+def _noise_of(options: Experiment, scenario: Scenario) -> _ChosenNoise:
+    """Return the noise of the curves 1 and 2.
+
+    The default is the noise of the scenario, or random noise if that is the game noise, which the
+    curves 3 and 4 have.
+    """
+    default = scenario.noise
+    if default is NoiseKind.GAME:
+        default = NoiseKind.RANDOM
+    names = [name for name in NOISES if name != NoiseKind.GAME.value]
+    chosen = chosen_noise(options.noise or default.value, names)
+    if isinstance(chosen, str):
+        return _ChosenNoise(chosen, None, NoiseKind(chosen))
+    return _ChosenNoise(chosen.name, chosen, NoiseKind.RANDOM)
 
 
-def _key(scenario: Scenario, curve: Curve) -> dict[str, int | str | bool]:
-    key: dict[str, int | str | bool] = {"noise": curve.noise, "range_sensor": curve.range_sensor}
-    return {"published_curve": curve.number, **key} if is_of_paper(scenario) else key
+class _Flight(NamedTuple):
+    """The runs of one curve that are simulated, and their courses."""
+
+    curve: int
+    noise: str
+    task: Task
+    course: Courses
+
+
+def _flights(
+    options: Experiment,
+    scenario: Scenario,
+    own: Strategy | None,
+    noise: _ChosenNoise,
+    work: Work,
+) -> list[_Flight]:
+    """Return the runs of the curves, the slowest first, each with its progress bar."""
+    flights = []
+    for curve, flown in reversed(curve_scenarios(scenario, noise.kind)):
+        is_game = flown.noise is NoiseKind.GAME
+        name = NoiseKind.GAME.value if is_game else noise.name
+        title = case_title(name, flown.range_sensor is not None)
+        if is_of_paper(scenario):
+            title = f"curve {curve}: {title}"
+        course = Courses(flown, options.runs)
+        task = Task(
+            flown,
+            range(options.runs),
+            options.seed,
+            noise=None if is_game else noise.own,
+            strategy=own,
+            progress=work.begin(title),
+            observe=course.observe if options.out is not None else None,
+        )
+        flights.append(_Flight(curve, name, task, course))
+    return flights
+
+
+def _curve_json(
+    scenario: Scenario, curve: Curve, remedies: Sequence[Remedy] | None
+) -> dict[str, object]:
+    """Return the results of a curve in JSON; `remedies` is None if they are not wanted."""
+    results = curve.results
+    keys = _key(scenario, curve) | hit_key(results.hits, results.missed)
+    if results.redrawn_share is not None:
+        keys["redrawn_share"] = results.redrawn_share
+    keys |= burns_key(scenario, results)
+    if remedies is not None:
+        keys["remedies"] = remedies
+    return keys | outcome_columns(results)
+
+
+def _key(scenario: Scenario, curve: Curve) -> dict[str, Any]:
+    """Return the keys that identify a curve; only curves of the paper have a number."""
+    key: dict[str, Any] = {}
+    if is_of_paper(scenario):
+        key["published_curve"] = curve.number
+    return key | {"noise": curve.noise, "range_sensor": curve.range_sensor}
 
 
 def _csv(scenario: Scenario, curves: Sequence[Curve]) -> str:
-    rows = [
-        [*_key(scenario, curve).values(), *values]
-        for curve in curves
-        for values in zip(*curve.results.to_dict().values(), strict=True)
-    ]
-    return csv_text((*_key(scenario, curves[0]), *curves[0].results.to_dict()), rows)
+    names = [*_key(scenario, curves[0]), *curves[0].results.to_dict()]
+    rows = []
+    for curve in curves:
+        key = _key(scenario, curve).values()
+        for values in zip(*curve.results.to_dict().values(), strict=True):
+            rows.append([*key, *values])
+    return csv_text(names, rows)
 
 
 def _parts(
     scenario: Scenario, curves: Sequence[Curve], remedies: Mapping[int, Sequence[Remedy]]
 ) -> Iterator[Part]:
-    table = number_table(_heading(scenario), "quantity", *QUANTILES, left=2)
+    """Yield the quantiles, the burns, and lines about hits, sets and noises, for the screen."""
     runs = len(curves[0].results)
-    for curve in curves:
-        results = curve.results
-        head = f"{curve.number} {curve.noise}" if is_of_paper(scenario) else curve.noise
-        table.add_row(head, "miss, m", *map(number, summary(results.miss_m).values()))
-        ranging = "  + range sensor" if curve.range_sensor else ""
-        table.add_row(ranging, "impulse, m/s", *map(number, summary(results.impulse_m_s).values()))
-        if results.guaranteed_miss_m.count():
-            bounds = summary(results.guaranteed_miss_m.compressed())
-            table.add_row("", bound_name(scenario), *map(number, bounds.values()))
     yield (
         f"{scenario.name}: quantiles of {some_runs(runs)} per {_heading(scenario)}; game noise "
         f"with the tie rule {scenario.tie.value}"
     )
-    yield table
-    burns = len(scenario.impulse_steps or ()) if scenario.thruster.is_scheduled else 0
+    yield _quantile_table(scenario, curves)
+
+    burns = 0
+    if scenario.thruster.is_scheduled:
+        burns = len(scenario.impulse_steps or ())
     if burns > MAX_BURN_ROWS:
         yield f"impulses at {burns} times: --json has the quantiles of each"
     elif burns:
         yield burn_table(scenario, curves)
+
     counts = SetCounts()
     for curve in curves:
         results = curve.results
-        sets = set_counts(results.truth_kept, results.set_emptied)
-        held = results.phi_held.compressed()
-        counts += sets
-        outcomes = Counter(outcome.value for outcome in results.outcomes)
-        lines = [hit_text(results.hits, scenario), certificate(sets, int(held.sum()), len(held))]
-        lines += [f"{outcome}: {count}" for outcome, count in outcomes.items()]
-        title = curve.title(scenario)
-        yield f"{title}: {'; '.join(filter(None, lines))}"
-        if outlook := outlook_text(results.hits):
-            yield f"{title}: {outlook}"
-        if causes := miss_text(results.missed, runs, scenario):
-            yield f"{title}: {causes}"
-        yield from (f"{title}: {remedy}" for remedy in remedies[curve.number])
+        counts += set_counts(results.truth_kept, results.set_emptied)
+        yield from _curve_lines(scenario, curve)
+        yield from (f"{curve.title(scenario)}: {remedy}" for remedy in remedies[curve.number])
+
     if started := redrawn_text(curves[0].results.redrawn_share):
         yield started
     yield from set_warnings(scenario.information_set.model, counts)
@@ -222,51 +259,79 @@ def _parts(
     yield from quantile_notes(runs, [*QUANTILES.values()])
 
 
+def _quantile_table(scenario: Scenario, curves: Sequence[Curve]) -> Table:
+    """Return the table of the quantiles of the miss, the impulse and the bound of each curve."""
+    table = number_table(_heading(scenario), "quantity", *QUANTILES, left=2)
+    for curve in curves:
+        results = curve.results
+        head = curve.noise
+        if is_of_paper(scenario):
+            head = f"{curve.number} {curve.noise}"
+        ranging = "  + range sensor" if curve.range_sensor else ""
+        table.add_row(head, "miss, m", *map(number, summary(results.miss_m).values()))
+        table.add_row(ranging, "impulse, m/s", *map(number, summary(results.impulse_m_s).values()))
+        if results.guaranteed_miss_m.count():
+            bounds = summary(results.guaranteed_miss_m.compressed())
+            table.add_row("", bound_name(scenario), *map(number, bounds.values()))
+    return table
+
+
+def _curve_lines(scenario: Scenario, curve: Curve) -> Iterator[str]:
+    """Yield lines about the hits, the sets, the outcomes and the misses of a curve."""
+    results = curve.results
+    title = curve.title(scenario)
+    sets = set_counts(results.truth_kept, results.set_emptied)
+    held = results.phi_held.compressed()
+    outcomes = Counter(outcome.value for outcome in results.outcomes)
+    lines = [
+        hit_text(results.hits, scenario),
+        certificate(sets, int(held.sum()), len(held)),
+        *(f"{outcome}: {count}" for outcome, count in outcomes.items()),
+    ]
+    yield f"{title}: {'; '.join(filter(None, lines))}"
+    if outlook := outlook_text(results.hits):
+        yield f"{title}: {outlook}"
+    if causes := miss_text(results.missed, len(results), scenario):
+        yield f"{title}: {causes}"
+
+
 def _heading(scenario: Scenario) -> str:
-    """Return what a sample of the experiment is called: the paper's word only for its scenarios."""
+    """Return the name of a sample of the experiment, which is a curve only in the paper."""
     return "curve" if is_of_paper(scenario) else "noise"
 
 
 def burns_key(scenario: Scenario, results: Results) -> dict[str, list[dict[str, float | None]]]:
-    """Return the key `burns` of a curve in JSON: for each burn its time, quantiles of its size, and
-    its share.
+    """Return the key `burns` of a curve in JSON; no key without a schedule of impulses.
 
-    The share is that of all impulses of all runs; None without any impulse. No key without a
-    schedule.
+    Each burn has its time, quantiles of its size, and its share of all impulses of all runs, None
+    without any impulse.
     """
     if results.burns_m_s is None:
         return {}
     whole = float(results.burns_m_s.sum())
-    arrival_s = scenario.nominal_arrival_s
-    step_s = scenario.set_model.step_s
-    return {
-        "burns": [
-            {
-                "before_arrival_s": arrival_s - step * step_s,
-                **dict(zip(LEVELS, shown_quantiles(sizes, [*LEVELS.values()]), strict=True)),
-                "share": float(sizes.sum()) / whole if whole > 0.0 else None,
-            }
-            for step, sizes in zip(scenario.impulse_steps or [], results.burns_m_s.T, strict=True)
-        ]
-    }
+    burns = []
+    for step, sizes in zip(scenario.impulse_steps or [], results.burns_m_s.T, strict=True):
+        burn: dict[str, float | None] = {
+            "before_arrival_s": scenario.nominal_arrival_s - step * scenario.set_model.step_s
+        }
+        burn |= zip(LEVELS, shown_quantiles(sizes, [*LEVELS.values()]), strict=True)
+        burn["share"] = float(sizes.sum()) / whole if whole > 0.0 else None
+        burns.append(burn)
+    return {"burns": burns}
 
 
 def burn_table(scenario: Scenario, curves: Sequence[Curve]) -> Table:
     """Return the table of the burns of all curves."""
-    table = number_table(
-        _heading(scenario),
-        "burn, s before arrival",
-        "p50, m/s",
-        "p99, m/s",
-        "share of impulse, %",
-        left=1,
-    )
+    titles = ("burn, s before arrival", "p50, m/s", "p99, m/s", "share of impulse, %")
+    table = number_table(_heading(scenario), *titles, left=1)
     for curve in curves:
+        case = case_title(curve.noise, curve.range_sensor)
+        if is_of_paper(scenario):
+            case = f"{curve.number} {case}"
         for burn in burns_key(scenario, curve.results).get("burns", []):
             share = burn["share"]
-            case = case_title(curve.noise, curve.range_sensor)
             table.add_row(
-                f"{curve.number} {case}" if is_of_paper(scenario) else case,
+                case,
                 f"{burn['before_arrival_s']:g}",
                 *(number(burn[key]) for key in LEVELS),
                 number(None if share is None else 100.0 * share),

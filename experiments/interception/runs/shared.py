@@ -1,6 +1,4 @@
-"""What the interception commands share: files, parallel simulation, searches, and lines about
-results.
-"""
+"""Parts that the interception commands share: files, simulation, searches and lines."""
 
 from __future__ import annotations
 
@@ -35,12 +33,11 @@ from infoset.sim.storage.codec import fingerprint
 from infoset.sim.versions import versions
 
 Progress = Callable[[float], None]
+"""Function that sets the fraction done."""
 
 
 def simulate_all(tasks: Sequence[Task]) -> list[Results]:
-    """Return the results of tasks, which are simulated in parallel; `InputError` if they are not
-    finite.
-    """
+    """Return the results of tasks, simulated in parallel; `InputError` if one is not finite."""
     try:
         results = dict(simulate_tasks(tasks))
     except FloatingPointError:
@@ -56,7 +53,7 @@ def need_finite(results: Results) -> None:
 
 @dataclass(frozen=True)
 class Work:
-    """What a running command has: its scenario with warnings, its files and its progress."""
+    """A running command: its scenario with warnings, its files and its progress."""
 
     scenario: Scenario
     warnings: Sequence[str]
@@ -67,16 +64,17 @@ class Work:
     def save(self, results: Mapping[str, object]) -> None:
         """Write the scenario, and results as JSON after the keys that all commands share."""
         self.written.save("scenario.toml", to_toml(self.scenario))
-        head = {
+        keys: dict[str, object] = {
             "versions": versions(),
             "scenario": self.scenario.name,
             "scenario_hash": fingerprint(self.scenario),
-            **({"warnings": self.warnings} if self.warnings else {}),
-            "model": self.scenario.information_set.model.value,
-            "range_sensor": self.scenario.range_sensor is not None,
-            "elapsed_s": perf_counter() - self.began_s,
         }
-        self.written.save("results.json", to_json({**head, **results}), "--json")
+        if self.warnings:
+            keys["warnings"] = self.warnings
+        keys["model"] = self.scenario.information_set.model.value
+        keys["range_sensor"] = self.scenario.range_sensor is not None
+        keys["elapsed_s"] = perf_counter() - self.began_s
+        self.written.save("results.json", to_json({**keys, **results}), "--json")
 
 
 @contextlib.contextmanager
@@ -89,8 +87,8 @@ def work_of(
 ) -> Iterator[Work]:
     """Check the files of a command, and print notes and the warnings of its scenario.
 
-    `names` are those of files in the folder of ``--out`` after the scenario and the results;
-    `files` are single files by option.
+    `names` are the files that the command writes into the folder of ``--out`` in addition to the
+    scenario and the results; `files` are single files by option.
     """
     wanted = ("scenario.toml", "results.json", *names)
     with (
@@ -104,59 +102,65 @@ def work_of(
 
 
 def b_plane_figures(scenario: Scenario, noises: Iterable[str]) -> list[str]:
-    """Return the names of the figures of misses across the approach, one for each noise; none in a
-    plane.
+    """Return the names of the figures of misses across the approach; none in a plane.
+
+    There is one figure for each noise.
     """
-    return [f"figure-b-plane-{noise}" for noise in noises] if scenario.is_spatial else []
+    if not scenario.is_spatial:
+        return []
+    return [f"figure-b-plane-{noise}" for noise in noises]
 
 
 def bound_name(scenario: Scenario) -> str:
     """Return the table heading of `guaranteed_miss_m`, which is no bound in the model `paper`."""
-    return (
-        "guaranteed miss, m"
-        if scenario.set_model.is_guaranteed
-        else "the paper's Phi (not a bound here), m"
-    )
+    if scenario.set_model.is_guaranteed:
+        return "guaranteed miss, m"
+    return "the paper's Phi (not a bound here), m"
 
 
 def allowance(scenario: Scenario) -> str | None:
-    """Return a line with the disturbances that the guaranteed model allows for; None for the model
-    `paper`.
-    """
+    """Return a line with the assumptions of the guaranteed model; None for the model `paper`."""
     model = on_board_model(scenario)
     if not model.is_guaranteed:
         return None
-    accelerations = ", ".join(
-        f"acceleration along {axis} at most {along.acceleration_m_s2:.5g} m/s^2 (manoeuvres "
-        f"{along.disturbance_m_s2:g} and gravity {along.gravity_m_s2:.2g}, divided by 1 - "
-        f"{along.speed_error:.4f})"
-        for axis, along in ((axis, model.axis(axis)) for axis in model.axes)
+
+    accelerations = []
+    for axis in model.axes:
+        along = model.axis(axis)
+        accelerations.append(
+            f"acceleration along {axis} at most {along.acceleration_m_s2:.5g} m/s^2 (manoeuvres "
+            f"{along.disturbance_m_s2:g} and gravity {along.gravity_m_s2:.2g}, divided by 1 - "
+            f"{along.speed_error:.4f})"
+        )
+    line = (
+        f"the guaranteed model assumes: {', '.join(accelerations)}; relative error of the closing "
+        f"speed at most {model.speed_error:.2%}, of impulses at most "
+        f"{model.execution_error_relative:.2%}"
     )
-    pointing = model.pointing_error_rad
-    direction = f", error of their direction at most {pointing:g} rad" if pointing else ""
-    return (
-        f"the guaranteed model assumes: {accelerations}; relative error of the closing speed at "
-        f"most {model.speed_error:.2%}, of impulses at most "
-        f"{model.execution_error_relative:.2%}{direction}"
-    )
+    if model.pointing_error_rad:
+        line += f", error of their direction at most {model.pointing_error_rad:g} rad"
+    return line
 
 
 def certificate(sets: SetCounts, held: int, known: int) -> str:
-    """Return a line about the sets of runs, and of the runs with a bound Phi, how many are within
-    it.
+    """Return a line about the sets of runs and their bounds Phi.
+
+    Of the runs, `known` have a bound, and in `held` of these the miss is at most the bound.
     """
     if not known:
         return str(sets)
-    missing = f" ({sets.runs - known} without a bound)" if known < sets.runs else ""
-    return f"{sets}; miss within the bound Phi: {held} of {some_runs(known)}{missing}"
+    line = f"{sets}; miss within the bound Phi: {held} of {some_runs(known)}"
+    if known < sets.runs:
+        line += f" ({sets.runs - known} without a bound)"
+    return line
 
 
 @dataclass(frozen=True)
 class WorstMisses:
-    """The engagements with the maximum values of a strategy: of those whose set never became empty,
-    and of all.
+    """The engagements with the maximum values of a strategy.
 
-    The first is None if there was none, the second if no miss was finite.
+    `set_kept` is the worst engagement whose set never became empty; None if there was none.
+    `overall` is the worst of all; None if no miss was finite.
     """
 
     set_kept: WorstEngagement | None
@@ -165,18 +169,19 @@ class WorstMisses:
     @property
     def engagements(self) -> tuple[WorstEngagement, ...]:
         """The one or two different engagements."""
-        both = (
-            (self.set_kept, self.overall) if self.set_kept is not self.overall else (self.overall,)
-        )
+        both = [self.overall]
+        if self.set_kept is not self.overall:
+            both.insert(0, self.set_kept)
         return tuple(engagement for engagement in both if engagement is not None)
 
     def misses(self) -> dict[str, float | None]:
         """Return both values as JSON, m."""
         named = {"worst_of_search_set_kept_m": self.set_kept, "worst_of_search_m": self.overall}
-        return {
-            name: None if engagement is None else engagement.value_m
-            for name, engagement in named.items()
-        }
+        values: dict[str, float | None] = dict.fromkeys(named)
+        for name, engagement in named.items():
+            if engagement is not None:
+                values[name] = engagement.value_m
+        return values
 
 
 def find_worst_misses(
@@ -188,11 +193,11 @@ def find_worst_misses(
     begin: BeginProgress,
     objective: Objective = Objective.FIXED_TRUTH,
 ) -> WorstMisses:
-    """Search for the maximum miss with the set never empty, and for the maximum miss of all
-    engagements.
+    """Search for the maximum miss with the set never empty, and of all engagements.
 
-    The second search is simulated only if the set became empty in the first one. Otherwise both are
-    the same. The default objective is that of `infoset bound`, which compares simulated misses.
+    The second search is simulated only if the set became empty in the first one; otherwise both
+    results are the same. The default objective is the objective of `infoset bound`, which compares
+    simulated misses.
     """
 
     def search(keep_set: bool, name: str) -> WorstEngagement | None:
@@ -213,8 +218,9 @@ def find_worst_misses(
     set_kept = search(True, "")
     if set_kept is not None and set_kept.sets_emptied == 0:
         return WorstMisses(set_kept, set_kept)
+
+    # The search with all engagements can find less than the first one.
     overall = search(False, ", empty sets included")
     found = [engagement for engagement in (overall, set_kept) if engagement is not None]
-    return WorstMisses(
-        set_kept, max(found, key=lambda engagement: engagement.value_m, default=None)
-    )
+    worst = max(found, key=lambda engagement: engagement.value_m, default=None)
+    return WorstMisses(set_kept, worst)
