@@ -201,9 +201,10 @@ class SweepReport:
     def _printed(self, rows: pd.DataFrame) -> pd.DataFrame:
         """Return the decisions as a table for the screen, the values of the keys as text."""
         required = self.table.required
-        name = required.name
         if isinstance(required, Requirement):
             name = str(required.quantile)
+        else:
+            name = required.name
         printed = rows[self.table.keys].map("{:.6g}".format)
         printed["decision"] = rows["requirement"].fillna("not simulated").str.replace("-", " ")
         printed["runs"] = rows["runs"].astype(str)

@@ -1,6 +1,4 @@
-"""The course of recorded engagements over time: time axis, predicted misses of the true state,
-schedule, and titles.
-"""
+"""The course of recorded engagements over time: time axis, misses, schedule and titles."""
 
 from __future__ import annotations
 
@@ -21,36 +19,43 @@ from infoset.sim.engagement import Step
 from infoset.sim.results import ending
 from infoset.sim.schedule import schedule
 
-MAX_STEPS = 400
-"""Number of steps above which a flight is long: its time axis is logarithmic in the time before the
-arrival.
+MAX_SHOWN_STEPS = 400
+"""Number of steps above which a flight is long: more cannot be told apart in a figure or a page.
+
+Its time axis is logarithmic in the time before the arrival, and not all steps are shown.
 """
 
 MAX_COURSES = 1000
-"""Maximum number of runs whose courses are kept."""
+"""Maximum number of runs whose courses are kept: with `MAX_SHOWN_STEPS` steps, 6 MB."""
 
 
 @dataclass(frozen=True)
 class Clock:
-    """The time axis of pictures of engagements: linear in the time, or logarithmic in the time
-    before the arrival.
+    """The time axis of pictures of engagements.
+
+    It is linear in the time, or logarithmic in the time before the arrival.
     """
 
     counts_down: bool
 
     @classmethod
     def of(cls, records: Sequence[Record]) -> Clock:
-        """Return the time axis for records: logarithmic for long flights, and if times before
-        arrival are scheduled.
+        """Return the time axis for records.
+
+        It is logarithmic for long flights, and if times before the arrival are scheduled.
         """
-        return cls(any(record.steps > MAX_STEPS or marks(record.scenario) for record in records))
+        return cls(
+            any(record.steps > MAX_SHOWN_STEPS or marks(record.scenario) for record in records)
+        )
 
     def at(self, record: Record, times_s: ArrayLike | None = None) -> Floats:
         """Return the positions of times on the axis, s; None is the times of the steps.
 
         Times before the arrival are at least half a step, because a logarithmic axis has no zero.
         """
-        times = np.asarray(record.time_s if times_s is None else times_s, dtype=np.float64)
+        if times_s is None:
+            times_s = record.time_s
+        times = np.asarray(times_s, dtype=np.float64)
         if not self.counts_down:
             return times
         return np.maximum(record.scenario.nominal_arrival_s - times, min_to_go_s(record.scenario))
@@ -62,11 +67,9 @@ class Clock:
         to_go_s = record.scenario.nominal_arrival_s - time_s
         if abs(to_go_s) < min_to_go_s(record.scenario):
             return "at the nominal arrival"
-        return (
-            f"{duration_text(to_go_s)} to go"
-            if to_go_s > 0.0
-            else f"{-to_go_s:.3g} s after the nominal arrival"
-        )
+        if to_go_s < 0.0:
+            return f"{-to_go_s:.3g} s after the nominal arrival"
+        return f"{duration_text(to_go_s)} to go"
 
 
 def min_to_go_s(scenario: Scenario) -> float:
@@ -75,41 +78,45 @@ def min_to_go_s(scenario: Scenario) -> float:
 
 
 def evenly(places: NDArray[Any], count: int) -> Integers:
-    """Return at most `count` indices of rising values, evenly distributed over them, with the first
-    and the last.
+    """Return at most `count` indices of rising values, evenly distributed over the values.
+
+    The first and the last index are among them.
     """
     wanted = np.linspace(places[0], places[-1], count)
     return np.unique(np.abs(places - wanted[:, None]).argmin(axis=1))
 
 
 def kept_steps(record: Record) -> list[int]:
-    """Return the steps that pages and terminals show: all, or of a long flight at most `MAX_STEPS`.
+    """Return the steps that pages and terminals show.
 
-    The first and last step and image, and up to a quarter of `MAX_STEPS` impulses are among them.
-    The others are evenly distributed, half over the steps and half over the logarithm of the time
-    before arrival.
+    They are all steps, or of a long flight at most `MAX_SHOWN_STEPS`: the first and the last step
+    and image, up to a quarter of `MAX_SHOWN_STEPS` impulses, and others that are evenly
+    distributed, half over the steps and half over the logarithm of the time before arrival.
     """
     count = record.steps
-    if count <= MAX_STEPS:
+    if count <= MAX_SHOWN_STEPS:
         return list(range(count))
+
     fired = np.flatnonzero(record.impulse_m_s.any(axis=1))
-    if len(fired) > MAX_STEPS // 4:
-        fired = fired[evenly(np.arange(len(fired)), MAX_STEPS // 4)]
+    most = MAX_SHOWN_STEPS // 4
+    if len(fired) > most:
+        fired = fired[evenly(np.arange(len(fired)), most)]
+    kept = {0, count - 1, *fired.tolist()}
     seen = np.flatnonzero(record.measures("angle"))
-    kept = {0, count - 1, *fired.tolist(), *seen[[0, -1] if len(seen) else []].tolist()}
+    if len(seen):
+        kept |= {int(seen[0]), int(seen[-1])}
+
+    half = (MAX_SHOWN_STEPS - len(kept)) // 2
     places = -np.log(Clock(counts_down=True).at(record))
-    half = (MAX_STEPS - len(kept)) // 2
-    return sorted(
-        kept.union(evenly(places, half).tolist(), evenly(np.arange(count), half).tolist())
-    )
+    kept |= {*evenly(places, half).tolist(), *evenly(np.arange(count), half).tolist()}
+    return sorted(kept)
 
 
 def marks(scenario: Scenario) -> dict[str, float]:
-    """Return the times before the nominal arrival, s, of the first and the last image and of the
-    last impulse.
+    """Return the times of the first and the last image and of the last impulse.
 
-    They are those of the schedule that will happen. A time that the scenario leaves open is left
-    out.
+    Each is a time before the nominal arrival, s, of the schedule that will happen. A time that the
+    scenario leaves open is left out.
     """
     sensor = scenario.set_model.angle_sensor
     thruster = scenario.thruster
@@ -149,8 +156,11 @@ def complete_steps(record: Record) -> Integers:
     """
     model = record.scenario.set_model
     min_range_m = model.range_threshold_m + model.closing_speed_m_s * model.step_s
-    leaving = [bool(sections) and sections[0].range_m < min_range_m for sections in record.sections]
-    end = leaving.index(True) + 1 if True in leaving else record.steps
+    end = record.steps
+    for step, sections in enumerate(record.sections):
+        if sections and sections[0].range_m < min_range_m:
+            end = step + 1
+            break
     return np.flatnonzero(np.isfinite(record.predicted_miss_m[:end, 0, 0]))
 
 
@@ -162,8 +172,8 @@ class Courses:
     Attributes
     ----------
     steps : ndarray of int, shape (n,)
-        Steps until the nominal arrival, of a long flight at most about `MAX_STEPS`, with those of
-        scheduled impulses.
+        Steps until the nominal arrival; of a long flight at most about `MAX_SHOWN_STEPS`, the
+        steps of scheduled impulses among them.
     possible_m : ndarray, shape (runs, n)
         Maximum possible miss without further impulses, m; NaN if the set is empty, or after its
         first section left.
@@ -175,14 +185,14 @@ class Courses:
         self.scenario = scenario
         every = np.arange(math.ceil(scenario.nominal_arrival_s / scenario.set_model.step_s))
         self.steps = every
-        if len(every) > MAX_STEPS:
-            places = -np.log(len(every) - every)
-            fired = scenario.impulse_steps or ()
-            scheduled = fired if scenario.thruster.is_scheduled else ()
-            half = MAX_STEPS // 2
-            self.steps = np.unique(
-                [*evenly(places, half), *evenly(every, half), *scheduled]
-            ).astype(np.int64)
+        if len(every) > MAX_SHOWN_STEPS:
+            half = MAX_SHOWN_STEPS // 2
+            by_logarithm = evenly(-np.log(len(every) - every), half)
+            scheduled: Sequence[int] = ()
+            if scenario.thruster.is_scheduled:
+                scheduled = scenario.impulse_steps or ()
+            steps = np.unique([*by_logarithm, *evenly(every, half), *scheduled])
+            self.steps = steps.astype(np.int64)
         self.possible_m = np.full((min(runs, MAX_COURSES), len(self.steps)), np.nan)
         self.impulse_m_s = np.zeros_like(self.possible_m)
 
@@ -201,10 +211,13 @@ class Courses:
         possible = self.possible_m[batch]
         if column == len(self.steps) or not len(impulse):
             return
+
+        # The maximum impulse of the steps since the step before in `steps`.
         count = len(impulse)
         np.maximum(impulse[:, column], modulus(step.impulse_m_s)[:count], out=impulse[:, column])
         if self.steps[column] != step.step:
             return
+
         model = self.scenario.set_model
         miss = step.predicted_miss
         nearest_m, _ = step.information.stored_range_interval_m()
@@ -212,21 +225,25 @@ class Courses:
         known = step.tracking & miss.exists & ~leaving
         maximum = modulus(np.maximum(np.abs(miss.lower_m), np.abs(miss.upper_m)))
         possible[:, column] = np.where(known, maximum, np.nan)[:count]
+        # A set that was not complete before does not become complete again.
         if column:
             possible[np.isnan(possible[:, column - 1]), column] = np.nan
 
 
 def noise_title(record: Record) -> str:
-    """Return the title of the noise of an engagement: `random noise`, or `game noise, range
-    sensor`.
-    """
-    name = "worst errors found" if record.noise == WORST_FOUND else f"{record.noise_name} noise"
-    return name + (", range sensor" if record.scenario.range_sensor is not None else "")
+    """Return the title of the noise of an engagement, for example `game noise, range sensor`."""
+    title = f"{record.noise_name} noise"
+    if record.noise == WORST_FOUND:
+        title = "worst errors found"
+    if record.scenario.range_sensor is not None:
+        title += ", range sensor"
+    return title
 
 
 def record_titles(records: Sequence[Record]) -> list[str]:
-    """Return a title for each record; equal noises are distinguished by run, seed, strategy, model,
-    tie or scenario.
+    """Return a title for each record.
+
+    Records with the same noise are distinguished by run, seed, strategy, model, tie or scenario.
     """
     titles = [noise_title(record) for record in records]
     candidates = (
@@ -246,8 +263,10 @@ def record_titles(records: Sequence[Record]) -> list[str]:
 
 
 def outcome_title(record: Record) -> str:
-    """Return miss and impulse, the outcome if it is not the arrival, and for a body with a size how
-    it ended.
+    """Return miss, impulse and outcome of an engagement.
+
+    The outcome is left out if it is the arrival. For a body with a size, the title says how the
+    engagement ended.
     """
     result = record.result
     text = (
@@ -255,14 +274,13 @@ def outcome_title(record: Record) -> str:
         f"{float(result.impulse_m_s[0]):.1f} m/s"
     )
     outcome = result.outcomes[0]
+    if outcome is not Outcome.ARRIVED:
+        text += f", {outcome.value.replace('-', ' ')}"
     cause = result.causes[0]
-    text = text if outcome is Outcome.ARRIVED else f"{text}, {outcome.value.replace('-', ' ')}"
     return ending(text, result.hit.tolist()[0], cause and cause.value)
 
 
 def _shown(metres: float) -> str:
-    return (
-        f"{metres:.2f}"
-        if metres < 100.0
-        else f"{metres:,.0f}".replace(",", "\N{NARROW NO-BREAK SPACE}")
-    )
+    if metres < 100.0:
+        return f"{metres:.2f}"
+    return f"{metres:,.0f}".replace(",", "\N{NARROW NO-BREAK SPACE}")

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Collection, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike
 
-from infoset.arrays import Flags, Floats
+from infoset.arrays import Floats
 from infoset.experiments.common.page_document import page
 from infoset.experiments.common.units import duration_text
 from infoset.experiments.interception.course import (
@@ -32,33 +32,38 @@ from infoset.sim import Record
 from infoset.sim.gravity import on_board_model
 
 MAX_RECORDS = 2
-TOLERANCE = 5e-4
-"""Tolerance of outlines in a page of a long flight, as a part of their box: about 0.2 pixels on a
-screen.
-"""
+"""Maximum number of engagements side by side: a screen has room for two."""
+OUTLINE_TOLERANCE = 5e-4
+"""Tolerance of outlines in a page of a long flight, as a share of their box: about 0.2 pixels."""
 STEPS_OF_A_BOX = 65535
-"""Steps of the vertex grid across the box of a polygon: about 0.01 pixels on a screen."""
+"""Steps of the vertex grid across the box of a polygon: the most that two bytes hold.
+
+A step is about 0.01 pixels on a screen.
+"""
 
 
 def interception_page(records: Sequence[Record]) -> str:
     """Return the replay page of one engagement, or of two side by side, as HTML."""
-    heading = f"Replay of {' and '.join(dict.fromkeys(record.scenario.name for record in records))}"
-    in_space = any(record.scenario.is_spatial for record in records)
+    scenarios = [record.scenario for record in records]
+    names = dict.fromkeys(scenario.name for scenario in scenarios)
+    heading = f"Replay of {' and '.join(names)}"
+    about = dict.fromkeys(scenario.description for scenario in scenarios if scenario.description)
     data = {
         "heading": heading,
-        "about": list(
-            filter(None, dict.fromkeys(record.scenario.description for record in records))
-        ),
+        "about": list(about),
         "counts_down": Clock.of(records).counts_down,
         "records": list(map(_data, records, record_titles(records), _kept_steps_of(records))),
     }
-    scripts = ["sets.js", *(["b-plane.js", "projection.js"] if in_space else []), "interception.js"]
+    scripts = ["sets.js", "interception.js"]
+    if any(scenario.is_spatial for scenario in scenarios):
+        scripts[1:1] = ["b-plane.js", "projection.js"]
     return page(heading, scripts, data)
 
 
 def _kept_steps_of(records: Sequence[Record]) -> list[list[int]]:
-    """Return the steps of each record that the page has: the same ones if the records have steps at
-    the same times.
+    """Return the steps of each record that the page has.
+
+    Records with steps at the same times have the same ones.
     """
     kept = [kept_steps(record) for record in records]
     if len({record.scenario.set_model.step_s for record in records}) > 1:
@@ -68,86 +73,60 @@ def _kept_steps_of(records: Sequence[Record]) -> list[list[int]]:
 
 
 def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
-    scenario = record.scenario
-    thruster = scenario.thruster
-    model = scenario.set_model
-    modulus_m_s = modulus(record.impulse_m_s.T)
+    """Return the data of one engagement: its facts, its steps `kept`, their sets and its axes."""
     before, misses_m = computed_again(record, kept)
-    states: list[tuple[Section, ...]] = []
-    numbers: list[tuple[int, int, int]] = []
-    for previous, index in zip([-2, *kept], kept, strict=False):
-        if index != previous + 1:
-            states.append(before[index])
-        states += [record.sections[index], before[index + 1]]
-        numbers.append((len(states) - 3, len(states) - 2, len(states) - 1))
-    sections = [section for state in states for section in state]
-    outlines = [section.omega_alpha for section in sections]
-    thinned = (
-        f"; the page has {len(kept)} of {record.steps} steps" if len(kept) < record.steps else ""
-    )
-    fired = np.flatnonzero(modulus_m_s)
+    sets = _sets_of(record, kept, before)
+    axes = [
+        _axis_data(record, number, kept)
+        | {"outlines": _outline_data(record, number, kept, sets, misses_m)}
+        for number in range(len(record.scenario.set_model.axes))
+    ]
     return {
         "title": title,
-        "outcome": outcome_title(record),
-        "facts": f"{record.strategy} strategy, {model.model.value} model, seed {record.seed}, "
-        f"run {record.run}{thinned}",
-        "arrival_s": scenario.nominal_arrival_s,
-        "min_to_go_s": min_to_go_s(scenario),
-        "marks": [[name, duration_text(time), time] for name, time in marks(scenario).items()],
-        "guaranteed_miss_m": max_guarantee_m(record.result),
-        "closing_speed_m_s": model.closing_speed_m_s,
-        "range_error_relative": scenario.range_sensor.relative_error
-        if scenario.range_sensor is not None
-        else None,
-        "rate_error_rad_s": scenario.rate_sensor.error_rad_s
-        if scenario.rate_sensor is not None
-        else None,
-        "max_impulse_m_s": thruster.max_impulse_m_s,
-        "budget_m_s": thruster.budget_m_s,
-        "radius_m": scenario.radius_m,
-        "time_s": record.time_s[kept].tolist(),
-        "measured_range_m": _known(record.measured["range"][kept])
-        if "range" in record.measured
-        else [None] * len(kept),
-        "complete_steps": int(
-            np.searchsorted(kept, complete_steps(record).max(initial=-1), side="right")
-        ),
-        "true_range_m": record.true_range_m[kept].tolist(),
-        "next_range_m": record.true_range_m[_next(record, kept)].tolist(),
-        "modulus_m_s": modulus_m_s[kept].tolist(),
-        "fired_s": record.time_s[fired].tolist(),
-        "fired_modulus_m_s": modulus_m_s[fired].tolist(),
-        "budget_left_m_s": np.maximum(thruster.budget_m_s - np.cumsum(modulus_m_s), 0.0)[
-            kept
-        ].tolist(),
-        "sections": {
-            "states": _packed(numbers, "<u4"),
-            "starts": _packed(
-                np.concatenate([[0], np.cumsum([len(state) for state in states])]), "<u4"
-            ),
-            "labels_m": _packed([section.label_m for section in sections], "<f8"),
-            "ranges_m": _packed([section.range_m for section in sections], "<f8"),
-        },
-        "axes": [
-            {
-                "along": f" along {axis}" if scenario.is_spatial else "",
-                "measured_name": f"measured angle along {axis}"
-                if scenario.is_spatial
-                else "measured angle",
-                **_axis_data(record, number, kept),
-                "fired_m_s": record.impulse_m_s[fired, number].tolist(),
-                "outlines": {
-                    "predicted_miss_m": _packed(
-                        np.concatenate([misses_m[k][number] for k in kept]), "<f8"
-                    ),
-                    **packed_outlines(
-                        [outline[number].polygon() for outline in outlines],
-                        TOLERANCE * bool(thinned),
-                    ),
-                },
-            }
-            for number, axis in enumerate(model.axes)
-        ],
+        **_facts(record, kept),
+        **_step_data(record, kept),
+        "sections": _section_data(sets),
+        "axes": axes,
+    }
+
+
+class _Sets(NamedTuple):
+    """The sets of an engagement on a page: states of the set, each a tuple of sections.
+
+    `of_step` has three numbers of states for each step: the set before the measurement, after it,
+    and predicted from it. The predicted set is the set before the next measurement, too.
+    """
+
+    states: list[tuple[Section, ...]]
+    of_step: list[tuple[int, int, int]]
+
+    @property
+    def sections(self) -> list[Section]:
+        """The sections of all states."""
+        return [section for state in self.states for section in state]
+
+
+def _sets_of(
+    record: Record, kept: Sequence[int], before: Mapping[int, tuple[Section, ...]]
+) -> _Sets:
+    sets = _Sets([], [])
+    for previous, step in zip([-2, *kept], kept, strict=False):
+        if step != previous + 1:
+            sets.states.append(before[step])
+        sets.states += [record.sections[step], before[step + 1]]
+        count = len(sets.states)
+        sets.of_step.append((count - 3, count - 2, count - 1))
+    return sets
+
+
+def _section_data(sets: _Sets) -> dict[str, str]:
+    """Return the states of each step, the first section of each state, and where sections are."""
+    starts = np.concatenate([[0], np.cumsum([len(state) for state in sets.states])])
+    return {
+        "states": _packed(sets.of_step, "<u4"),
+        "starts": _packed(starts, "<u4"),
+        "labels_m": _packed([section.label_m for section in sets.sections], "<f8"),
+        "ranges_m": _packed([section.range_m for section in sets.sections], "<f8"),
     }
 
 
@@ -156,29 +135,85 @@ def _next(record: Record, kept: Sequence[int]) -> list[int]:
     return [min(index + 1, record.steps - 1) for index in kept]
 
 
+def _facts(record: Record, kept: Sequence[int]) -> dict[str, object]:
+    """Return the facts of an engagement that do not depend on the step."""
+    scenario = record.scenario
+    model = scenario.set_model
+    facts = (
+        f"{record.strategy} strategy, {model.model.value} model, seed {record.seed}, "
+        f"run {record.run}"
+    )
+    if len(kept) < record.steps:
+        facts += f"; the page has {len(kept)} of {record.steps} steps"
+    range_sensor = scenario.range_sensor
+    rate_sensor = scenario.rate_sensor
+    return {
+        "outcome": outcome_title(record),
+        "facts": facts,
+        "arrival_s": scenario.nominal_arrival_s,
+        "min_to_go_s": min_to_go_s(scenario),
+        "marks": [[name, duration_text(time), time] for name, time in marks(scenario).items()],
+        "guaranteed_miss_m": max_guarantee_m(record.result),
+        "closing_speed_m_s": model.closing_speed_m_s,
+        "range_error_relative": range_sensor and range_sensor.relative_error,
+        "rate_error_rad_s": rate_sensor and rate_sensor.error_rad_s,
+        "max_impulse_m_s": scenario.thruster.max_impulse_m_s,
+        "budget_m_s": scenario.thruster.budget_m_s,
+        "radius_m": scenario.radius_m,
+    }
+
+
+def _step_data(record: Record, kept: Sequence[int]) -> dict[str, object]:
+    """Return times, ranges and moduli of impulses of the steps; `fired` are all with an impulse."""
+    modulus_m_s = modulus(record.impulse_m_s.T)
+    fired = np.flatnonzero(modulus_m_s)
+    budget_left_m_s = record.scenario.thruster.budget_m_s - np.cumsum(modulus_m_s)
+    measured_range_m: list[Any] = [None] * len(kept)
+    if "range" in record.measured:
+        measured_range_m = _known(record.measured["range"][kept])
+    last_complete = complete_steps(record).max(initial=-1)
+    return {
+        "time_s": record.time_s[kept].tolist(),
+        "measured_range_m": measured_range_m,
+        "complete_steps": int(np.searchsorted(kept, last_complete, side="right")),
+        "true_range_m": record.true_range_m[kept].tolist(),
+        "next_range_m": record.true_range_m[_next(record, kept)].tolist(),
+        "modulus_m_s": modulus_m_s[kept].tolist(),
+        "fired_s": record.time_s[fired].tolist(),
+        "fired_modulus_m_s": modulus_m_s[fired].tolist(),
+        "budget_left_m_s": np.maximum(budget_left_m_s, 0.0)[kept].tolist(),
+    }
+
+
 def _axis_data(record: Record, axis: int, kept: Sequence[int]) -> dict[str, object]:
-    """Return what belongs to one lateral axis: the line of sight in its plane with x, impulses and
-    predicted misses.
+    """Return the data of one lateral axis: line of sight, predicted misses and impulses.
+
+    The line of sight is in the plane of the axis and x.
     """
     name = record.scenario.set_model.axes[axis]
     after = _next(record, kept)
     model = on_board_model(record.scenario).axis(name)
-    angles, rates, misses = (
-        values[:, axis]
-        for values in (record.true_angle_rad, record.true_rate_rad_s, true_predicted_misses(record))
-    )
-    unknown = np.full(record.true_angle_rad.shape, np.nan)
-    return {
+    angles = record.true_angle_rad[:, axis]
+    rates = record.true_rate_rad_s[:, axis]
+    misses = true_predicted_misses(record)[:, axis]
+
+    data: dict[str, object] = {"along": "", "measured_name": "measured angle"}
+    if record.scenario.is_spatial:
+        data = {"along": f" along {name}", "measured_name": f"measured angle along {name}"}
+    data |= {
         "axis": name,
         "angle_error_rad": model.angle_sensor.constant_error_rad,
         "angle_error_slope_rad_m": model.angle_sensor.error_slope_rad_per_m,
         "centroid_error_m": model.angle_sensor.centroid_error_m,
         "disturbance_m_s2": model.disturbance_m_s2,
-        **{
-            f"measured_{kind.quantity}": _known(record.measured.get(kind.name, unknown)[kept, axis])
-            for kind in SENSORS
-            if kind.is_lateral
-        },
+    }
+    unknown = np.full(record.true_angle_rad.shape, np.nan)
+    for kind in SENSORS:
+        if kind.is_lateral:
+            measured = record.measured.get(kind.name, unknown)
+            data[f"measured_{kind.quantity}"] = _known(measured[kept, axis])
+    fired = np.flatnonzero(modulus(record.impulse_m_s.T))
+    return data | {
         "true_angle_rad": angles[kept].tolist(),
         "true_rate_rad_s": rates[kept].tolist(),
         "true_predicted_miss_m": misses[kept].tolist(),
@@ -187,34 +222,50 @@ def _axis_data(record: Record, axis: int, kept: Sequence[int]) -> dict[str, obje
         "next_predicted_miss_m": misses[after].tolist(),
         "predicted_miss_m": _known(record.predicted_miss_m[kept, axis]),
         "impulse_m_s": record.impulse_m_s[kept, axis].tolist(),
+        "fired_m_s": record.impulse_m_s[fired, axis].tolist(),
+    }
+
+
+def _outline_data(
+    record: Record, axis: int, kept: Sequence[int], sets: _Sets, misses_m: Mapping[int, Floats]
+) -> dict[str, str]:
+    """Return the outlines of all sections along an axis, and the intervals of predicted misses."""
+    tolerance = 0.0
+    if len(kept) < record.steps:
+        tolerance = OUTLINE_TOLERANCE
+    intervals_m = np.concatenate([misses_m[step][axis] for step in kept])
+    polygons = [section.omega_alpha[axis].polygon() for section in sets.sections]
+    return {
+        "predicted_miss_m": _packed(intervals_m, "<f8"),
+        **packed_outlines(polygons, tolerance),
     }
 
 
 def _known(values: Floats) -> list[Any]:
     """Return the values of steps; None where they are not known."""
-    known: Flags = np.asarray(np.isfinite(values.reshape(len(values), -1)).all(axis=1))
-    return [
-        value if is_known else None for value, is_known in zip(values.tolist(), known, strict=True)
-    ]
+    known: list[Any] = values.tolist()
+    is_known = np.isfinite(values.reshape(len(values), -1)).all(axis=1)
+    for step in np.flatnonzero(~is_known):
+        known[step] = None
+    return known
 
 
 def computed_again(
     record: Record, kept: Collection[int]
 ) -> tuple[Mapping[int, tuple[Section, ...]], Mapping[int, Floats]]:
-    """Return by step what a record does not contain: sections before the measurement, and intervals
-    of misses.
+    """Return the sections and intervals of misses that a record does not contain, by step.
 
-    The sections are those predicted to the steps `kept` and to the steps after them; after an
-    impulse k a section is the measured one with V reduced by k. The intervals are those of the
-    predicted misses of each measured section of the steps `kept`, m, shape (C, sections, 2). The
-    cost is that of the steps of the set, a few ms.
+    The sections are predicted to the steps `kept` and to the steps after them; after an impulse k a
+    section is the measured one with V reduced by k. The intervals are the intervals of the
+    predicted misses of each measured section of the steps `kept`, m, shape (C, sections, 2). This
+    takes as long as the steps of the set, a few ms.
     """
     wanted = {*kept}
     before = {}
     misses_m = {}
-    for number, information in enumerate(
-        replayed(record.scenario, record.measured, record.impulse_m_s)
-    ):
+    sets = replayed(record.scenario, record.measured, record.impulse_m_s)
+    # The sets before and after the measurement of a step follow each other.
+    for number, information in enumerate(sets):
         step, is_measured = divmod(number, 2)
         if is_measured and step in wanted:
             intervals = np.stack(information.predicted_miss_by_section_m(), axis=-1)
@@ -225,23 +276,26 @@ def computed_again(
 
 
 def packed_outlines(outlines: Sequence[Floats], tolerance: float = 0.0) -> dict[str, str]:
-    """Return outlines with their boxes exactly and their vertices on a grid of `STEPS_OF_A_BOX`
-    across the box.
+    """Return outlines as boxes and vertices on a grid of `STEPS_OF_A_BOX` across the box.
 
-    An outline has at least one vertex. A box is the minimum of each coordinate, then the maximum.
-    With a tolerance, a part of the box, outlines are simplified by the algorithm of Douglas and
-    Peucker.
+    An outline has at least one vertex. A box is the minimum of each coordinate, then the maximum,
+    both exact. With a tolerance, a share of the box, outlines are simplified by the algorithm of
+    Douglas and Peucker.
     """
     counts = np.array([len(outline) for outline in outlines], dtype=np.int64)
     if not len(counts):
         return {"boxes": "", "counts": "", "vertices": ""}
+
+    # The vertices of all outlines together, as shares of their boxes.
     points = np.concatenate(outlines)
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
     minimum = np.minimum.reduceat(points, starts)
     maximum = np.maximum.reduceat(points, starts)
     width = np.where(maximum > minimum, maximum - minimum, 1.0)
     share = (points - np.repeat(minimum, counts, axis=0)) / np.repeat(width, counts, axis=0)
+
     if tolerance:
+        # Lines that end where they begin; the repeated vertex is dropped again.
         closed = np.insert(share, np.cumsum(counts), share[starts], axis=0)
         lines = shapely.linestrings(closed, indices=np.repeat(np.arange(len(counts)), counts + 1))
         share, line = shapely.get_coordinates(shapely.simplify(lines, tolerance), return_index=True)

@@ -1,6 +1,4 @@
-"""Kumkov and Patsko (1997): the interception, single engagements and the distributions of figure
-4.
-"""
+"""Kumkov and Patsko (1997): single engagements and the distributions of figure 4."""
 
 from __future__ import annotations
 
@@ -25,47 +23,46 @@ MANY, SINGLE = OF_PAPER
 ONE_RUN = "section 8, one run"
 """Miss and impulse of the two engagements from z = -8 km, without a range sensor."""
 RUNS = 200
-"""A curve of figure 4, or runs of one engagement with random errors."""
+"""Number of runs of a curve of figure 4, and of one engagement with random errors."""
 
 
 def compute(progress: Progress) -> dict[str, Sequence[Ours | float]]:
-    """Compute the numbers by source; for the game of one run, with each tie rule that does not
-    draw.
+    """Compute the numbers of the paper by source.
+
+    The game of one run is computed with each tie rule that does not draw.
     """
+    # One engagement without a range sensor, with random errors and with the game noise.
     single = replace(load_scenario(SINGLE), range_sensor=None)
-    many = load_scenario(MANY)
-    # The published procedure: a set that became empty stays lost.
-    lost = replace(many, information_set=replace(many.information_set, recovery=Recovery.NONE))
-    curves = [
-        (number, flown) for number, flown in curve_scenarios(many) if flown.range_sensor is None
-    ]
-    curves += [
-        (number, flown) for number, flown in curve_scenarios(lost) if flown.range_sensor is not None
-    ]
-    ties = [
+    games = [
         replace(single, noise=NoiseKind.GAME, tie=tie)
         for tie in TieRule
         if tie is not TieRule.RANDOM
     ]
-    runs = [(single, RUNS), *((tie, 1) for tie in ties), *((flown, RUNS) for _, flown in curves)]
-    results = simulate_all(
-        [
-            Task(scenario, range(count), 0, guarantee=False, progress=report)
-            for (scenario, count), report in zip(runs, parts_of(progress, len(runs)), strict=True)
-        ]
-    )
-    both = results[:1], results[1 : 1 + len(ties)]
-    one_run = [
-        _median(values) for found in both for values in zip(*map(_values, found), strict=True)
+
+    # Figure 4 by the published procedure: with a range sensor, a set that became empty stays lost.
+    many = load_scenario(MANY)
+    lost = replace(many, information_set=replace(many.information_set, recovery=Recovery.NONE))
+    curves = [each for each in curve_scenarios(many) if each[1].range_sensor is None]
+    curves += [each for each in curve_scenarios(lost) if each[1].range_sensor is not None]
+
+    runs = [(single, RUNS), *((game, 1) for game in games), *((flown, RUNS) for _, flown in curves)]
+    tasks = [
+        Task(scenario, range(count), 0, guarantee=False, progress=report)
+        for (scenario, count), report in zip(runs, parts_of(progress, len(runs)), strict=True)
     ]
-    figure_4 = {
-        f"figure 4, curve {number}": [
+    of_random, *others = simulate_all(tasks)
+    of_games = others[: len(games)]
+    of_curves = others[len(games) :]
+
+    numbers: dict[str, Sequence[Ours | float]] = {
+        ONE_RUN: [*_medians([of_random]), *_medians(of_games)]
+    }
+    for (number, _), found in zip(curves, of_curves, strict=True):
+        numbers[f"figure 4, curve {number}"] = [
             *np.quantile(found.miss_m, (0.5, 0.9)),
             np.quantile(found.impulse_m_s, 0.5),
         ]
-        for (number, _), found in zip(curves, results[1 + len(ties) :], strict=True)
-    }
-    return {ONE_RUN: one_run, **figure_4}
+    return numbers
 
 
 def printed_single_runs() -> dict[str, tuple[float, float]]:
@@ -74,8 +71,12 @@ def printed_single_runs() -> dict[str, tuple[float, float]]:
     return {"random": (values[0], values[1]), "game": (values[2], values[3])}
 
 
-def _values(results: Results) -> tuple[Floats, Floats]:
-    return results.miss_m, results.impulse_m_s
+def _medians(runs: Sequence[Results]) -> list[Ours]:
+    """Return the median of the miss and the median of the impulse."""
+    return [
+        _median([results.miss_m for results in runs]),
+        _median([results.impulse_m_s for results in runs]),
+    ]
 
 
 def _median(runs: Sequence[Floats]) -> Ours:

@@ -34,9 +34,13 @@ from infoset.sim.scenario import MAX_STEPS
 from infoset.sim.storage.codec import from_json, to_json
 
 MAX_FILE_BYTES = 1 << 28
+"""Size of the largest record that is read: `MAX_STEPS` steps in space take 14 MB."""
 MAX_HEADER_BYTES = 1 << 20
+"""Size of the largest JSON header: 500 times the header of a built-in scenario."""
 MAX_ARRAY_HEADER_BYTES = 1 << 8
+"""Size of the largest header of an array; NumPy writes 128 bytes."""
 LONGEST_REASON = 300
+"""Maximum number of letters of a reason, which a hostile file can make long."""
 MAX_SECTION_STEPS = 5 * MAX_STEPS
 """Maximum number of sections times steps: the longest flight with the five sections of the built-in
 missions. A section takes about 1.4 kB a step when a record is read, so this is 0.7 GB."""
@@ -103,8 +107,9 @@ class Header:
 
 
 def record_bytes(record: Record) -> bytes:
-    """Return the content of the `.npz` file of a record; `InputError` if the record is too large to
-    be read again.
+    """Return the content of the `.npz` file of a record.
+
+    Raise `InputError` if the record is too large to be read again.
     """
     with input_errors("record"):
         _check_size(record.scenario, record.steps)
@@ -122,8 +127,9 @@ def record_bytes(record: Record) -> bytes:
 
 
 def write_record(record: Record, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-    """Write a record, completely or not at all; `InputError` if the file cannot be written, or
-    exists already.
+    """Write a record, completely or not at all.
+
+    Raise `InputError` if the file cannot be written, or exists already.
     """
     file = Path(path)
     if file.suffix.lower() != ".npz":
@@ -151,48 +157,45 @@ def load_record(path: str | os.PathLike[str]) -> Record:
 
 
 def _to_arrays(record: Record) -> Arrays:
+    arrays: dict[str, Any] = {name: getattr(record, name) for name in _OF_STEPS}
     unknown = np.full((record.steps, len(record.scenario.set_model.axes)), np.nan)
-    arrays: dict[str, Any] = {
-        **{name: getattr(record, name) for name in _OF_STEPS},
-        **{
-            name: record.measured.get(kind.name, unknown if kind.is_lateral else unknown[:, 0])
-            for name, kind in _MEASURED.items()
-        },
-        **{
-            name: np.ma.filled(np.ma.asarray(getattr(record.result, column.field), float), np.nan)
-            for name, column in _RESULT.items()
-        },
-    }
+    for name, kind in _MEASURED.items():
+        missing = unknown if kind.is_lateral else unknown[:, 0]
+        arrays[name] = record.measured.get(kind.name, missing)
+    for name, column in _RESULT.items():
+        values = np.ma.asarray(getattr(record.result, column.field), float)
+        arrays[name] = np.ma.filled(values, np.nan)
     return {name: np.asarray(values, dtype=MEMBERS[name].dtype) for name, values in arrays.items()}
 
 
 def _read_arrays(content: bytes) -> Arrays:
     """Read the arrays of an archive, whose directory is checked before a member is read."""
-    if content.count(b"PK\x01\x02") > 2 * len(
-        MEMBERS
-    ):  # entries of the directory; numbers may look like one, too
+    # Entries of the directory; the bytes of numbers may look like an entry, too.
+    if content.count(b"PK\x01\x02") > 2 * len(MEMBERS):
         raise ValueError("it has more members than a record")
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            members = {each.filename: each for each in archive.infolist()}
-            if sorted(members) != sorted(f"{name}.npy" for name in MEMBERS) or len(
-                archive.infolist()
-            ) > len(members):
-                raise ValueError("its members are not those of a record")
-            if any(each.compress_type != zipfile.ZIP_STORED for each in members.values()):
-                raise ValueError("it is compressed; records are not")
-            if sum(each.file_size for each in members.values()) > len(content):
-                raise ValueError("the declared sizes of its members are larger than the file")
-            if members["header.npy"].file_size > MAX_HEADER_BYTES:
-                raise ValueError("its header is too long")
+            _check_archive(archive, len(content))
         with np.load(
             io.BytesIO(content), allow_pickle=False, max_header_size=MAX_ARRAY_HEADER_BYTES
         ) as stored:
-            return {
-                name: np.asarray(stored[name]) for name in MEMBERS
-            }  # bytes, if a member is no array
+            # A member that is not an array is read as bytes, which become an array of text.
+            return {name: np.asarray(stored[name]) for name in MEMBERS}
     except Exception as error:  # zipfile and numpy raise errors of many types for damaged files
         raise ValueError(" ".join(str(error).split()) or type(error).__name__) from None
+
+
+def _check_archive(archive: zipfile.ZipFile, size: int) -> None:
+    """Raise ValueError if the directory of an archive of `size` bytes is not of a record."""
+    names = sorted(each.filename for each in archive.infolist())
+    if names != sorted(f"{name}.npy" for name in MEMBERS):
+        raise ValueError("its members are not those of a record")
+    if any(each.compress_type != zipfile.ZIP_STORED for each in archive.infolist()):
+        raise ValueError("it is compressed; records are not")
+    if sum(each.file_size for each in archive.infolist()) > size:
+        raise ValueError("the declared sizes of its members are larger than the file")
+    if archive.getinfo("header.npy").file_size > MAX_HEADER_BYTES:
+        raise ValueError("its header is too long")
 
 
 def _check(arrays: Arrays, axes: int) -> None:
@@ -213,9 +216,12 @@ def _check(arrays: Arrays, axes: int) -> None:
                 f"{shape}"
             )
         if values.dtype.kind == "f":
-            known = values[~np.isnan(values)] if member.nullable else values
+            known = values
+            if member.nullable:
+                known = values[~np.isnan(values)]
             if not (np.abs(known) <= MAXIMUM).all():
                 raise ValueError(f"{name} has a number beyond {MAXIMUM:g}")
+
     if steps == 0 or (np.diff(arrays["time_s"]) <= 0.0).any():
         raise ValueError("time_s does not increase")
     if arrays["result_velocity_m_s"][0, -1] >= 0.0:
@@ -236,12 +242,11 @@ def _check_size(scenario: Scenario, steps: int) -> None:
 def replayed(
     scenario: Scenario, measured: Measurements, impulse_m_s: Floats
 ) -> Iterator[InformationSet]:
-    """Yield the set of an engagement before and after the measurement of each step, and predicted
-    from the last step.
+    """Yield the set of an engagement before and after the measurement of each step.
 
-    It is one object, which changes. It is computed from measurements and impulses, arrays as in
-    `Record`, and equals that of the engagement bit for bit if the versions of the packages are the
-    same.
+    The last set is predicted from the last step. It is one object, which changes. It is computed
+    from measurements and impulses, arrays as in `Record`, and equals the set of the engagement bit
+    for bit if the versions of the packages are the same.
     """
     information = InformationSet(on_board_model(scenario), guarantee=False)
     is_known = {
@@ -264,11 +269,13 @@ def replayed(
 
 
 def _to_record(header: Header, arrays: Arrays) -> Record:
+    """Return the record of checked arrays, with its sets computed again."""
     first = header.inconsistency
-    if first is not None and not (
-        0 <= first.step < len(arrays["time_s"]) and abs(first.label_m) <= MAXIMUM
-    ):
-        raise ValueError("inconsistency is not at a step of the record")
+    if first is not None:
+        is_step = 0 <= first.step < len(arrays["time_s"])
+        if not is_step or not abs(first.label_m) <= MAXIMUM:
+            raise ValueError("inconsistency is not at a step of the record")
+
     fields: dict[str, Any] = {
         "runs": np.array([header.run]),
         "outcomes": (header.outcome,),
@@ -277,9 +284,10 @@ def _to_record(header: Header, arrays: Arrays) -> Record:
     for name, column in _RESULT.items():
         unknown = np.isnan(arrays[name])
         values: NDArray[Any] = np.where(unknown, 0.0, arrays[name]).astype(column.kind)
-        fields[column.field] = (
-            np.ma.MaskedArray(values, mask=unknown) if column.nullable else values
-        )
+        if column.nullable:
+            values = np.ma.MaskedArray(values, mask=unknown)
+        fields[column.field] = values
+
     scenario = header.scenario
     measured = {
         kind.name: arrays[name] for name, kind in _MEASURED.items() if kind.name in scenario.sensors

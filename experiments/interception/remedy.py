@@ -1,5 +1,6 @@
-"""Remedies of misses: the least change of one key at which no run misses for a cause, with the same
-random numbers.
+"""Remedies of misses: the least change of one key at which no run misses for a cause.
+
+All values are examined with the same random numbers.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ from infoset.sim.results import join
 IMPULSE = "thruster.max_impulse_m_s"
 BUDGET = "thruster.budget_m_s"
 CUT_OFF = "thruster.last_impulse_s"
-PIXEL, SCALE = "camera.pixel_error_rad", "angle_sensor.scale"
+PIXEL = "camera.pixel_error_rad"
+SCALE = "angle_sensor.scale"
 KEYS = {
     MissCause.ENGINE: (IMPULSE, CUT_OFF),
     MissCause.BUDGET: (BUDGET,),
@@ -28,9 +30,14 @@ KEYS = {
     MissCause.SATURATED: (IMPULSE, PIXEL, SCALE),
     MissCause.GUIDANCE: (),
 }
+"""Keys whose change can remove a cause; another strategy is no key."""
 MAX_DOUBLINGS = 10
+"""Maximum number of doublings, or halvings, of a value: a factor of 1000 is another mission."""
 NEAR = 1.02
-"""Ratio of a value that is enough and one that is not, at which the search ends."""
+"""Ratio of a value that is enough and one that is not, at which the search ends.
+
+Values have three digits, so neighbours can differ by 1 %.
+"""
 
 
 @dataclass(frozen=True)
@@ -62,33 +69,38 @@ class Remedy:
     missed: Mapping[str, int] = field(default_factory=dict)
 
     def __str__(self) -> str:
+        head = f"remedy for {self.cause.value}: "
         if self.enough is None or self.hits is None:
-            return (
-                f"remedy for {self.cause.value}: no {self.key} from {self.now:g} to "
-                f"{self.not_enough:g}"
-            )
-        limit = (
-            "in closed form" if self.not_enough is None else f"{self.not_enough:g} is not enough"
+            return f"{head}no {self.key} from {self.now:g} to {self.not_enough:g}"
+
+        limit = "in closed form"
+        if self.not_enough is not None:
+            limit = f"{self.not_enough:g} is not enough"
+        text = (
+            f"{head}{self.key} = {self.enough:g} instead of {self.now:g} ({limit}); then "
+            f"{self.hits.hits} of {self.hits.runs} other runs hit (95 % CI "
+            f"{percent(self.hits.lower)} to {percent(self.hits.upper)})"
         )
-        others = ", ".join(f"{name} {count}" for name, count in self.missed.items())
-        return (
-            f"remedy for {self.cause.value}: {self.key} = {self.enough:g} instead of {self.now:g} "
-            f"({limit}); then {self.hits.hits} of {self.hits.runs} other runs hit (95 % CI "
-            f"{percent(self.hits.lower)} to "
-            f"{percent(self.hits.upper)}){f', missed by {others}' if others else ''}"
-        )
+        if self.missed:
+            others = ", ".join(f"{name} {count}" for name, count in self.missed.items())
+            text += f", missed by {others}"
+        return text
 
 
 def find_remedies(task: Task, results: Results, progress: Progress) -> list[Remedy]:
-    """Return the remedies of all causes in the results of a task, for the keys that its scenario
-    has.
+    """Return the remedies of all causes in the results of a task.
 
-    A maximum impulse for the cause `engine` follows in closed form, because its authority is
-    proportional to it. The other values are found by bisection: all runs are simulated again with
-    each value.
+    The keys are those that its scenario has. A maximum impulse for the cause `engine` follows in
+    closed form, because its authority is proportional to it. The other values are found by
+    bisection: all runs are simulated again with each value.
     """
-    wanted = [(cause, key) for cause in MissCause if cause in results.causes for key in KEYS[cause]]
-    wanted = [(cause, key) for cause, key in wanted if _values(task.scenario, key)]
+    wanted = [
+        (cause, key)
+        for cause in MissCause
+        if cause in results.causes
+        for key in KEYS[cause]
+        if _values(task.scenario, key)
+    ]
     remedies = []
     for cause, key in wanted:
         remedies.append(_remedy(task, results, cause, key))
@@ -101,7 +113,6 @@ def _remedy(task: Task, results: Results, cause: MissCause, key: str) -> Remedy:
     cores = os.cpu_count() or 1
     values = _values(scenario, key)
     now = 1.0 if key == SCALE else values[key]
-    not_enough = None
 
     @functools.cache
     def simulated(value: float, runs: Sequence[int] = task.runs) -> Results:
@@ -111,15 +122,20 @@ def _remedy(task: Task, results: Results, cause: MissCause, key: str) -> Remedy:
         parts = [runs[first::cores] for first in range(min(len(runs), cores))]
         return join(simulate_all([replace(flight, runs=part) for part in parts]))
 
+    not_enough = None
     enough: float | None
     if (cause, key) == (MissCause.ENGINE, IMPULSE):
         needed = (results.unguided_miss_m - (scenario.radius_m or 0.0)) / results.engine_corrects_m
-        enough = _rounded(1.005 * now * float(needed.max()))  # 1.005 rounds up
+        # The factor 1.005 lets the three digits be rounded up.
+        enough = _rounded(1.005 * now * float(needed.max()))
     else:
+        # A stronger engine is a remedy, and smaller errors and a shorter cut-off are.
         factor = 2.0 if key in (IMPULSE, BUDGET) else 0.5
         not_enough, enough = _search(lambda value: cause in simulated(value).causes, now, factor)
         if enough is None:
             return Remedy(cause, key, now, not_enough, None)
+
+    # The value was chosen for the runs of the task: other runs show its hits.
     next_run = max(task.runs) + 1
     then = simulated(enough, range(next_run, next_run + len(task.runs)))
     left = {name: count for name, count in then.missed.items() if count and not name.endswith("_m")}
@@ -127,12 +143,18 @@ def _remedy(task: Task, results: Results, cause: MissCause, key: str) -> Remedy:
 
 
 def _values(scenario: Scenario, key: str) -> dict[str, float]:
-    """Return the values that a key changes in proportion, by their keys; none if the scenario does
-    not have it.
+    """Return the values that a key changes in proportion, by their keys.
+
+    There are none if the scenario does not have the key.
     """
     table, name = key.split(".")
-    owner = {} if getattr(scenario, table) is None else vars(getattr(scenario, table))
-    names = [each for each in owner if "error" in each] if key == SCALE else [name]
+    part = getattr(scenario, table)
+    if part is None:
+        return {}
+    owner = vars(part)
+    names = [name]
+    if key == SCALE:
+        names = [each for each in owner if "error" in each]
     return {f"{table}.{each}": owner[each] for each in names if owner.get(each)}
 
 

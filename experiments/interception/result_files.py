@@ -1,6 +1,4 @@
-"""Files of results and records: `save` writes them, `load_results` and `load_record` read them
-again.
-"""
+"""Files of results and records: `save` writes them, `load_results` reads results."""
 
 from __future__ import annotations
 
@@ -67,8 +65,7 @@ def save(
 
 
 def load_results(path: str | os.PathLike[str]) -> Results:
-    """Read results that `save` wrote as ``.json``: all columns and digits are those of the results
-    that were saved.
+    """Read results that `save` wrote as ``.json``, with all columns and digits.
 
     `InputError` if the file has no results, or is damaged.
     """

@@ -1,5 +1,6 @@
-"""Strategies and noises that options name: built-in ones, and classes in Python files
-(``FILE.py:CLASS``).
+"""Strategies and noises that options name: built in, or classes of Python files.
+
+A class of a file is written as ``FILE.py:CLASS``.
 """
 
 from __future__ import annotations
@@ -35,22 +36,28 @@ def own_strategy(text: str | None, option: str = "--strategy") -> Strategy | Non
 
     `InputError` if the file has no such strategy.
     """
-    return None if text is None or not is_own(text) else load_strategy(text, option)
+    if text is None or not is_own(text):
+        return None
+    return load_strategy(text, option)
 
 
 def chosen_strategies(scenario: Scenario, names: str | None) -> Mapping[str, Strategy | None]:
-    """Return the strategies of ``--strategies`` by name, with the strategy of a Python file, None
-    for a built-in one.
+    """Return the strategies of ``--strategies`` by name.
 
-    None is all built-in strategies. `InputError` if there is no such strategy.
+    A built-in strategy has the value None, a class of a Python file its object. The value None of
+    the option means all built-in strategies. Raise `InputError` if there is no such strategy.
     """
     valid = strategy_names()
+    texts = valid
+    if names is not None:
+        texts = [part.strip() for part in names.split(",")]
     chosen: dict[str, Strategy | None] = {}
-    for text in valid if names is None else [part.strip() for part in names.split(",")]:
+    for text in texts:
         own = own_strategy(text, "--strategies")
-        chosen[
-            choice("--strategies", text, valid) if own is None else strategy_name(scenario, own)
-        ] = own
+        if own is None:
+            chosen[choice("--strategies", text, valid)] = None
+        else:
+            chosen[strategy_name(scenario, own)] = own
     return chosen
 
 
@@ -119,8 +126,9 @@ _LOADED: dict[tuple[Path, str], str] = {}
 def _load(
     text: str, option: str, methods: tuple[str, ...], version: str | None
 ) -> tuple[Any, tuple[str, str, str]]:
-    """Return the class of a text ``FILE.py:CLASS``, and text, option and version that load it in
-    another process.
+    """Return a class of a Python file, and what loads it in another process.
+
+    The text is ``FILE.py:CLASS``. Another process needs the text, the option and the version.
     """
     name, _, class_name = text.rpartition(":")
     file = Path(name).resolve()
@@ -129,7 +137,8 @@ def _load(
             f"{option}: {shown(text)} must be FILE.py:CLASS, the path of a file that exists and "
             "its class"
         )
-    _LOADED.pop((file, class_name), None)  # the last one is looked at first
+    # The newest class is the last one, which `own_code_errors` examines first.
+    _LOADED.pop((file, class_name), None)
     _LOADED[file, class_name] = option
     with own_code_errors():
         if str(file.parent) not in sys.path:
@@ -144,11 +153,13 @@ def _load(
     digest = vars(module).setdefault(
         "_sha256_at_import", hashlib.sha256(file.read_bytes()).hexdigest()
     )
+
     kind = vars(module).get(class_name)
     if not (isinstance(kind, type) and all(hasattr(kind, method) for method in methods)):
-        needed = f"method{'s' if len(methods) > 1 else ''} {' and '.join(methods)}"
+        needed = "method" if len(methods) == 1 else "methods"
         raise InputError(
-            f"{option}: {name} has no class {shown(class_name)} with the {needed}; check the name"
+            f"{option}: {name} has no class {shown(class_name)} with the {needed} "
+            f"{' and '.join(methods)}; check the name"
         )
     found = f"{file.name}:{class_name} sha256:{digest[:16]}"
     if version not in (None, found):
@@ -158,23 +169,26 @@ def _load(
 
 @contextlib.contextmanager
 def own_code_errors() -> Iterator[None]:
-    """Turn an exception of the code in a loaded file, or about what it returned, into a message
-    with its line.
+    """Turn an exception of the code in a loaded file into a message with its line.
+
+    The message is also about a wrong value that the code returned.
     """
     try:
         yield
     except (InputError, MemoryError):
         raise
     except (Exception, SystemExit) as error:
-        trace = "".join(traceback.format_exception(error))  # also that of another process
+        trace = "".join(traceback.format_exception(error))  # contains a trace of another process
         for (file, name), option in reversed(_LOADED.items()):
+            where = os.path.relpath(file)
             lines = re.findall(rf'File "{re.escape(str(file))}", line (\d+)', trace)
-            # Without a line: the class needs arguments, or returned a value that `infoset.sim`
-            # refuses.
-            if lines or re.match(rf"((strategy|noise) )?{name}\b", str(error)):
-                where = f", line {lines[-1]}" if lines else ""
-                raise InputError(
-                    f"{option}: {os.path.relpath(file)}{where}: {type(error).__name__}: {error}; "
-                    "correct the file"
-                ) from None
+            if lines:
+                where += f", line {lines[-1]}"
+            elif not re.match(rf"((strategy|noise) )?{name}\b", str(error)):
+                # Not an error of this class either, which has no line if the class needs
+                # arguments, or returned a value that `infoset.sim` refuses.
+                continue
+            raise InputError(
+                f"{option}: {where}: {type(error).__name__}: {error}; correct the file"
+            ) from None
         raise

@@ -1,6 +1,4 @@
-"""Trajectories: files with the states of a spacecraft and an object, and the scenarios that follow
-from them.
-"""
+"""Trajectory files: states of a spacecraft and an object, and the scenario that follows."""
 
 from __future__ import annotations
 
@@ -22,15 +20,14 @@ from infoset.experiments.interception.trajectory.files import named_file
 from infoset.experiments.interception.trajectory.frames import centre_name, frame_of_spice
 from infoset.experiments.interception.trajectory.oem import MAX_OEM_BYTES, OemSegment, read_oem
 from infoset.limits import NUMBER, Description, Line, Name, Positive, check_fields
+from infoset.model import StateBox
 from infoset.sim.approach import Approach, find_approach
 from infoset.sim.covariance import Covariance
 from infoset.sim.gravity import on_board_model
 from infoset.sim.scenario import Body, Scenario
 
 _Text = Line(longest=1000)
-"""Names and paths: one line, because they are repeated in messages and in the comments of the
-scenario.
-"""
+"""Names and paths: one line, because messages and comments of the scenario repeat them."""
 KERNEL_SCALE = "TDB"
 """Time scale of SPICE."""
 
@@ -51,9 +48,8 @@ class CraftTrack:
     def __post_init__(self) -> None:
         check_fields(self)
         vectors = [vector for vector in (self.position_m, self.velocity_m_s) if vector is not None]
-        if [len(vectors), self.oem, self.spice].count(None) + (not vectors) != 2 or len(
-            vectors
-        ) == 1:
+        sources = [bool(vectors), self.oem is not None, self.spice is not None]
+        if sources.count(True) != 1 or len(vectors) == 1:
             raise ValueError("CraftTrack: must have position and velocity, or oem, or spice")
         if any(len(vector) != 3 for vector in vectors):
             raise ValueError("CraftTrack: position and velocity must have three components")
@@ -61,10 +57,10 @@ class CraftTrack:
 
 @dataclass(frozen=True, kw_only=True)
 class Trajectory:
-    """The states of a spacecraft and an object at an epoch, and the covariance of the relative
-    state.
+    """The states of a spacecraft and an object at an epoch, and their covariance.
 
-    The components of the covariance are x, y, z and their rates, of the object from the spacecraft.
+    The covariance is of the relative state, with the components x, y, z and their rates, of the
+    object from the spacecraft.
 
     Parameters
     ----------
@@ -112,10 +108,9 @@ class Trajectory:
 
 
 class KnownTarget(NamedTuple):
-    """What the files of a trajectory do not contain about the target: its radius, m, and the bound
-    of its acceleration.
+    """Properties of the target that the files of a trajectory do not contain.
 
-    None is not known.
+    They are its radius, m, and the bound of its acceleration. None is not known.
     """
 
     radius_m: float | None = None
@@ -123,9 +118,7 @@ class KnownTarget(NamedTuple):
 
 
 class FoundScenario(NamedTuple):
-    """The scenario of a trajectory, its file with comments, and notes and warnings about the
-    trajectory.
-    """
+    """The scenario of a trajectory, its file, and notes and warnings about the trajectory."""
 
     scenario: Scenario
     text: str
@@ -180,11 +173,11 @@ def scenario_of(
     target = target or KnownTarget()
     pair = _pair(trajectory, Path(file).parent, folders, source)
     _check_accuracy(pair, source)
-    own = pair.spacecraft.state
-    other = pair.object.state
+
+    relative = pair.object.state - pair.spacecraft.state
     with input_errors(source):
         found = find_approach(
-            np.concatenate([own, other - own]),
+            np.concatenate([pair.spacecraft.state, relative]),
             trajectory.gravitational_parameter_m3_s2 or 0.0,
             pair.covariance,
             np.array(trajectory.pole),
@@ -193,35 +186,46 @@ def scenario_of(
     with input_errors(f"{source} at {sigmas:g} sigma: uncertainty"):
         box = found.box(sigmas)
     with input_errors(f"{source} with the sensors and the engine of {like.name}"):
-        scenario = replace(
-            like,
-            name=trajectory.name,
-            description=trajectory.description,
-            nominal_range_m=float(found.state[2]),
-            closing_speed_m_s=float(-found.state[5]),
-            b_plane_t_rad=0.0,
-            sun=found.sun,
-            uncertainty=box,
-            dispersion=box,
-            covariance=found.covariance,
-            target=None,
-            body=None if target.radius_m is None else Body(target.radius_m),
-            information_set=replace(
-                like.information_set,
-                disturbance_m_s2=target.disturbance_m_s2 or 0.0,
-                disturbance_y_m_s2=None,
-            ),
-        )
+        scenario = _scenario(trajectory, like, found, box, target)
         on_board_model(scenario)
 
     missing = _missing(target)
-    notes = [*pair.notes, *missing]
     warnings = [*pair.spacecraft.warnings, *pair.object.warnings]
-    origins = _origins(trajectory, pair)
-    text = _text(
-        scenario, found, like.name, sigmas, source, [*origins, *pair.notes, *warnings, *missing]
+    about_states = [*_origins(trajectory, pair), *pair.notes, *warnings, *missing]
+    text = _text(scenario, found, like.name, sigmas, source, about_states)
+    return FoundScenario(scenario, text, [*pair.notes, *missing], warnings)
+
+
+def _scenario(
+    trajectory: Trajectory, like: Scenario, found: Approach, box: StateBox, target: KnownTarget
+) -> Scenario:
+    """Return a scenario of an approach, with the sensors, the engine and the settings of another.
+
+    The uncertainty and the dispersion are the box.
+    """
+    body = None
+    if target.radius_m is not None:
+        body = Body(target.radius_m)
+    information_set = replace(
+        like.information_set,
+        disturbance_m_s2=target.disturbance_m_s2 or 0.0,
+        disturbance_y_m_s2=None,
     )
-    return FoundScenario(scenario, text, notes, warnings)
+    return replace(
+        like,
+        name=trajectory.name,
+        description=trajectory.description,
+        nominal_range_m=float(found.state[2]),
+        closing_speed_m_s=float(-found.state[5]),
+        b_plane_t_rad=0.0,
+        sun=found.sun,
+        uncertainty=box,
+        dispersion=box,
+        covariance=found.covariance,
+        target=None,
+        body=body,
+        information_set=information_set,
+    )
 
 
 def _missing(target: KnownTarget) -> list[str]:
@@ -246,15 +250,17 @@ def _origins(trajectory: Trajectory, pair: _Pair) -> list[str]:
     lines = []
     if trajectory.epoch is not None:
         lines.append(f"Epoch: {trajectory.epoch}")
-    lines += [f"Spacecraft: {pair.spacecraft.origin}.", f"Object: {pair.object.origin}."]
+    lines.append(f"Spacecraft: {pair.spacecraft.origin}.")
+    lines.append(f"Object: {pair.object.origin}.")
+
     frames = [
         craft.frame.name for craft in (pair.spacecraft, pair.object) if craft.frame is not None
     ]
-    axes = f"of {frames[0]}" if frames else "of the states"
+    owner = frames[0] if frames else "the states"
     x, y, z = trajectory.pole
     lines.append(
-        f"Reference plane of T and R: its normal (pole) is [{x:g}, {y:g}, {z:g}] in the axes "
-        f"{axes}."
+        f"Reference plane of T and R: its normal (pole) is [{x:g}, {y:g}, {z:g}] in the axes of "
+        f"{owner}."
     )
     return lines
 
@@ -267,19 +273,34 @@ def _text(
     source: str,
     about_states: Sequence[str],
 ) -> str:
+    """Return the text of a scenario file, with comments about the approach and about each table."""
     t_km, r_km = (value / 1e3 for value in found.miss_m)
-    about = "".join(f"# {on_a_screen(line)}\n" for line in about_states)
-    head = f"""\
-# The approach of {source}, written by infoset scenarios from-states.
-# x is along the line of approach (S of the B-plane), y along T, z along R; the origin is the spacecraft.
-# Start: {found.start_s / 86400.0:.6g} d after the epoch, {found.flight_s:.6g} s before the closest approach.
-# Closest approach without impulses: B.T = {t_km:.6g} km, B.R = {r_km:.6g} km.
-# Until then gravity changes the closing speed by {found.speed_change_m_s:.3g} m/s and turns the line of approach by
-# {found.turn_rad:.3g} rad; B.T and B.R are in the plane across the line at the start.
-{about}# What is not explained here has the values of {like}: replace them by yours.
-"""
-    comments = {
-        **{f"[{part.name}]": f"as {like}" for part in fields(Scenario)},
+    head = [
+        f"The approach of {source}, written by infoset scenarios from-states.",
+        "x is along the line of approach (S of the B-plane), y along T, z along R; the origin is "
+        "the spacecraft.",
+        f"Start: {found.start_s / 86400.0:.6g} d after the epoch, {found.flight_s:.6g} s before "
+        "the closest approach.",
+        f"Closest approach without impulses: B.T = {t_km:.6g} km, B.R = {r_km:.6g} km.",
+        f"Until then gravity changes the closing speed by {found.speed_change_m_s:.3g} m/s and "
+        "turns the line of approach by",
+        f"{found.turn_rad:.3g} rad; B.T and B.R are in the plane across the line at the start.",
+        *map(on_a_screen, about_states),
+        f"What is not explained here has the values of {like}: replace them by yours.",
+    ]
+    comments = _comments(like, sigmas)
+    lines = []
+    for line in to_toml(scenario).replace("], [", "],\n    [").splitlines():
+        if line in comments:
+            line += f"  # {comments[line]}"
+        lines.append(line)
+    return "\n".join([*(f"# {line}" for line in head), *lines]) + "\n"
+
+
+def _comments(like: str, sigmas: float) -> dict[str, str]:
+    """Return the comments of the tables of a scenario file."""
+    comments = {f"[{part.name}]": f"as {like}" for part in fields(Scenario)}
+    return comments | {
         "[sun]": (
             "the attracting body, its direction from the spacecraft, and the velocity of the "
             "spacecraft from it"
@@ -289,16 +310,13 @@ def _text(
             f"true starts are within {sigmas:g} sigma; those of the covariance beyond are drawn "
             "again"
         ),
-        "[covariance]": "of the start, components y, z, x and their rates; lower triangle of the correlations",
+        "[covariance]": (
+            "of the start, components y, z, x and their rates; lower triangle of the correlations"
+        ),
         "[camera]": f"as {like}; centroid_error_m depends on the size of the target",
         "[body]": "of --body-radius-m",
         "[information_set]": f"as {like}, but the disturbance",
     }
-    lines = []
-    for line in to_toml(scenario).replace("], [", "],\n    [").splitlines():
-        comment = comments.get(line)
-        lines.append(f"{line}  # {comment}" if comment else line)
-    return head + "\n".join(lines) + "\n"
 
 
 def _pair(trajectory: Trajectory, folder: Path, folders: Sequence[Path], source: str) -> _Pair:
@@ -309,7 +327,9 @@ def _pair(trajectory: Trajectory, folder: Path, folders: Sequence[Path], source:
             craft.oem: _oem(craft.oem, folder, folders) for craft in crafts if craft.oem is not None
         }
         epoch = _epoch(trajectory, is_needed=bool(messages))
-        scale = "" if epoch is None else craft_state.epoch_scale(epoch, list(messages.values()))
+        scale = ""
+        if epoch is not None:
+            scale = craft_state.epoch_scale(epoch, list(messages.values()))
 
         states = []
         for craft in crafts:
@@ -365,8 +385,9 @@ def _spice_craft(
     folder: Path,
     folders: Sequence[Path],
 ) -> CraftState:
-    """Return the state of a body of SPICE kernels; other epochs than those of `parse_epoch` are
-    read by SPICE.
+    """Return the state of a body of SPICE kernels.
+
+    SPICE reads the epochs that `parse_epoch` does not know.
     """
     files = kernels.kernel_files(trajectory.kernels, folder, folders)
     with kernels.loaded(files) as spice:
@@ -388,24 +409,21 @@ def _spice_craft(
 def _covariance(
     trajectory: Trajectory, one: CraftState, other: CraftState, source: str
 ) -> tuple[Floats, list[str]]:
-    """Return the covariance of the relative state, and a line about it if it is that of OEM
-    files.
-    """
+    """Return the covariance of the relative state, and a line about OEM files that give it."""
     if trajectory.covariance is not None:
         return trajectory.covariance.matrix, []
-    found = {
-        craft.source: craft.covariance for craft in (one, other) if craft.covariance is not None
-    }
+    found = {}
+    texts = []
+    for craft in (one, other):
+        if craft.covariance is not None:
+            found[craft.source] = craft.covariance
+            texts.append(f"{craft.source} (axes: {craft.covariance_frame})")
     if not found:
         raise InputError(
             f"{source}: covariance: is missing, and the OEM files have none; write the table "
             "[covariance]"
         )
-    named = " and ".join(
-        f"{craft.source} (axes: {craft.covariance_frame})"
-        for craft in (one, other)
-        if craft.covariance is not None
-    )
+    named = " and ".join(texts)
     if len(found) == 1:
         note = f"covariance: that of {named}; the other state is taken as exact"
     else:
@@ -422,9 +440,7 @@ def _covariance(
 
 
 def _check_accuracy(pair: _Pair, source: str) -> None:
-    """Refuse states that the tables give with greater errors than the covariance claims: both
-    cannot be right.
-    """
+    """Refuse states whose interpolation has greater errors than the covariance claims."""
     errors = pair.spacecraft.error + pair.object.error
     variances = pair.covariance.diagonal()
     claimed = np.sqrt([variances[:3].sum(), variances[3:].sum()])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from infoset import InitialSet, Model
-from infoset.experiments.interception.course import MAX_STEPS, complete_steps, kept_steps
+from infoset.experiments.interception.course import MAX_SHOWN_STEPS, complete_steps, kept_steps
 from infoset.experiments.interception.page import interception_page
 from infoset.experiments.interception.scenario_file import load_scenario
 from infoset.guidance import NoiseKind
@@ -107,7 +107,7 @@ def test_a_long_flight_is_thinned(open_page: Open, long_flight: Record, screensh
     kept = kept_steps(record)
     fired = np.flatnonzero(record.impulse_m_s.any(axis=1)).tolist()
     assert record.steps > 1000
-    assert len(kept) <= MAX_STEPS
+    assert len(kept) <= MAX_SHOWN_STEPS
     assert {0, record.steps - 1, *fired} <= set(kept)
     assert 1 <= len(fired) <= 4
     assert len(html.encode()) < 4_000_000

@@ -21,7 +21,7 @@ from infoset import InitialSet, Model, RateSensor, Recovery
 from infoset.experiments.common.page_document import embedded_json, page
 from infoset.experiments.interception.page import (
     STEPS_OF_A_BOX,
-    TOLERANCE,
+    OUTLINE_TOLERANCE,
     computed_again,
     interception_page,
     packed_outlines,
@@ -148,7 +148,9 @@ def test_outlines_of_long_flights_have_few_vertices() -> None:
     turns = np.linspace(0.0, 2.0 * np.pi, 400, endpoint=False)
     circle = np.column_stack([np.cos(turns), np.sin(turns)])
     triangle = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]])
-    packed = packed_outlines([circle, triangle, triangle[:1], triangle[:2], circle], TOLERANCE)
+    packed = packed_outlines(
+        [circle, triangle, triangle[:1], triangle[:2], circle], OUTLINE_TOLERANCE
+    )
     counts = np.frombuffer(base64.b64decode(packed["counts"]), dtype="<u4")
     assert counts[1:4].tolist() == [3, 1, 2]
     assert 20 < counts[0] == counts[4] < 150
@@ -157,6 +159,6 @@ def test_outlines_of_long_flights_have_few_vertices() -> None:
     ]
     drawn = 2.0 * grid / STEPS_OF_A_BOX - 1.0
     chords = 0.5 * (drawn + np.roll(drawn, 1, axis=0))
-    assert np.hypot(*chords.T).min() > 1.0 - 2.0 * TOLERANCE - 1e-4
+    assert np.hypot(*chords.T).min() > 1.0 - 2.0 * OUTLINE_TOLERANCE - 1e-4
     boxes = np.frombuffer(base64.b64decode(packed["boxes"])).reshape(-1, 4)
     np.testing.assert_allclose(boxes[0], [-1.0, -1.0, 1.0, 1.0])

@@ -22,9 +22,12 @@ from infoset.experiments.interception.figures.shared import count_down
 from infoset.sim import Record
 
 DURATION_S = 8.0
+"""Duration of an animation, s."""
 COLOURS = 16
+"""Number of colours of an image: the figures have fewer, and the file is a third as large."""
 
 _SECTIONS = 7
+"""Maximum number of sections of a set."""
 
 
 @style()
@@ -41,13 +44,17 @@ def animate(
     clock = Clock.of(records)
     chosen = _frame_times(records, clock, max_frames)
     traces = traces_of(records)
-    width_mm, width_px = (
-        (120.0, 425) if len(traces) == 1 else (85.0 * len(traces), 320 * len(traces))
-    )
+    width_mm = 120.0
+    width_px = 425
+    if len(traces) > 1:
+        width_mm = 85.0 * len(traces)
+        width_px = 320 * len(traces)
     figure, (above, below) = subplots(
         135.0, 2, len(traces), width_mm=width_mm, height_ratios=[1.2, 1.0]
     )
     figure.set_dpi(width_px / figure.get_figwidth())
+
+    # The lower panels stay; a line moves in them.
     for axes, trace in zip(below, traces, strict=True):
         draw_predicted_miss(axes, trace, clock)
         if clock.counts_down:
@@ -57,6 +64,7 @@ def animate(
         axes.set_ylabel("predicted miss π, m")
     level_predicted_miss(below)
     lines = [axes.axvline(float(chosen[0]), color=INK, linewidth=1.0) for axes in below]
+
     canvas: Any = figure.canvas
     frames = []
     for index, time in enumerate(chosen.tolist()):
@@ -74,6 +82,7 @@ def animate(
         image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
         frames.append(image.quantize(COLOURS, dither=Image.Dither.NONE))
         progress((index + 1) / len(chosen))
+
     content = BytesIO()
     frame_ms = round(1000 * DURATION_S / len(frames))
     frames[0].save(
@@ -89,10 +98,13 @@ def animate(
 
 
 def _frame_times(records: Sequence[Record], clock: Clock, most: int) -> Floats:
-    """Return at most `most` times of steps, evenly distributed over the time axis or over the
-    steps.
+    """Return at most `most` times of steps.
+
+    They are evenly distributed over the time axis, or over the steps.
     """
     times = np.unique(np.concatenate([record.time_s for record in records]))
-    last = max(records, key=lambda record: record.scenario.nominal_arrival_s)
-    places = -np.log(clock.at(last, times)) if clock.counts_down else np.arange(len(times))
+    places: Floats = np.arange(len(times), dtype=np.float64)
+    if clock.counts_down:
+        last = max(records, key=lambda record: record.scenario.nominal_arrival_s)
+        places = -np.log(clock.at(last, times))
     return np.asarray(times[evenly(places, min(len(times), most))])

@@ -33,6 +33,9 @@ from infoset.sim import Results
 from infoset.sim.statistics import shows
 
 _MAX_COLUMNS = 3
+"""Maximum number of panels in a row of the sheet."""
+_FLAT = 1e-12
+"""Ratio of the variances at which points are on a line: the square of a rounding error of 1e-6."""
 _OWN_LIMITS_FROM = 3.0
 """Ratio of the maximum and the minimum median above which each panel has its own limits."""
 RADIUS_SHOWN = 2.0
@@ -40,10 +43,10 @@ RADIUS_SHOWN = 2.0
 shown.
 """
 _AT_BODY_SCALE = "at the scale of the body"
-_BODY_FROM, _BODY_SCALE = 4.0, 2.0
-"""Ratio of the axes and the radius of the body from which a second panel extends to some radii of
-the body.
-"""
+_BODY_FROM = 4.0
+"""Ratio of the axes to the radius of the body above which a second panel shows the body."""
+_BODY_SCALE = 2.0
+"""Length of half the axes of this panel, in radii of the body."""
 
 _CIRCLES: tuple[tuple[float, str, Any], ...] = (
     (0.5, "circle: median of the miss", "-"),
@@ -79,19 +82,22 @@ class Cloud:
 
 
 def cloud(title: str, samples: Sequence[Results]) -> Cloud:
-    """Return the misses of runs in space; with several results of the same runs, the worst result
-    of each run.
+    """Return the misses of runs in space.
+
+    With several results of the same runs, the worst result of each run is taken.
     """
     misses = np.array([results.miss_m for results in samples])
     has_axes = samples[0].b_plane_t_rad is not None
-    across = np.array(
-        [results.b_plane_m if has_axes else results.lateral_miss_m for results in samples]
-    )
+    if has_axes:
+        across = np.array([results.b_plane_m for results in samples])
+    else:
+        across = np.array([results.lateral_miss_m for results in samples])
     worst = misses.argmax(axis=0)
     runs = np.arange(misses.shape[1])
+
     bounds = [bound for bound in map(max_guarantee_m, samples) if bound is not None]
-    most_m = max(bounds) if len(bounds) == len(samples) else None
-    return Cloud(title, across[worst, runs], misses[worst, runs], most_m, has_axes)
+    guaranteed_m = max(bounds) if len(bounds) == len(samples) else None
+    return Cloud(title, across[worst, runs], misses[worst, runs], guaranteed_m, has_axes)
 
 
 def ellipse(across_m: Floats, level: float, within_m: float = np.inf) -> Floats | None:
@@ -101,16 +107,19 @@ def ellipse(across_m: Floats, level: float, within_m: float = np.inf) -> Floats 
     of their Mahalanobis radii. None if the points are on a line, or a part of it is beyond a
     distance that no point has.
     """
-    variances, axes = (
-        np.linalg.eigh(np.cov(across_m.T)) if len(across_m) > 2 else (np.zeros(2), np.eye(2))
-    )
-    if variances[0] <= 1e-12 * variances[1]:
+    if len(across_m) <= 2:
         return None
+    variances, axes = np.linalg.eigh(np.cov(across_m.T))
+    if variances[0] <= _FLAT * variances[1]:
+        return None
+
     centre = across_m.mean(axis=0)
     scaled = axes * np.sqrt(variances)
     radii = np.linalg.norm(np.linalg.solve(scaled, (across_m - centre).T), axis=0)
     outline = np.asarray(centre[:, None] + scaled @ ring(float(np.quantile(radii, level))))
-    return None if np.hypot(*outline).max() > within_m else outline
+    if np.hypot(*outline).max() > within_m:
+        return None
+    return outline
 
 
 @style()
@@ -124,11 +133,15 @@ def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figu
     beside the misses, each cloud has a second panel at the scale of the body.
     """
     medians = [float(np.median(each.miss_m)) for each in clouds]
-    alone = max(medians) > _OWN_LIMITS_FROM * min(medians)
-    halves = [_half_width([each] if alone else clouds, radius_m) for each in clouds]
+    has_own_limits = max(medians) > _OWN_LIMITS_FROM * min(medians)
+    halves = [_half_width([each] if has_own_limits else clouds, radius_m) for each in clouds]
     if radius_m is not None and max(halves) > _BODY_FROM * radius_m:
         halves += [_BODY_SCALE * radius_m] * len(clouds)
-    columns = min(_MAX_COLUMNS, len(clouds)) if len(clouds) > 1 else len(halves)
+
+    # A single cloud has its two panels in one row.
+    columns = len(halves)
+    if len(clouds) > 1:
+        columns = min(_MAX_COLUMNS, len(clouds))
     rows = -(-len(halves) // columns)
     figure, grid = subplots(40.0 + 68.0 * rows, rows, columns, width_mm=56.0 * columns + 22.0)
     panels = first_panels(grid, len(halves))
@@ -137,62 +150,35 @@ def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figu
         zip(panels, itertools.cycle(clouds), halves, strict=False)
     ):
         lines = _draw_cloud(axes, each, half, radius_m)
-        titles.append(
-            "\n".join(
-                [
-                    plain(each.title),
-                    *(lines if place < len(clouds) else [_AT_BODY_SCALE, lines[-1]]),
-                ]
-            )
-        )
+        if place >= len(clouds):
+            lines = [_AT_BODY_SCALE, lines[-1]]
+        titles.append("\n".join([plain(each.title), *lines]))
     letters(panels, titles, fontsize="small")
-    note = "The scale differs from panel to panel." if len(set(halves)) > 1 else None
+
+    note = None
+    if len(set(halves)) > 1:
+        note = "The scale differs from panel to panel."
     legend_below(figure, min(2, columns), title=note)
     return figure
 
 
 def _half_width(clouds: Sequence[Cloud], radius_m: float | None) -> float:
-    """Return half the length of the axes: the misses and, if not much greater, the radius of the
-    body and Φ.
+    """Return half the length of the axes, so that all misses are visible.
+
+    The radius of the body and Φ are visible, too, if they are not much greater.
     """
     maximum = axis_limit([each.miss_m for each in clouds]) or 1.0
-    sizes = [
-        size for size in (radius_m, *(each.guaranteed_m for each in clouds)) if size is not None
-    ]
-    return 1.08 * max([maximum, *(size for size in sizes if size <= RADIUS_SHOWN * maximum)])
+    half = maximum
+    for size in (radius_m, *(each.guaranteed_m for each in clouds)):
+        if size is not None and size <= RADIUS_SHOWN * maximum:
+            half = max(half, size)
+    return 1.08 * half
 
 
 def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) -> list[str]:
-    """Draw the points and lines of a panel, and return lines about the miss: quantiles, the bound,
-    and hits.
-    """
+    """Draw the points and lines of a panel, and return the lines of its title."""
     count = len(each.miss_m)
-    known = []
-    size = float(np.clip(45.0 / np.sqrt(count), 1.6, 3.5))
-    alpha = float(np.clip(30.0 / np.sqrt(count), 0.35, 0.8))
-    point: dict[str, Any] = {
-        "color": SET_EDGE,
-        "marker": "o",
-        "linestyle": "none",
-        "markeredgewidth": 0.0,
-    }
-    point |= {"markersize": size, "alpha": alpha, "rasterized": count > MAX_VECTORS}
-    point["zorder"] = 3.2  # the white edge of a circle would hide the points on it
-    axes.plot(*each.across_m.T, label="miss of one run", **point)
-    line: dict[str, Any] = {"path_effects": [*HALO, Normal()], "zorder": 3.0}
-    for level, name, dashes in _CIRCLES:
-        if shows(count, level):
-            quantile = float(np.quantile(each.miss_m, level))
-            axes.plot(
-                *ring(quantile), label=name, color=GAME, linestyle=dashes, linewidth=0.9, **line
-            )
-            known.append(
-                f"{'median' if level == 0.5 else f'{100 * level:g} %'} {number(quantile)} m"
-            )
-    within_m = np.inf if each.guaranteed_m is None else each.guaranteed_m
-    for level, name, dashes in _ELLIPSES:
-        if shows(count, level) and (outline := ellipse(each.across_m, level, within_m)) is not None:
-            axes.plot(*outline, label=name, color=TRUTH, linestyle=dashes, **line)
+    known = _draw_points(axes, each)
     draw_body(axes, half, each.guaranteed_m, radius_m)
     if each.has_axes:
         axes.set(xlabel=r"$B\cdot T$, m", ylabel=r"$B\cdot R$, m", ylim=(half, -half))
@@ -202,20 +188,53 @@ def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) ->
             "xycoords": "axes fraction",
             "ha": "right",
             "va": "bottom",
+            "fontsize": "small",
             "path_effects": HALO,
+            "zorder": 5.0,
         }
-        axes.annotate(
-            f"beyond the axes: {outside} of {count}",
-            (0.97, 0.03),
-            fontsize="small",
-            zorder=5.0,
-            **place,
-        )
+        axes.annotate(f"beyond the axes: {outside} of {count}", (0.97, 0.03), **place)
+
     lines = [", ".join(known)]
-    lines += [] if each.guaranteed_m is None else [f"maximum Φ {number(each.guaranteed_m)} m"]
-    lines += (
-        []
-        if radius_m is None
-        else [f"hits: {int((each.miss_m <= radius_m).sum())} of {some_runs(count)}"]
-    )
+    if each.guaranteed_m is not None:
+        lines.append(f"maximum Φ {number(each.guaranteed_m)} m")
+    if radius_m is not None:
+        hits = int((each.miss_m <= radius_m).sum())
+        lines.append(f"hits: {hits} of {some_runs(count)}")
     return lines
+
+
+def _draw_points(axes: Axes, each: Cloud) -> list[str]:
+    """Draw the misses with circles and ellipses, and return the quantiles as text.
+
+    Many points are smaller and paler.
+    """
+    count = len(each.miss_m)
+    point: dict[str, Any] = {
+        "color": SET_EDGE,
+        "marker": "o",
+        "linestyle": "none",
+        "markeredgewidth": 0.0,
+        "markersize": float(np.clip(45.0 / np.sqrt(count), 1.6, 3.5)),
+        "alpha": float(np.clip(30.0 / np.sqrt(count), 0.35, 0.8)),
+        "rasterized": count > MAX_VECTORS,
+        "zorder": 3.2,  # the white edge of a circle would hide the points on it
+    }
+    axes.plot(*each.across_m.T, label="miss of one run", **point)
+
+    known = []
+    line: dict[str, Any] = {"path_effects": [*HALO, Normal()], "zorder": 3.0}
+    for level, name, dashes in _CIRCLES:
+        if shows(count, level):
+            quantile = float(np.quantile(each.miss_m, level))
+            circle = ring(quantile)
+            axes.plot(*circle, label=name, color=GAME, linestyle=dashes, linewidth=0.9, **line)
+            level_text = "median" if level == 0.5 else f"{100 * level:g} %"
+            known.append(f"{level_text} {number(quantile)} m")
+
+    within_m = np.inf
+    if each.guaranteed_m is not None:
+        within_m = each.guaranteed_m
+    for level, name, dashes in _ELLIPSES:
+        if shows(count, level) and (outline := ellipse(each.across_m, level, within_m)) is not None:
+            axes.plot(*outline, label=name, color=TRUTH, linestyle=dashes, **line)
+    return known

@@ -1,6 +1,4 @@
-"""The lower bound of the miss that any strategy can guarantee: over the label, its pair, and
-strategies against it.
-"""
+"""The lower bound of the miss: over the label, its pair, and strategies against it."""
 
 from __future__ import annotations
 
@@ -37,7 +35,10 @@ _LOOKS = tuple(
 _CORRECTED: dict[str, Any] = {"linewidth": 0.8, "linestyle": ":"}
 _COLUMN_MM = 88.0
 _WIDE = 8.0
-"""Ratio of the maximum miss to the bound from which the axis of misses is logarithmic."""
+"""Ratio of the maximum miss to the bound from which the axis of misses is logarithmic.
+
+On a linear axis the bound would be in the first tenth.
+"""
 _SECONDS_SHOWN = 3.0
 """Length of the time axis, in durations between the last equal measurement and the arrival."""
 
@@ -46,8 +47,7 @@ _SECONDS_SHOWN = 3.0
 def draw_bound(
     scenario: Scenario, lower: LowerBound, worst_m: Mapping[str, float] | None = None
 ) -> Figure:
-    """Draw the bound in one column: over the label, the true states that prove it, and the misses
-    of strategies.
+    """Draw the bound in one column: over the label, its proof, and misses of strategies.
 
     Panel (a) has one curve per closing speed, (b) the motions of the pair, (c) the maximum misses
     found, `worst_m`, m, by the name of the strategy; without them it is left out. The bound is the
@@ -72,6 +72,7 @@ def draw_bound(
 
 
 def _draw_labels(axes: Axes, lower: LowerBound) -> None:
+    """Draw the bound over the label, for each closing speed, and mark its maximum."""
     for look, speed in zip(_LOOKS, lower.speeds_m_s, strict=False):
         labels_m, bounds_m = lower.curve(speed)
         # No lines: the bound ripples over the distance of one step, and only some stretches of
@@ -79,28 +80,22 @@ def _draw_labels(axes: Axes, lower: LowerBound) -> None:
         axes.plot(
             labels_m / 1e3, bounds_m, label=f"{-speed / 1e3:g} km/s", linestyle="none", **look
         )
+
     pair = lower.pair
-    axes.plot(
-        pair.label_m / 1e3,
-        pair.bound_m,
-        marker="*",
-        markersize=9.0,
-        color=INK,
-        linestyle="none",
-        zorder=5,
-    )
-    right = 2e-3 * pair.label_m > sum(axes.get_xlim())  # in the right half
-    place: dict[str, Any] = {
-        "xytext": (-7.0 if right else 7.0, 3.0),
-        "ha": "right" if right else "left",
-    }
+    label_km = pair.label_m / 1e3
+    star: dict[str, Any] = {"marker": "*", "markersize": 9.0, "linestyle": "none"}
+    axes.plot(label_km, pair.bound_m, color=INK, zorder=5, **star)
+    place: dict[str, Any] = {"xytext": (7.0, 3.0), "ha": "left"}
+    if 2e-3 * pair.label_m > sum(axes.get_xlim()):  # in the right half
+        place = {"xytext": (-7.0, 3.0), "ha": "right"}
     axes.annotate(
         f"{pair.bound_m:.1f} m",
-        (pair.label_m / 1e3, pair.bound_m),
+        (label_km, pair.bound_m),
         color=INK,
         textcoords="offset points",
         **place,
     )
+
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.6 * (high - low))  # space for the legend
     axes.set(xlabel="label: range at $t = 0$, km", ylabel="bound of the miss, m")
@@ -108,40 +103,46 @@ def _draw_labels(axes: Axes, lower: LowerBound) -> None:
 
 
 def _draw_pair(axes: Axes, scenario: Scenario, lower: LowerBound) -> None:
+    """Draw the motions of the pair that proves the bound, or its single motion."""
     pair = lower.pair
-    model = scenario.set_model
-    direction = _direction(pair)
-    half = direction @ pair.track_m
+    step_s = scenario.set_model.step_s
+    if pair.is_single:
+        alike_until = np.inf
+        last_common_step = -1
+        motions = [(1.0, "no impulses", _FIRST)]
+        title = "offset without impulses, m"
+    else:
+        alike_until = pair.arrival_s - pair.last_common_step * step_s
+        last_common_step = pair.last_common_step
+        mark: dict[str, Any] = {"marker": "o", "markersize": 2.2}
+        motions = [
+            (1.0, "first state, equal impulses", _FIRST | mark),
+            (-1.0, "second state", _SECOND | mark),
+        ]
+        title = "offset from the midpoint, m"
+
+    half = _direction(pair) @ pair.track_m
     to_go = pair.arrival_s - pair.times_s
-    alike_until = (
-        np.inf if pair.is_single else pair.arrival_s - pair.last_common_step * model.step_s
-    )
-    shown = float(min(_SECONDS_SHOWN * alike_until + 2.0 * model.step_s, to_go[0]))
+    shown = float(min(_SECONDS_SHOWN * alike_until + 2.0 * step_s, to_go[0]))
     top = float(half[-1])
+    bottom = 0.0
     if not pair.is_single:
         top = max(top, _draw_equal_measurements(axes, scenario, pair, shown))
         axes.vlines(alike_until, -top, top, **BOUND)
-    given_s, sizes = later_impulses(
-        scenario, -1 if pair.is_single else pair.last_common_step, pair.arrival_s
-    )
+        bottom = -1.12 * top
+
+    given_s, sizes = later_impulses(scenario, last_common_step, pair.arrival_s)
     corrected = half - np.maximum(pair.times_s[:, None] - given_s, 0.0) @ sizes
-    after = to_go <= alike_until + 1e-9
-    mark: dict[str, Any] = {} if pair.is_single else {"marker": "o", "markersize": 2.2}
-    without = "no impulses" if pair.is_single else "first state, equal impulses"
-    for sign, look, name in ((1.0, _FIRST, without), (-1.0, _SECOND, "second state"))[
-        : 1 if pair.is_single else 2
-    ]:
-        axes.plot(to_go, sign * half, label=name, **look, **mark)
+    after = to_go <= alike_until + 1e-9  # with rounding errors of the times
+    for sign, name, look in motions:
+        axes.plot(to_go, sign * half, label=name, **look)
         axes.plot(to_go[after], sign * corrected[after], color=look["color"], **_CORRECTED)
     axes.plot(
         [], [], color=INK, label=f"corrected by at most {pair.correction_m:.1f} m", **_CORRECTED
     )
-    axes.set_xlim(shown, 0.0)
-    axes.set_ylim(0.0 if pair.is_single else -1.12 * top, 2.2 * top)  # space for the legend
-    axes.set_xlabel("time to go, s")
-    axes.set_ylabel(
-        "offset without impulses, m" if pair.is_single else "offset from the midpoint, m"
-    )
+
+    axes.set(xlim=(shown, 0.0), ylim=(bottom, 2.2 * top))  # space for the legend
+    axes.set(xlabel="time to go, s", ylabel=title)
     axes.legend(loc="upper right", fontsize="small", borderaxespad=0.2)
 
 
@@ -152,6 +153,7 @@ def _direction(pair: TruthPair) -> Floats:
 
 
 def _draw_strategies(axes: Axes, bound_m: float, worst_m: Mapping[str, float]) -> None:
+    """Draw the maximum miss of each strategy beside the bound, the smallest on top."""
     rows = sorted(worst_m.items(), key=lambda item: item[1])
     places = np.arange(len(rows))
     misses = np.array([miss_m for _, miss_m in rows])
@@ -165,6 +167,8 @@ def _draw_strategies(axes: Axes, bound_m: float, worst_m: Mapping[str, float]) -
     beside: dict[str, Any] = {"xytext": (5.0, 0.0), "textcoords": "offset points", "va": "center"}
     for place, miss_m in zip(places, misses, strict=True):
         axes.annotate(f"{number(miss_m)} m", (miss_m, place), fontsize="small", **beside)
+
+    # Room for the numbers on the right.
     if bound_m > 0.0 and maximum > _WIDE * bound_m:
         axes.set(xscale="log", xlim=(0.6 * bound_m, maximum * (maximum / bound_m) ** 0.4))
         axes.xaxis.set_major_formatter("{x:g}")
@@ -178,8 +182,9 @@ def _draw_strategies(axes: Axes, bound_m: float, worst_m: Mapping[str, float]) -
 def _draw_equal_measurements(
     axes: Axes, scenario: Scenario, pair: TruthPair, shown: float
 ) -> float:
-    """Draw the limits of the offset of each state with equal measurements; return the largest one,
-    m.
+    """Draw the limits of the offset of each state with equal measurements.
+
+    Return the largest limit, m.
     """
     model = scenario.set_model
     fine = np.linspace(0.0, shown, 200)

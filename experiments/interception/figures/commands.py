@@ -28,27 +28,25 @@ from infoset.experiments.interception.study import Comparison, Curve, is_of_pape
 from infoset.sim import Record, Results, Scenario
 
 DEFAULT_TIMES = (0.5, 4.0, 8.0)
+"""Times of the paper's figure 3, s."""
 
 
 def draw_experiment(
     scenario: Scenario, curves: Sequence[Curve], courses: Sequence[Courses]
 ) -> Iterator[Figure]:
-    """Draw the distributions and the corridor, and in space the misses across the approach for each
-    noise.
-    """
+    """Draw the distributions and the corridor, and in space the misses across the approach."""
     of_paper = is_of_paper(scenario)
     printed = printed_single_runs() if of_paper else None
     yield draw_distributions(curves, scenario.radius_m, printed, numbered=of_paper)
     yield draw_corridor(curves, courses)
-    for noise in dict.fromkeys(curve.noise for curve in curves) if scenario.is_spatial else ():
-        clouds = [
-            cloud(
-                f"{noise} noise,\n{'with' if curve.range_sensor else 'no'} range sensor",
-                [curve.results],
-            )
-            for curve in curves
-            if curve.noise == noise
-        ]
+    if not scenario.is_spatial:
+        return
+    for noise in dict.fromkeys(curve.noise for curve in curves):
+        clouds = []
+        for curve in curves:
+            if curve.noise == noise:
+                sensor = "with" if curve.range_sensor else "no"
+                clouds.append(cloud(f"{noise} noise,\n{sensor} range sensor", [curve.results]))
         yield draw_b_plane(clouds, scenario.radius_m)
 
 
@@ -58,17 +56,21 @@ def draw_compared(scenario: Scenario, compared: Sequence[Comparison]) -> Iterato
     With game noise, the misses are those of the worst tie rule of a run.
     """
     yield draw_comparison(compared, scenario.radius_m)
-    for noise in dict.fromkeys(one.noise for one in compared) if scenario.is_spatial else ():
-        chosen = [one for one in compared if one.noise == noise]
+    if not scenario.is_spatial:
+        return
+    for noise in dict.fromkeys(one.noise for one in compared):
         clouds = [
-            cloud(f"{one.strategy}\n{one.noise_title}", [*one.results.values()]) for one in chosen
+            cloud(f"{one.strategy}\n{one.noise_title}", [*one.results.values()])
+            for one in compared
+            if one.noise == noise
         ]
         yield draw_b_plane(clouds, scenario.radius_m)
 
 
 def draw_flights(records: Sequence[Record], times_s: Sequence[float]) -> Iterator[Figure]:
-    """Draw one or two engagements: over time, their sets at some times, and their approach; no
-    times: the default.
+    """Draw one or two engagements: over time, their sets at some times, their approach.
+
+    Without times, the default times are shown.
     """
     yield draw_process(records)
     yield draw_sets(records, times_s or _default_times(records))
@@ -76,8 +78,9 @@ def draw_flights(records: Sequence[Record], times_s: Sequence[float]) -> Iterato
 
 
 def _default_times(records: Sequence[Record]) -> tuple[float, ...]:
-    """Return the times of figure 3, s: those of the paper, or in a long flight evenly over the
-    logarithm of time.
+    """Return the times of figure 3, s.
+
+    In a long flight, they are evenly distributed over the logarithm of the time before arrival.
     """
     if not Clock.of(records).counts_down:
         return DEFAULT_TIMES
@@ -95,8 +98,10 @@ def plot(results: Results | Record | Sequence[Record]) -> Figure:
         Results give the distributions of miss and impulse, each with its 95 % confidence band.
         Records give angle, rate, predicted miss and impulses over time (`draw_process`).
     """
-    if not isinstance(results, Results):
-        return draw_process([results] if isinstance(results, Record) else results)
-    return draw_samples(
-        [Sample(some_runs(len(results)), CURVE_LOOKS[1], results.miss_m, results.impulse_m_s)]
-    )
+    if isinstance(results, Record):
+        return draw_process([results])
+    if isinstance(results, Results):
+        name = some_runs(len(results))
+        sample = Sample(name, CURVE_LOOKS[1], results.miss_m, results.impulse_m_s)
+        return draw_samples([sample])
+    return draw_process(results)

@@ -1,6 +1,4 @@
-"""The corridor of many runs: quantiles of possible misses and of impulses against the time before
-arrival.
-"""
+"""The corridor of many runs: possible misses and impulses over the time before arrival."""
 
 from __future__ import annotations
 
@@ -66,8 +64,10 @@ def draw_corridor(curves: Sequence[Curve], courses: Sequence[Courses]) -> Figure
         first.set_ylabel("possible miss, m")
         second.set_ylabel("impulse, m/s")
         second.tick_params(labelbottom=True)
-        sensor = f", {'' if curve.range_sensor else 'no '}range sensor" if len(curves) > 2 else ""
-        titles.append(f"{curve.noise} noise{sensor}, {some_runs(len(course.possible_m))}")
+        title = f"{curve.noise} noise"
+        if len(curves) > 2:
+            title += ", range sensor" if curve.range_sensor else ", no range sensor"
+        titles.append(f"{title}, {some_runs(len(course.possible_m))}")
     letters(above, titles)
     for level in (above, below):
         limits = np.array([axes.get_ylim() for axes in level])

@@ -26,7 +26,7 @@ from infoset.experiments.interception.study import Curve
 from infoset.sim import empirical_distribution
 
 MAX_POINTS = 2000
-"""Most points of a curve; more would only make the file larger."""
+"""Maximum number of points of a curve: a panel has fewer pixels."""
 
 _DOTTED: dict[str, Any] = {"linestyle": (0, (1, 1.2)), "linewidth": 0.9}
 _RUN: dict[str, Any] = {
@@ -38,8 +38,9 @@ _RUN: dict[str, Any] = {
 }
 _BAND = "95 % confidence band (Dvoretzky-Kiefer-Wolfowitz)"
 _LOGARITHMIC_FROM = 50.0
-"""Ratio of the end of the axis of the miss to the smallest median, or to the radius, above which it
-is logarithmic.
+"""Ratio of the end of the axis of the miss to the smallest median above which it is logarithmic.
+
+The radius of the body counts as a median.
 """
 _MIN_SHOWN = 0.01
 """Quantile at which a logarithmic axis starts: misses can be arbitrarily small."""
@@ -95,8 +96,9 @@ def draw_distributions(
 def draw_samples(
     samples: Sequence[Sample], radius_m: float | None = None, runs: Sequence[Sample] = ()
 ) -> Figure:
-    """Draw the distribution functions of (a) the miss and (b) the impulse spent, with their 95 %
-    confidence bands.
+    """Draw the distribution functions of (a) the miss and (b) the impulse spent.
+
+    They have their 95 % confidence bands.
 
     Where a few values are far beyond the others, the axis ends before them and its label says how
     many; where the curves or the radius lie decades apart, the axis of the miss is logarithmic. The
@@ -109,62 +111,56 @@ def draw_samples(
     bounds = [sample.guaranteed_miss_m for sample in samples if sample.guaranteed_miss_m.size]
     scale_misses(left, [*misses, *bounds], radius_m)
     minimum = min(float(each.min()) for each in impulses)
-    limit = axis_limit(impulses)
-    limit = max([limit, *(float(run.impulse_m_s.max()) for run in runs)])
+    limit = max([axis_limit(impulses), *(float(run.impulse_m_s.max()) for run in runs)])
     margin = 0.05 * (limit - minimum) or 0.5
     right.set(xlim=(max(0.0, minimum - margin), limit + margin), ylim=(-0.02, 1.02))
+
     for sample in samples:
         _draw_curve(left, sample.miss_m, sample.look, sample.name)
         _draw_curve(right, sample.impulse_m_s, sample.look, sample.name)
         if sample.guaranteed_miss_m.size:
-            _draw_curve(
-                left,
-                sample.guaranteed_miss_m,
-                sample.look | _DOTTED,
-                sample.guaranteed_name,
-                banded=False,
-            )
+            dotted = sample.look | _DOTTED
+            name = sample.guaranteed_name
+            _draw_curve(left, sample.guaranteed_miss_m, dotted, name, banded=False)
     for run in runs:
         left.plot(run.miss_m, [0.0], label=run.name, **_RUN | run.look)
         right.plot(run.impulse_m_s, [0.0], **_RUN | run.look)
     left.fill_between([], [], facecolor=LIMIT, alpha=0.3, label=_BAND)
     draw_radius(left, radius_m)
+
     left.set_ylabel("share of runs")
     letters(panels, ("miss", "impulse spent"))
-    left.set_xlabel(
-        "\n".join(
-            ["miss, m", *_beyond(left, "runs", misses), *_beyond(left, "guaranteed misses", bounds)]
-        )
-    )
+    beyond = [*_beyond(left, "runs", misses), *_beyond(left, "guaranteed misses", bounds)]
+    left.set_xlabel("\n".join(["miss, m", *beyond]))
     right.set_xlabel("\n".join(["impulse spent, m/s", *_beyond(right, "runs", impulses)]))
     legend_below(figure, 2)
     return figure
 
 
 def scale_misses(axes: Axes, samples: Sequence[Floats], radius_m: float | None) -> None:
-    """Scale the axis of the misses so that every sample and the radius are visible: logarithmic if
-    decades apart.
+    """Scale the axis of the misses so that every sample and the radius are visible.
+
+    It is logarithmic if they lie decades apart.
     """
-    sizes = [float(np.median(sample)) for sample in samples] + (
-        [] if radius_m is None else [radius_m]
-    )
-    if 0.0 < _LOGARITHMIC_FROM * min(sizes) < axis_limit(samples):
-        firsts = [float(np.quantile(sample[sample > 0.0], _MIN_SHOWN)) for sample in samples]
-        axes.set(
-            xscale="log",
-            xlim=(0.5 * min(*firsts, *sizes), 2.0 * max(float(sample.max()) for sample in samples)),
-        )
-        plain_ticks(axes.xaxis)
-    else:
+    sizes = [float(np.median(sample)) for sample in samples]
+    if radius_m is not None:
+        sizes.append(radius_m)
+    if not 0.0 < _LOGARITHMIC_FROM * min(sizes) < axis_limit(samples):
         axes.set_xlim(0.0, 1.04 * axis_limit(samples) or 0.5)
+        return
+    firsts = [float(np.quantile(sample[sample > 0.0], _MIN_SHOWN)) for sample in samples]
+    low = 0.5 * min(*firsts, *sizes)
+    high = 2.0 * max(float(sample.max()) for sample in samples)
+    axes.set(xscale="log", xlim=(low, high))
+    plain_ticks(axes.xaxis)
 
 
 def axis_limit(samples: Sequence[Floats]) -> float:
     """Return the end of an axis: beyond all values, or of all but a few very large ones.
 
-    It is the maximum value if that is at most twice the farthest upper fence (upper quartile and
-    three times the distance between the quartiles) of the samples, else the maximum value within
-    half as much again as that fence.
+    It is the maximum value, if this is at most twice the farthest upper fence of the samples: the
+    upper quartile and three times the distance between the quartiles. Otherwise it is the maximum
+    value within 1.5 times this fence.
     """
     quartiles = [np.quantile(sample, (0.25, 0.75)) for sample in samples]
     fence = max(float(upper + 3.0 * (upper - lower)) for lower, upper in quartiles)
@@ -175,27 +171,25 @@ def axis_limit(samples: Sequence[Floats]) -> float:
 
 
 def _beyond(axes: Axes, name: str, samples: Sequence[Floats]) -> list[str]:
-    """Return a note with the number of values beyond a horizontal axis; none without such
-    values.
-    """
+    """Return a note with the number of values beyond a horizontal axis; none without such values."""
     count = sum(int((sample > axes.get_xlim()[1]).sum()) for sample in samples)
-    return (
-        [f"{name} beyond the axis: {count} of {sum(sample.size for sample in samples)}"]
-        if count
-        else []
-    )
+    if not count:
+        return []
+    return [f"{name} beyond the axis: {count} of {sum(sample.size for sample in samples)}"]
 
 
 def draw_radius(axes: Axes, radius_m: float | None) -> None:
     """Draw the radius of the body, if it is known, as a line on a scaled axis of misses."""
     if radius_m is None:
         return
-    inside = radius_m <= axes.get_xlim()[1]
-    label = (
-        f"body radius, {radius_m:g} m: {'a smaller miss is a hit' if inside else 'beyond the axis'}"
-    )
-    axes.plot([radius_m, radius_m] if inside else [], [0.0, 1.0] if inside else [], label=label,
-              transform=axes.get_xaxis_transform(), **RADIUS)  # fmt: skip
+    label = f"body radius, {radius_m:g} m"
+    look = RADIUS | {"transform": axes.get_xaxis_transform()}
+    if radius_m <= axes.get_xlim()[1]:
+        axes.plot(
+            [radius_m, radius_m], [0.0, 1.0], label=f"{label}: a smaller miss is a hit", **look
+        )
+    else:
+        axes.plot([], [], label=f"{label}: beyond the axis", **look)
 
 
 def _draw_curve(

@@ -35,13 +35,12 @@ from infoset.sensors import BearingSensor
 from infoset.sim import Record
 
 RANGE_SHARE = 0.1
-"""Share of the first range below which values do not set the limits: angle and rate grow as 1/x and
-1/x^2.
+"""Share of the first range below which values do not set the limits.
+
+Angle and rate grow as 1/x and 1/x^2 there.
 """
 _MIN_RATE = 0.02
-"""Quantile of the moduli of the rates at which their logarithmic axis starts: a rate can be
-zero.
-"""
+"""Quantile of the moduli of the rates at which their logarithmic axis starts: a rate can be 0."""
 _ZERO: dict[str, Any] = {"color": LIMIT, "linewidth": 0.6}
 
 Trace = tuple[Record, int]
@@ -50,13 +49,14 @@ Trace = tuple[Record, int]
 
 @style()
 def draw_process(records: Sequence[Record]) -> Figure:
-    """Draw angle, angular rate, impulse and predicted miss over time, one column per record and
-    lateral axis.
+    """Draw angle, angular rate, impulse and predicted miss over time.
+
+    There is one column per record and lateral axis.
 
     The axes of a row have the same limits. At least one record is needed. On a logarithmic time
     axis (`Clock`), where angle and rate grow by many decades, the angle is replaced by the error of
-    its measurement with its bound, the rate by its modulus, and the predicted miss has that of the
-    true state.
+    its measurement with its bound, the rate by its modulus, and the predicted miss of the true
+    state is drawn, too.
     """
     if not records:
         raise ValueError("at least one record is needed")
@@ -70,22 +70,12 @@ def draw_process(records: Sequence[Record]) -> Figure:
         traces = traces_of([record])
         grid = part.subplots(4, len(traces), squeeze=False, sharex=True, sharey="row")
         for trace, column in zip(traces, grid.T, strict=True):
-            angle, rate, impulse, miss = column
-            rate.axhline(0.0, **_ZERO)
-            if clock.counts_down:
-                _draw_angle_error(angle, trace, clock)
-                _draw_sight(rate, trace, clock, "rate", is_modulus=True)
-                count_down(column, record.scenario)
-            else:
-                _draw_sight(angle, trace, clock, "angle")
-                _draw_sight(rate, trace, clock, "rate")
-                miss.set_xlabel("time t, s")
-            _draw_impulse(impulse, trace, clock, impulse_m_s)
-            draw_predicted_miss(miss, trace, clock)
+            _draw_column(column, trace, clock, impulse_m_s)
             if len(traces) > 1:
-                angle.set_title(f"along {record.scenario.set_model.axes[trace[1]]}")
+                column[0].set_title(f"along {record.scenario.set_model.axes[trace[1]]}")
         _name_rows(grid[:, 0], clock)
         grids.append(grid)
+
     angles, rates, impulses, misses = np.hstack(grids)
     if clock.counts_down:
         _level_errors(angles, traces_of(records))
@@ -100,6 +90,22 @@ def draw_process(records: Sequence[Record]) -> Figure:
     return figure
 
 
+def _draw_column(column: Sequence[Axes], trace: Trace, clock: Clock, impulse_m_s: float) -> None:
+    """Draw the four panels of an engagement along one lateral axis."""
+    angle, rate, impulse, miss = column
+    rate.axhline(0.0, **_ZERO)
+    if clock.counts_down:
+        _draw_angle_error(angle, trace, clock)
+        _draw_sight(rate, trace, clock, "rate", is_modulus=True)
+        count_down(column, trace[0].scenario)
+    else:
+        _draw_sight(angle, trace, clock, "angle")
+        _draw_sight(rate, trace, clock, "rate")
+        miss.set_xlabel("time t, s")
+    _draw_impulse(impulse, trace, clock, impulse_m_s)
+    draw_predicted_miss(miss, trace, clock)
+
+
 def traces_of(records: Sequence[Record]) -> list[Trace]:
     """Return the columns of figures: each record with each of its lateral axes."""
     return [
@@ -108,21 +114,21 @@ def traces_of(records: Sequence[Record]) -> list[Trace]:
 
 
 def _name_rows(rows: Sequence[Axes], clock: Clock) -> None:
-    down = clock.counts_down
-    rows[0].set_ylabel("error of α, µrad" if down else "angle α, mrad")
-    rows[1].set_ylabel("modulus of ω, µrad/s" if down else "rate ω, µrad/s")
-    rows[2].set_ylabel("impulse, m/s")
-    rows[3].set_ylabel("predicted miss π, m")
+    names = ["angle α, mrad", "rate ω, µrad/s", "impulse, m/s", "predicted miss π, m"]
+    if clock.counts_down:
+        names[:2] = ["error of α, µrad", "modulus of ω, µrad/s"]
+    for axes, name in zip(rows, names, strict=True):
+        axes.set_ylabel(name)
 
 
 _SCALE = {"angle": 1e3, "rate": 1e6}
-"""Number per SI unit of the unit of its axis."""
+"""Factor from SI units to the unit of the axis."""
 
 
 def _true(trace: Trace, sensor: str) -> Floats:
     """Return the true angle, mrad, or rate, µrad/s, at each step."""
     record, axis = trace
-    values = record.true_angle_rad if sensor == "angle" else record.true_rate_rad_s
+    values = {"angle": record.true_angle_rad, "rate": record.true_rate_rad_s}[sensor]
     return np.asarray(_SCALE[sensor] * values[:, axis])
 
 
@@ -130,15 +136,17 @@ def _measured(trace: Trace, sensor: str) -> tuple[Integers, Floats]:
     """Return the steps with a measurement, and the measured angles, mrad, or rates, µrad/s."""
     record, axis = trace
     steps = np.flatnonzero(record.measures(sensor))
-    values = record.measured[sensor][steps, axis] if steps.size else np.zeros(0)
-    return steps, np.asarray(_SCALE[sensor] * values)
+    if not steps.size:
+        return steps, np.zeros(0)
+    return steps, np.asarray(_SCALE[sensor] * record.measured[sensor][steps, axis])
 
 
 def _draw_sight(
     axes: Axes, trace: Trace, clock: Clock, sensor: str, *, is_modulus: bool = False
 ) -> None:
-    """Draw the angle or the rate of the line of sight, or its modulus, and its measurements as
-    dots.
+    """Draw the angle or the rate of the line of sight, and its measurements as dots.
+
+    If wanted, the modulus is drawn.
     """
     times = clock.at(trace[0])
     change = np.abs if is_modulus else np.asarray
@@ -160,18 +168,15 @@ def _dots(axes: Axes, times: Floats, values: Floats, label: str) -> None:
 
 def _draw_angle_error(axes: Axes, trace: Trace, clock: Clock) -> None:
     """Draw the errors of the measured angle, µrad, in their bounds."""
-    record, (steps, values) = trace[0], _measured(trace, "angle")
+    record = trace[0]
+    steps, values = _measured(trace, "angle")
     times = clock.at(record)[steps]
     bounds = 1e6 * _sensor(trace).error_bound(record.true_range_m[steps])
     axes.axhline(0.0, **_ZERO)
-    band: dict[str, Any] = {
-        "facecolor": MEASURED,
-        "alpha": 0.18,
-        "linewidth": 0.0,
-        "label": "bound of the angle error",
-    }
-    axes.fill_between(times, -bounds, bounds, **band)
-    _dots(axes, times, 1e3 * (values - _true(trace, "angle")[steps]), "error of the measured angle")
+    band: dict[str, Any] = {"facecolor": MEASURED, "alpha": 0.18, "linewidth": 0.0}
+    axes.fill_between(times, -bounds, bounds, label="bound of the angle error", **band)
+    errors = 1e3 * (values - _true(trace, "angle")[steps])
+    _dots(axes, times, errors, "error of the measured angle")
 
 
 def _sensor(trace: Trace) -> BearingSensor:
@@ -180,8 +185,9 @@ def _sensor(trace: Trace) -> BearingSensor:
 
 
 def _level_errors(row: Sequence[Axes], traces: Sequence[Trace]) -> None:
-    """Give axes of angle errors the same limits: logarithmic beyond the power of ten of the first
-    bound.
+    """Give axes of angle errors the same limits.
+
+    They are logarithmic beyond the power of ten of the first bound.
     """
     bounds = [np.abs(axes.dataLim.intervaly).max() for axes in row]
     firsts = [1e6 * float(_sensor(trace).error_bound(trace[0].true_range_m[0])) for trace in traces]
@@ -193,15 +199,17 @@ def _level_errors(row: Sequence[Axes], traces: Sequence[Trace]) -> None:
 
 
 def _level_moduli(row: Sequence[Axes]) -> None:
+    """Give axes of moduli of rates the same logarithmic limits."""
     moduli = np.concatenate(
         [np.asarray(line.get_ydata(), dtype=np.float64) for axes in row for line in axes.lines]
     )
-    known = moduli[moduli > 0.0] if moduli.any() else np.ones(1)
+    known = np.ones(1)
+    if moduli.any():
+        known = moduli[moduli > 0.0]
+    low = 0.5 * float(np.quantile(known, _MIN_RATE))
+    high = 2.0 * float(known.max())
     for axes in row:
-        axes.set(
-            yscale="log",
-            ylim=(0.5 * float(np.quantile(known, _MIN_RATE)), 2.0 * float(known.max())),
-        )
+        axes.set(yscale="log", ylim=(low, high))
 
 
 def _draw_impulse(axes: Axes, trace: Trace, clock: Clock, impulse_m_s: float) -> None:
@@ -222,27 +230,19 @@ def _draw_impulse(axes: Axes, trace: Trace, clock: Clock, impulse_m_s: float) ->
 def draw_predicted_miss(axes: Axes, trace: Trace, clock: Clock) -> None:
     """Draw the predicted-miss interval over time."""
     record, axis = trace
-    times, (lower, upper) = clock.at(record), record.predicted_miss_m[:, axis].T
+    times = clock.at(record)
+    lower, upper = record.predicted_miss_m[:, axis].T
     known = np.isfinite(lower)
     axes.axhline(0.0, **_ZERO)
+    band: dict[str, Any] = {"facecolor": SET_FILL, "linewidth": 0.0}
     axes.fill_between(
-        times[known],
-        lower[known],
-        upper[known],
-        facecolor=SET_FILL,
-        linewidth=0.0,
-        label="predicted-miss interval",
+        times[known], lower[known], upper[known], label="predicted-miss interval", **band
     )
     for bound in (lower, upper):
         axes.plot(times[known], bound[known], color=SET_EDGE, linewidth=0.9)
     if clock.counts_down:
-        axes.plot(
-            times,
-            true_predicted_misses(record)[:, axis],
-            color=TRUTH,
-            linewidth=1.0,
-            label="true value",
-        )
+        true_m = true_predicted_misses(record)[:, axis]
+        axes.plot(times, true_m, color=TRUTH, linewidth=1.0, label="true value")
 
 
 def level_predicted_miss(row: Sequence[Axes]) -> None:
@@ -254,13 +254,15 @@ def level_predicted_miss(row: Sequence[Axes]) -> None:
 
 
 def _level(row: Sequence[Axes], traces: Sequence[Trace], sensor: str) -> None:
-    """Give axes of a row the same limits, those of the first part of the way."""
+    """Give axes of a row the same limits, which contain the first part of the way."""
     values = []
     for trace in traces:
         ranges = trace[0].true_range_m
-        shown, (steps, measured) = ranges >= RANGE_SHARE * ranges.max(), _measured(trace, sensor)
+        shown = ranges >= RANGE_SHARE * ranges.max()
+        steps, measured = _measured(trace, sensor)
         values += [_true(trace, sensor)[shown], measured[shown[steps]]]
     far = np.concatenate(values)
+    # Values without extent have a margin, too.
     margin = 0.12 * float(np.ptp(far)) or 0.1 * float(np.abs(far).max()) or 1.0
     low = float(far.min()) - margin
     high = float(far.max()) + margin

@@ -48,23 +48,25 @@ _SQUARE: dict[str, Any] = {
 }
 _SECTIONS = 5
 _RATES = ("µrad/s", "nrad/s")
+"""Units of rates; the second one is for small numbers."""
 _ANGLES = ("mrad", "µrad")
+"""Units of angles; the second one is for small numbers."""
 _SMALL = 0.1
-"""Units of the axes, and the number up to which the second ones are used."""
+"""Largest number of an axis up to which its second unit is used."""
 _VISIBLE = 0.3
-"""Share of common limits below which a set is too small to see; the planes of a row then have their
-own limits.
+"""Share of common limits below which a set is too small to see.
+
+The planes of a row then have their own limits.
 """
 _FAR = 1.5
-"""Distance of a measured angle from its set, in heights of the set, from which it is outside the
-limits.
-"""
+"""Distance of a measured angle from its set, in heights of the set, above which it is not shown."""
 
 
 @style()
 def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8.0)) -> Figure:
-    """Draw sections of the sets after the measurement: one row per time, one column per record and
-    lateral axis.
+    """Draw sections of the sets after the measurement at some times.
+
+    There is one row per time, and one column per record and lateral axis.
 
     At most five sections are drawn, evenly chosen over the range. The planes of a row have the same
     limits for each lateral axis, unless a set would then be too small to see.
@@ -78,9 +80,8 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
         raise ValueError("at least one record and one time are needed")
     rows = [planes_at(records, time_s, _SECTIONS) for time_s in times_s]
     columns = len(rows[0])
-    figure, grid = subplots(
-        15.0 + 60.0 * len(rows), len(rows), columns, width_mm=WIDTH_MM if columns > 1 else 100.0
-    )
+    width_mm = WIDTH_MM if columns > 1 else 100.0
+    figure, grid = subplots(15.0 + 60.0 * len(rows), len(rows), columns, width_mm=width_mm)
     for row, planes in zip(grid, rows, strict=True):
         for axes, plane in zip(row, planes, strict=True):
             draw_plane(axes, plane)
@@ -115,11 +116,10 @@ class Plane:
     @property
     def measured_rad(self) -> float | None:
         """The measured angle, if there is one."""
-        return (
-            self.record.measured["angle"][self.step, self.axis]
-            if self.record.measures("angle")[self.step]
-            else None
-        )
+        if not self.record.measures("angle")[self.step]:
+            return None
+        measured_rad: float = self.record.measured["angle"][self.step, self.axis]
+        return measured_rad
 
     @property
     def outlines(self) -> list[Floats]:
@@ -139,30 +139,38 @@ class Plane:
 
     @property
     def box(self) -> Floats:
-        """The least and the greatest omega and alpha of the set, the true state and a measurement
-        near them, (2, 2).
+        """The least and the greatest omega and alpha, shape (2, 2).
+
+        They are of the set, of the true state, and of a measurement near them.
         """
         points = np.vstack([*self.outlines, self.true])
         low = points.min(axis=0)
         high = points.max(axis=0)
-        far = _FAR * (high[1] - low[1])
-        angle = low[1] if self.measured_rad is None else self.measured_rad * 1e3
-        if far == 0.0 or low[1] - far <= angle <= high[1] + far:
-            low[1], high[1] = min(low[1], angle), max(high[1], angle)
+        if self.measured_rad is not None:
+            angle = self.measured_rad * 1e3
+            far = _FAR * (high[1] - low[1])
+            if far == 0.0 or low[1] - far <= angle <= high[1] + far:
+                low[1] = min(low[1], angle)
+                high[1] = max(high[1], angle)
         return np.array([low, high])
 
 
 def planes_at(records: Sequence[Record], time_s: float, sections: int) -> list[Plane]:
-    """Return the planes of each record at its step nearest to a time, with at most so many
-    sections.
+    """Return the planes of each record at its step nearest to a time.
+
+    A plane has at most so many sections.
     """
     planes = []
     clock = Clock.of(records)
     for number, (record, name) in enumerate(zip(records, record_titles(records), strict=True)):
+        noise = name
+        if len(records) > 1:
+            noise = name.removeprefix(f"({ascii_lowercase[number]}) ")
         step = int(np.abs(record.time_s - time_s).argmin())
         chosen = choose_sections(record.sections[step], sections)
-        ranges = f"{_km(chosen[0])} to {_km(chosen[-1])} km" if chosen else "no section is left"
-        noise = name.removeprefix(f"({ascii_lowercase[number]}) ") if len(records) > 1 else name
+        ranges = "no section is left"
+        if chosen:
+            ranges = f"{_km(chosen[0])} to {_km(chosen[-1])} km"
         title = plain(f"{noise},\n{clock.text(record, float(record.time_s[step]))}, {ranges}")
         planes += [
             Plane(title, noise, record, axis, step, chosen)
@@ -172,12 +180,14 @@ def planes_at(records: Sequence[Record], time_s: float, sections: int) -> list[P
 
 
 def _km(section: Section) -> str:
-    return f"{section.range_m / 1e3:.{0 if section.range_m >= 1e6 else 1}f}"
+    digits = 0 if section.range_m >= 1e6 else 1
+    return f"{section.range_m / 1e3:.{digits}f}"
 
 
 def choose_sections(sections: Sequence[Section], most: int) -> list[Section]:
-    """Return at most `most` sections in their order, evenly distributed over the range, with the
-    first and the last.
+    """Return at most `most` sections in their order, evenly distributed over the range.
+
+    The first and the last section are among them.
     """
     if len(sections) <= most:
         return list(sections)
@@ -198,9 +208,7 @@ def draw_plane(axes: Axes, plane: Plane) -> None:
 
 
 def _shade_allowed(axes: Axes, plane: Plane) -> None:
-    """Shade the angles that the measurement allows at the nearest and the farthest drawn
-    section.
-    """
+    """Shade the angles that the measurement allows at the nearest and the farthest section."""
     if plane.measured_rad is None or not plane.chosen:
         return
     sensor = plane.record.scenario.set_model.axis(plane.name).angle_sensor
@@ -214,23 +222,19 @@ def _shade_allowed(axes: Axes, plane: Plane) -> None:
 def _draw_outline(axes: Axes, outline: Floats, colour: Floats, zorder: float) -> None:
     """Draw a section; a point becomes a dot and a segment a thick line with dots at its ends."""
     if len(outline) > 2:
-        look: dict[str, Any] = {
-            "edgecolor": colour,
-            "linewidth": 1.1,
-            "joinstyle": "round",
-            "zorder": zorder,
-        }
+        look: dict[str, Any] = {"edgecolor": colour, "linewidth": 1.1, "joinstyle": "round"}
         axes.add_patch(
-            Polygon(outline.tolist(), facecolor=(*colour[:3], 0.05), label=SECTIONS_MARK, **look)
+            Polygon(
+                outline.tolist(),
+                facecolor=(*colour[:3], 0.05),
+                label=SECTIONS_MARK,
+                zorder=zorder,
+                **look,
+            )
         )
     elif len(outline):
-        dots: dict[str, Any] = {
-            "linewidth": 2.0,
-            "marker": "o",
-            "markersize": 4.0,
-            "label": SECTIONS_MARK,
-        }
-        axes.plot(*outline.T, color=colour, zorder=zorder + 1.0, **dots)
+        dots: dict[str, Any] = {"linewidth": 2.0, "marker": "o", "markersize": 4.0}
+        axes.plot(*outline.T, color=colour, zorder=zorder + 1.0, label=SECTIONS_MARK, **dots)
 
 
 def level_planes(row: Sequence[Axes], planes: Sequence[Plane]) -> None:
@@ -248,8 +252,10 @@ def level_planes(row: Sequence[Axes], planes: Sequence[Plane]) -> None:
         high = boxes[:, 1].max(axis=0)
         if (boxes[:, 1] - boxes[:, 0] >= _VISIBLE * (high - low)).all():
             boxes[:] = low, high
+
         for (axes, plane), (low, high) in zip(same, boxes, strict=True):
             margin = 0.07 * (high - low)
+            # A set without extent has a margin, too.
             margin = np.where(margin > 0.0, margin, np.maximum(0.05 * np.abs(high), 1e-6))
             axes.set(
                 xlim=(low[0] - margin[0], high[0] + margin[0]),
@@ -263,13 +269,15 @@ def level_planes(row: Sequence[Axes], planes: Sequence[Plane]) -> None:
 
 def _name_units(axes: Axes) -> None:
     """Write the numbers of both axes, in a smaller unit if they are small."""
-    for one, limits, units in (
+    for one, limits, (large, small) in (
         (axes.xaxis, axes.get_xlim(), _RATES),
         (axes.yaxis, axes.get_ylim(), _ANGLES),
     ):
-        is_small = float(np.abs(limits).max()) <= _SMALL
-        one.set_major_formatter(partial(_number, factor=1e3 if is_small else 1.0))
-        one.set_label_text(one.get_label_text().replace(units[0], units[is_small]))
+        factor = 1.0
+        if float(np.abs(limits).max()) <= _SMALL:
+            factor = 1e3
+            one.set_label_text(one.get_label_text().replace(large, small))
+        one.set_major_formatter(partial(_number, factor=factor))
 
 
 def _number(tick: float, _place: int, factor: float) -> str:
@@ -278,12 +286,7 @@ def _number(tick: float, _place: int, factor: float) -> str:
 
 def _draw_measurement(axes: Axes, plane: Plane) -> None:
     """Draw the measured angle as a square, which is not seen if it is far from the set."""
-    if plane.measured_rad is not None:
-        axes.plot(
-            plane.true[0],
-            plane.measured_rad * 1e3,
-            zorder=5,
-            label=MEASUREMENT_MARK,
-            linestyle="none",
-            **_SQUARE,
-        )
+    if plane.measured_rad is None:
+        return
+    look = _SQUARE | {"linestyle": "none", "zorder": 5}
+    axes.plot(plane.true[0], plane.measured_rad * 1e3, label=MEASUREMENT_MARK, **look)

@@ -1,6 +1,4 @@
-"""What figures of the interception share: lines of levels, the time before the arrival, and its
-events.
-"""
+"""Parts that figures of the interception share: lines of levels, and the time axis."""
 
 from __future__ import annotations
 
@@ -35,9 +33,7 @@ its centre.
 
 
 def draw_levels(axes: Axes, guaranteed_m: float | None, radius_m: float | None) -> None:
-    """Draw the guaranteed miss and the radius of the body, if they are known, as horizontal
-    lines.
-    """
+    """Draw the guaranteed miss and the radius of the body, if known, as horizontal lines."""
     if guaranteed_m:
         axes.axhline(guaranteed_m, label="guaranteed miss Φ", **GUARANTEE)
     if radius_m:
@@ -45,8 +41,9 @@ def draw_levels(axes: Axes, guaranteed_m: float | None, radius_m: float | None) 
 
 
 def draw_end(axes: Axes, time_s: float, miss_m: float, scenario: Scenario) -> None:
-    """Mark the end of the possible miss: from there on the set is not complete (see
-    `complete_steps`).
+    """Mark the end of the possible miss, after which the set is not complete.
+
+    See `complete_steps`.
     """
     label = f"end: nearest range in the set {scenario.set_model.range_threshold_m / 1e3:g} km"
     axes.plot(
@@ -64,11 +61,14 @@ def draw_end(axes: Axes, time_s: float, miss_m: float, scenario: Scenario) -> No
 def draw_body(
     axes: Axes, half_m: float, guaranteed_m: float | None, radius_m: float | None
 ) -> None:
-    """Draw the B-plane of axes that extend by `half_m` around the centre of the body: disc,
-    guaranteed miss, labels.
+    """Draw the B-plane around the centre of the body: disc, guaranteed miss and labels.
+
+    The axes extend by `half_m` in each direction.
     """
     if radius_m is not None and radius_m >= _MIN_DISC * half_m:
-        label = f"body radius, {radius_m:g} m{': beyond the axes' if radius_m > half_m else ''}"
+        label = f"body radius, {radius_m:g} m"
+        if radius_m > half_m:
+            label += ": beyond the axes"
         fill = axes.fill(*ring(radius_m), facecolor=BODY_FILL, zorder=0.6, label=label)
         fill[0].set(edgecolor=INK, linestyle=RADIUS["linestyle"])
     if guaranteed_m is not None and guaranteed_m <= half_m:
@@ -81,14 +81,10 @@ def draw_body(
         "zorder": 4.0,
     }
     axes.plot(0.0, 0.0, markeredgewidth=1.1, label="centre of the body", **centre)
+
     unit, per_m = length_unit(half_m)
-    axes.set(
-        xlim=(-half_m, half_m),
-        ylim=(-half_m, half_m),
-        aspect="equal",
-        xlabel=f"miss along y, {unit}",
-    )
-    axes.set_ylabel(f"miss along z, {unit}")
+    axes.set(xlim=(-half_m, half_m), ylim=(-half_m, half_m), aspect="equal")
+    axes.set(xlabel=f"miss along y, {unit}", ylabel=f"miss along z, {unit}")
     for one in (axes.xaxis, axes.yaxis):
         one.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 5, 10]))
         one.set_major_formatter(lambda tick, _: f"{tick * per_m:g}".replace("-", "\N{MINUS SIGN}"))
@@ -107,8 +103,9 @@ def draw_impulses(axes: Axes, times: Any, sizes: Any, **look: Any) -> None:
 
 
 def count_down(column: Sequence[Axes], scenario: Scenario) -> None:
-    """Make the time axis of axes above each other logarithmic in the time before the arrival; draw
-    the schedule.
+    """Make the time axis of a column of axes logarithmic in the time before the arrival.
+
+    The times of the schedule are drawn as vertical lines.
     """
     begin_s = scenario.nominal_arrival_s
     end_s = min_to_go_s(scenario)
@@ -130,18 +127,21 @@ def count_down(column: Sequence[Axes], scenario: Scenario) -> None:
 
 
 def name_events(axes: Axes, scenario: Scenario) -> None:
-    """Write the names of the times of the schedule along their lines, in turn to the left and to
-    the right.
+    """Write the names of the times of the schedule along their lines.
+
+    They are in turn to the left and to the right of the lines.
     """
-    for number, (name, time_s) in enumerate(
-        sorted(marks(scenario).items(), key=lambda item: -item[1])
-    ):
+    look: dict[str, Any] = {
+        "xycoords": axes.get_xaxis_transform(),
+        "textcoords": "offset points",
+        "rotation": 90.0,
+        "va": "top",
+        "fontsize": "small",
+        "path_effects": HALO,
+        "zorder": 5.0,
+    }
+    by_time = sorted(marks(scenario).items(), key=lambda item: -item[1])
+    for number, (name, time_s) in enumerate(by_time):
         side, offset = (("right", -2.0), ("left", 2.0))[number % 2]
-        place: dict[str, Any] = {
-            "xycoords": axes.get_xaxis_transform(),
-            "textcoords": "offset points",
-        }
-        axes.annotate(
-            f"{name}, {duration_text(time_s)}", (time_s, 0.97), xytext=(offset, 0.0), rotation=90.0, ha=side, va="top",
-            fontsize="small", path_effects=HALO, zorder=5.0, **place,
-        )  # fmt: skip
+        text = f"{name}, {duration_text(time_s)}"
+        axes.annotate(text, (time_s, 0.97), xytext=(offset, 0.0), ha=side, **look)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from time import perf_counter
 
 import numpy as np
@@ -59,6 +59,11 @@ def run(options: Adversary) -> None:
 
 
 def _summary(worst: WorstMisses, chosen: WorstEngagement, options: Adversary) -> dict[str, object]:
+    """Return the results of the searches in JSON."""
+    lateral_m = {f"worst_miss_{axis}_m": value for axis, value in _lateral_m(chosen).items()}
+    history = [
+        {"evaluations": evaluations, "value_m": value_m} for evaluations, value_m in chosen.history
+    ]
     return {
         "seed": chosen.seed,
         "strategy": chosen.strategy,
@@ -67,7 +72,7 @@ def _summary(worst: WorstMisses, chosen: WorstEngagement, options: Adversary) ->
         **worst.misses(),
         "worst_any_state_miss_m": chosen.any_state_miss_m,
         "worst_miss_m": chosen.miss_m,
-        **{f"worst_miss_{axis}_m": value for axis, value in _lateral_m(chosen).items()},
+        **lateral_m,
         "outcome": chosen.result.outcomes[0].value,
         "truth_kept": bool(chosen.result.truth_kept[0]),
         "evaluations": chosen.evaluations,
@@ -75,42 +80,30 @@ def _summary(worst: WorstMisses, chosen: WorstEngagement, options: Adversary) ->
         "found_from": chosen.construction,
         "changes": chosen.changes,
         "start": chosen.start(),
-        "history": [
-            {"evaluations": evaluations, "value_m": value_m}
-            for evaluations, value_m in chosen.history
-        ],
+        "history": history,
     }
 
 
-def _rows(scenario: Scenario) -> list[tuple[str, Callable[[WorstEngagement], str]]]:
+def _rows(scenario: Scenario, found: WorstEngagement) -> dict[str, str]:
+    """Return the values of an engagement as text, by their titles."""
     axes = [*scenario.set_model.axes, "x"]
     position = ", ".join(axes)
     velocity = ", ".join(f"V_{axis}" for axis in axes)
-    return [
-        ("maximum miss of any state of the set, m", lambda found: number(found.any_state_miss_m)),
-        ("miss of the simulated truth, m", lambda found: number(found.miss_m)),
-        (
-            f"miss along {', '.join(axes[:-1])}, m",
-            lambda found: ", ".join(map(number, _lateral_m(found).values())),
-        ),
-        ("outcome", lambda found: found.result.outcomes[0].value),
-        (
-            "true state always in the set",
-            lambda found: "yes" if found.result.truth_kept[0] else "no",
-        ),
-        (f"initial {position}, km", lambda found: _texts(found.result.position_m[0] / M_PER_KM)),
-        (
-            f"initial {velocity}, km/s",
-            lambda found: _texts(found.result.velocity_m_s[0] / M_PER_KM),
-        ),
-    ]
+    return {
+        "maximum miss of any state of the set, m": number(found.any_state_miss_m),
+        "miss of the simulated truth, m": number(found.miss_m),
+        f"miss along {', '.join(axes[:-1])}, m": ", ".join(map(number, _lateral_m(found).values())),
+        "outcome": found.result.outcomes[0].value,
+        "true state always in the set": "yes" if found.result.truth_kept[0] else "no",
+        f"initial {position}, km": _texts(found.result.position_m[0] / M_PER_KM),
+        f"initial {velocity}, km/s": _texts(found.result.velocity_m_s[0] / M_PER_KM),
+    }
 
 
 def _lateral_m(found: WorstEngagement) -> dict[str, float]:
     """Return the position of the true state at the closest approach by lateral axis, m."""
-    return dict(
-        zip(found.scenario.set_model.axes, found.result.lateral_miss_m[0].tolist(), strict=True)
-    )
+    values_m = found.result.lateral_miss_m[0].tolist()
+    return dict(zip(found.scenario.set_model.axes, values_m, strict=True))
 
 
 def _texts(values: NDArray[np.float64]) -> str:
@@ -120,28 +113,31 @@ def _texts(values: NDArray[np.float64]) -> str:
 def _parts(
     scenario: Scenario, worst: WorstMisses, options: Adversary, elapsed_s: float
 ) -> Iterator[Part]:
+    """Yield the table of the engagements found, and lines that explain it."""
     first = worst.engagements[0]
-    is_same = worst.set_kept is worst.overall
-    columns = {"set never empty, set also empty" if is_same else "set never empty": worst.set_kept}
-    if not is_same:
-        columns["set also empty"] = worst.overall
-    table = number_table("", *columns)
-    for title, text in _rows(scenario):
-        table.add_row(title, *("-" if found is None else text(found) for found in columns.values()))
     count = sum(found.evaluations for found in worst.engagements)
     yield (
         f"{scenario_title(scenario)}, strategy {first.strategy}: "
         f"{count} simulated engagements, {number(count / max(elapsed_s, 1e-9))} per second"
     )
+
+    is_same = worst.set_kept is worst.overall
+    columns = {"set never empty": worst.set_kept, "set also empty": worst.overall}
+    if is_same:
+        columns = {"set never empty, set also empty": worst.overall}
+    table = number_table("", *columns)
+    texts = [None if found is None else _rows(scenario, found) for found in columns.values()]
+    for title in _rows(scenario, first):
+        table.add_row(title, *(text[title] if text else "-" for text in texts))
     yield table
-    bounds = [
-        f"{number(bound)} m/s^2 along {axis}" for axis, bound in first.max_acceleration_m_s2.items()
-    ]
-    target = (
-        f"target accelerations up to {', '.join(bounds)}"
-        if bounds
-        else "the target of the scenario"
-    )
+
+    target = "the target of the scenario"
+    if first.max_acceleration_m_s2:
+        bounds = ", ".join(
+            f"{number(bound)} m/s^2 along {axis}"
+            for axis, bound in first.max_acceleration_m_s2.items()
+        )
+        target = f"target accelerations up to {bounds}"
     yield (
         f"searched: starts in the uncertainty, errors within their bounds, {target}; objective: "
         f"{options.objective}"
@@ -156,14 +152,10 @@ def _parts(
     )
     if not is_same:
         emptied = max(found.sets_emptied for found in worst.engagements)
-        yield (
-            (
-                f"the set became empty in {emptied} engagements of a search; these misses show a "
-                "failure of the model"
-            )
-            + (
-                ""
-                if scenario.set_model.is_guaranteed
-                else "; use --model guaranteed, whose set keeps the true state"
-            )
+        note = (
+            f"the set became empty in {emptied} engagements of a search; these misses show a "
+            "failure of the model"
         )
+        if not scenario.set_model.is_guaranteed:
+            note += "; use --model guaranteed, whose set keeps the true state"
+        yield note

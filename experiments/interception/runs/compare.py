@@ -44,9 +44,11 @@ from infoset.sim.parallel import Task
 
 FIGURE = "figure-comparison"
 NEAR = 0.1
-"""Relative difference of quantiles up to which strategies count as equally good."""
+"""Relative difference of quantiles up to which strategies count as equally good.
+
+The 90 % quantile of some hundred runs has an interval of about this size.
+"""
 TIES = "for each run, the worst of the four tie rules"
-ACROSS = ("miss_y_m", "miss_z_m", "b_dot_t_m", "b_dot_r_m")
 COLUMNS = (
     "run",
     "miss_m",
@@ -56,8 +58,12 @@ COLUMNS = (
     "set_emptied",
     "hit",
     "cause",
-    *ACROSS,
+    "miss_y_m",
+    "miss_z_m",
+    "b_dot_t_m",
+    "b_dot_r_m",
 )
+"""Columns of the CSV; in a plane there are no components of the miss."""
 
 
 def run(options: Compare) -> None:
@@ -68,18 +74,22 @@ def run(options: Compare) -> None:
     figures = [FIGURE, *b_plane_figures(scenario, noises)]
     with work_of(options, scenario, ["results.csv", *figure_files(*figures)], notes=notes) as work:
         wanted = compared_scenarios(scenario, strategies, noises)
-        each = len(wanted) // len(strategies)
-        reports = [report for name in strategies for report in parts_of(work.begin(name), each)]
+        # Each strategy has a progress bar, of which its scenarios are equal parts.
+        count = len(wanted) // len(strategies)
+        reports = [report for name in strategies for report in parts_of(work.begin(name), count)]
         tasks = [
             Task(
-                *(flown, range(options.runs), options.seed),
-                noise=noises[flight[1]],
-                strategy=strategies[flight[0]],
+                flown,
+                range(options.runs),
+                options.seed,
+                noise=noises[noise],
+                strategy=strategies[strategy],
                 progress=report,
             )
-            for (flight, flown), report in zip(wanted.items(), reports, strict=True)
+            for ((strategy, noise, _), flown), report in zip(wanted.items(), reports, strict=True)
         ]
         compared = comparisons(dict(zip(wanted, simulate_all(tasks), strict=True)))
+
         work.save(
             {
                 "seed": options.seed,
@@ -97,97 +107,111 @@ def run(options: Compare) -> None:
 
 
 def _summary(comparison: Comparison) -> dict[str, object]:
-    outcomes = Counter(
-        outcome.value for results in comparison.results.values() for outcome in results.outcomes
-    )
-    phi_held = comparison.worst("phi_held")
-    return {
+    """Return the results of a strategy with a noise in JSON."""
+    keys: dict[str, object] = {
         "name": comparison.strategy,
         "noise": comparison.noise,
-        **{name: summary(comparison.worst(name)) for name in ("miss_m", "impulse_m_s")},
+        "miss_m": summary(comparison.worst("miss_m")),
+        "impulse_m_s": summary(comparison.worst("impulse_m_s")),
         **hit_key(comparison.hits, comparison.missed),
-        **{name: int(comparison.worst(name).sum()) for name in ("truth_kept", "set_emptied")},
-        "phi_held": int(phi_held.sum()) if phi_held.count() else None,
-        "outcomes": dict(outcomes),
-        "ties": {
-            tie.value: {
-                "miss_m": summary(results.miss_m),
-                "impulse_m_s": summary(results.impulse_m_s),
-            }
-            for tie, results in comparison.results.items()
-            if tie is not None
-        },
+        "truth_kept": int(comparison.worst("truth_kept").sum()),
+        "set_emptied": int(comparison.worst("set_emptied").sum()),
+        "phi_held": None,
     }
+    phi_held = comparison.worst("phi_held")
+    if phi_held.count():
+        keys["phi_held"] = int(phi_held.sum())
+
+    results = comparison.results.values()
+    keys["outcomes"] = Counter(outcome.value for each in results for outcome in each.outcomes)
+    keys["ties"] = {
+        tie.value: {"miss_m": summary(each.miss_m), "impulse_m_s": summary(each.impulse_m_s)}
+        for tie, each in comparison.results.items()
+        if tie is not None
+    }
+    return keys
 
 
 def _csv(compared: Sequence[Comparison]) -> str:
-    rows: list[list[Cell]] = []
-    (known,) = {
-        tuple(results.to_dict())
-        for comparison in compared
-        for results in comparison.results.values()
-    }
+    known = next(iter(compared[0].results.values())).to_dict()  # all have the same columns
     names = [name for name in COLUMNS if name in known]
+    rows: list[list[Cell]] = []
     for comparison in compared:
         for tie, results in comparison.results.items():
             columns = results.to_dict()
             head = [comparison.strategy, comparison.noise, None if tie is None else tie.value]
-            rows += [
-                [*head, *values] for values in zip(*(columns[name] for name in names), strict=True)
-            ]
+            for values in zip(*(columns[name] for name in names), strict=True):
+                rows.append([*head, *values])
     return csv_text(("strategy", "noise", "tie", *names), rows)
 
 
 def _parts(scenario: Scenario, compared: Sequence[Comparison]) -> Iterator[Part]:
-    table = number_table("noise", "strategy", "quantity", *QUANTILES, left=3)
-    titles = ["true state in the\nset at every step", "set became\nempty"]
-    if scenario.body is not None:
-        titles += [f"hit: miss at\nmost {scenario.body.radius_m:g} m", "95 % CI\nof a hit"]
-    sets = number_table("noise", "strategy", *titles, left=2)
-    total = SetCounts()
+    """Yield the quantiles, the sets and hits, and how they depend on the noise, for the screen."""
     noises = list(dict.fromkeys(comparison.noise for comparison in compared))
-    for comparison in sorted(compared, key=lambda each: noises.index(each.noise)):
-        head = (comparison.noise, comparison.strategy)
-        table.add_row(*head, "miss, m", *map(number, summary(comparison.worst("miss_m")).values()))
-        table.add_row(
-            "", "", "impulse, m/s", *map(number, summary(comparison.worst("impulse_m_s")).values())
-        )
-        counts = set_counts(*map(comparison.worst, ("truth_kept", "set_emptied")))
-        hits = comparison.hits
-        total += counts
-        shares = [
-            f"{count} ({percent(count / counts.runs)})"
-            for count in (counts.truth_kept, counts.set_emptied)
-        ]
-        if hits is not None:
-            shares += [
-                f"{hits.hits} ({percent(hits.probability)})",
-                f"{percent(hits.lower)} to {percent(hits.upper)}",
-            ]
-        sets.add_row(*head, *shares)
+    by_noise = sorted(compared, key=lambda each: noises.index(each.noise))
     runs = len(compared[0].worst("miss_m"))
-    ties = f"; game noise: {TIES}" if NoiseKind.GAME.value in noises else ""
-    yield f"{scenario_title(scenario)}: quantiles of {some_runs(runs)}{ties}"
-    yield table
-    yield from ("", f"of the {some_runs(runs)}:", sets)
+    head = f"{scenario_title(scenario)}: quantiles of {some_runs(runs)}"
+    if NoiseKind.GAME.value in noises:
+        head += f"; game noise: {TIES}"
+    yield head
+    yield _quantile_table(by_noise)
+    yield ""
+    yield f"of the {some_runs(runs)}:"
+    yield _set_table(scenario, by_noise)
+
     for comparison in compared:
         if comparison.hits is not None and (causes := miss_text(comparison.missed, runs, scenario)):
             yield f"{comparison.noise} noise, {comparison.strategy}: {causes}"
     if len(noises) > 1:
-        yield from (
-            "",
-            "what depends on the noise, 90 % quantile of the miss, m:",
-            _by_noise(compared, noises),
-        )
+        yield ""
+        yield "what depends on the noise, 90 % quantile of the miss, m:"
+        yield _by_noise(compared, noises)
         yield _best(compared, noises)
     yield from noise_notes(scenario, noises, TIES)
     yield from quantile_notes(runs, [*QUANTILES.values()])
-    yield from set_warnings(scenario.information_set.model, total)
+    counts = sum(map(_set_counts, compared), SetCounts())
+    yield from set_warnings(scenario.information_set.model, counts)
+
+
+def _quantile_table(compared: Sequence[Comparison]) -> Table:
+    """Return the table of the quantiles of the miss and the impulse."""
+    table = number_table("noise", "strategy", "quantity", *QUANTILES, left=3)
+    for comparison in compared:
+        miss = summary(comparison.worst("miss_m")).values()
+        impulse = summary(comparison.worst("impulse_m_s")).values()
+        table.add_row(comparison.noise, comparison.strategy, "miss, m", *map(number, miss))
+        table.add_row("", "", "impulse, m/s", *map(number, impulse))
+    return table
+
+
+def _set_table(scenario: Scenario, compared: Sequence[Comparison]) -> Table:
+    """Return the table of the sets, and of the hits if the body has a size."""
+    titles = ["true state in the\nset at every step", "set became\nempty"]
+    if scenario.body is not None:
+        titles += [f"hit: miss at\nmost {scenario.body.radius_m:g} m", "95 % CI\nof a hit"]
+    table = number_table("noise", "strategy", *titles, left=2)
+    for comparison in compared:
+        counts = _set_counts(comparison)
+        row = [
+            f"{count} ({percent(count / counts.runs)})"
+            for count in (counts.truth_kept, counts.set_emptied)
+        ]
+        hits = comparison.hits
+        if hits is not None:
+            row.append(f"{hits.hits} ({percent(hits.probability)})")
+            row.append(f"{percent(hits.lower)} to {percent(hits.upper)}")
+        table.add_row(comparison.noise, comparison.strategy, *row)
+    return table
+
+
+def _set_counts(comparison: Comparison) -> SetCounts:
+    return set_counts(comparison.worst("truth_kept"), comparison.worst("set_emptied"))
 
 
 def _by_noise(compared: Sequence[Comparison], noises: Sequence[str]) -> Table:
-    """Return a table of the 90 % quantile of the miss by strategy and noise, with the ratio of its
-    extremes.
+    """Return a table of the 90 % quantile of the miss by strategy and noise.
+
+    The last column is the ratio of the extremes of a strategy.
     """
     table = number_table("strategy", *noises, "maximum / minimum")
     for name in dict.fromkeys(comparison.strategy for comparison in compared):
@@ -195,14 +219,17 @@ def _by_noise(compared: Sequence[Comparison], noises: Sequence[str]) -> Table:
             summary(each.worst("miss_m"))["p90"] for each in compared if each.strategy == name
         ]
         known = [value for value in values if value is not None]
-        ratio = max(known) / min(known) if known and min(known) > 0.0 else None
+        ratio = None
+        if known and min(known) > 0.0:
+            ratio = max(known) / min(known)
         table.add_row(name, *map(number, (*values, ratio)))
     return table
 
 
 def _best(compared: Sequence[Comparison], noises: Sequence[str]) -> str:
-    """Return a line with the strategies whose 90 % quantile of the miss is near the least one, for
-    each noise.
+    """Return a line with the strategies whose 90 % quantile of the miss is near the least.
+
+    For each noise, if they differ.
     """
     near = {}
     for noise in noises:
@@ -211,13 +238,11 @@ def _best(compared: Sequence[Comparison], noises: Sequence[str]) -> str:
             for each in compared
             if each.noise == noise
         }
-        near[noise] = [
-            name
-            for name, value in quantiles.items()
-            if value <= (1.0 + NEAR) * min(quantiles.values())
-        ]
-    always = [name for name in near[noises[0]] if all(name in names for names in near.values())]
+        limit = (1.0 + NEAR) * min(quantiles.values())
+        near[noise] = [name for name, value in quantiles.items() if value <= limit]
+
     within = f"within {NEAR:.0%} of the least in these runs"
+    always = [name for name in near[noises[0]] if all(name in names for names in near.values())]
     if always:
         return f"{within} with every noise: {', '.join(always)}"
     by_noise = "; ".join(f"{', '.join(names)} with {noise}" for noise, names in near.items())

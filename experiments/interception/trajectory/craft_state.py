@@ -1,6 +1,4 @@
-"""The state of a spacecraft or an object at an epoch, from each source, with its frame and
-covariance.
-"""
+"""The state of a spacecraft or an object at an epoch, with its frame and covariance."""
 
 from __future__ import annotations
 
@@ -30,28 +28,28 @@ from infoset.experiments.interception.trajectory.oem import OemCovariance, OemSe
 from infoset.sim.approach import propagate
 
 SAME_EPOCH_S = Fraction(1, 1000)
-"""Difference between the epoch of a covariance and of the states: files write both with
-milliseconds.
+"""Largest difference between the epochs of a covariance and of the states.
+
+Files write both with milliseconds.
 """
 MODEL_SHARE = 0.01
-"""Difference to two-body motion, as a share of the distance to the nearest tabulated state, that is
-a warning.
+"""Difference to two-body motion from which a warning reports a state.
 
+It is a share of the distance to the nearest tabulated state.
 Perturbations of an orbit change it by less (the Earth's oblateness by 0.1 %), wrong units and
 manoeuvres by more.
 """
 MAX_SPANS = 3
 """Number of the spans of segments that a message lists: a line has room for them."""
 ALONG_RADIUS = ("RTN", "RSW", "RIC", "QSW")
+"""Names of the axes radius, transverse, normal of the orbit."""
 ALONG_VELOCITY = ("TNW",)
-"""Names of local axes: radius, transverse, normal; and velocity, in-plane normal, normal of the
-orbit.
-"""
+"""Name of the axes velocity, normal in the plane, normal of the orbit."""
 
 
 @dataclass(frozen=True)
 class CraftState:
-    """A state, shape (2, 3), and what its source says about it.
+    """A state, shape (2, 3), and the facts that its source gives about it.
 
     Parameters
     ----------
@@ -84,20 +82,22 @@ class CraftState:
 
 
 def epoch_scale(epoch: Epoch, files: Sequence[Sequence[OemSegment]]) -> str:
-    """Return the time scale of an epoch: as written, or that of all OEM files; UTC without such
-    files, as in SPICE.
+    """Return the time scale of an epoch.
 
+    It is as written, or the scale of all OEM files; UTC without such files, as in SPICE. Raise
     `InputError` if the files have several.
     """
     if epoch.scale is not None:
         return epoch.scale
     scales = sorted({segment.scale for segments in files for segment in segments})
+    if not scales:
+        return "UTC"
     if len(scales) > 1:
         raise InputError(
-            f"epoch: has no time scale, and the OEM files have {' and '.join(scales)}; write one of them after it, for "
-            f'example epoch = "2029-03-01T00:00:00 {scales[0]}"'
+            f"epoch: has no time scale, and the OEM files have {' and '.join(scales)}; write one "
+            f'of them after it, for example epoch = "2029-03-01T00:00:00 {scales[0]}"'
         )
-    return scales[0] if scales else "UTC"
+    return scales[0]
 
 
 def oem_craft(
@@ -109,8 +109,9 @@ def oem_craft(
     *,
     with_covariance: bool,
 ) -> CraftState:
-    """Return the state of an OEM file at an epoch in a time scale, with its covariance if that is
-    wanted.
+    """Return the state of an OEM file at an epoch in a time scale.
+
+    The covariance is read if it is wanted.
 
     `InputError` if no segment holds the epoch, its frame rotates or is unknown, the epoch is in a
     gap, or the segment has covariances and none of them is of the epoch.
@@ -133,7 +134,6 @@ def oem_craft(
     except ValueError as error:
         raise InputError(f"{where}: {error}") from None
 
-    centre = centre_name(segment.metadata["CENTER_NAME"])
     covariance = None
     covariance_frame = ""
     if with_covariance and segment.covariances:
@@ -148,6 +148,7 @@ def oem_craft(
             f"{where}: has fewer states around the epoch than degree + 1 = {segment.degree + 1}: "
             f"interpolated with degree {found.degree}"
         )
+    centre = centre_name(segment.metadata["CENTER_NAME"])
     return CraftState(
         state=found.state,
         source=source,
@@ -163,17 +164,12 @@ def oem_craft(
 
 
 def time_notes(epoch: Epoch, scale: str, wanted: Sequence[str]) -> list[str]:
-    """Return a line if an epoch in UTC is converted to other scales with leap seconds that are not
-    yet known.
-    """
-    if any(is_guess(epoch, scale, each) for each in wanted):
-        return [
-            (
-                f"the leap seconds of {epoch.day} are not yet known: UTC is converted with TAI - "
-                "UTC = 37 s"
-            )
-        ]
-    return []
+    """Return a line if UTC is converted with leap seconds that are not yet known."""
+    if not any(is_guess(epoch, scale, each) for each in wanted):
+        return []
+    return [
+        f"the leap seconds of {epoch.day} are not yet known: UTC is converted with TAI - UTC = 37 s"
+    ]
 
 
 def need_same_axes(one: CraftState, other: CraftState, source: str) -> None:
@@ -203,31 +199,35 @@ def axes_note(one: CraftState, other: CraftState) -> list[str]:
 def _segment_at(
     segments: Sequence[OemSegment], source: str, epoch: Epoch, scale: str
 ) -> OemSegment:
-    """Return the segment that holds an epoch; of two that meet there, the later one, after a
-    manoeuvre.
+    """Return the segment that holds an epoch.
+
+    Of two segments that meet at the epoch it is the later one, after a manoeuvre.
     """
     holding = []
+    inside = []
     for segment in segments:
         try:
             seconds = converted(epoch, scale, segment.scale)
         except ValueError as error:
             raise InputError(f"epoch: {error}") from None
         if segment.start <= seconds <= segment.stop:
-            holding.append((segment, seconds))
+            holding.append(segment)
+        if segment.start < seconds < segment.stop:
+            inside.append(segment)
 
     if not holding:
         spans = ", ".join(map(_usable_span, segments[:MAX_SPANS]))
-        more = f" and {len(segments) - MAX_SPANS} more" if len(segments) > MAX_SPANS else ""
+        if len(segments) > MAX_SPANS:
+            spans += f" and {len(segments) - MAX_SPANS} more"
         raise InputError(
-            f"{source}: no segment holds the epoch: the usable spans are {spans}{more}; take an "
-            "epoch within one"
+            f"{source}: no segment holds the epoch: the usable spans are {spans}; take an epoch "
+            "within one"
         )
-    inside = [segment for segment, seconds in holding if segment.start < seconds < segment.stop]
     if len(inside) > 1:
         raise InputError(
             f"{source}: segments {inside[0].number} and {inside[1].number} both hold the epoch"
         )
-    return inside[0] if inside else holding[-1][0]
+    return (inside or holding)[-1]
 
 
 def _usable_span(segment: OemSegment) -> str:
@@ -273,8 +273,9 @@ def _warnings(
 
 
 def _two_body_difference(found: Interpolated, parameter_m3_s2: float) -> float:
-    """Return the distance from the two-body motion of the nearest tabulated state, m; infinite if
-    that fails.
+    """Return the distance from the two-body motion of the nearest tabulated state, m.
+
+    It is infinite if the motion cannot be computed.
     """
     if not found.nearest_s:
         return 0.0
@@ -322,8 +323,10 @@ def _axes_of(
 
 
 def _local_axes(state: Floats, where: str, *, along_radius: bool) -> Floats:
-    """Return the axes of an orbit at a state as rows; the first is along the radius or along the
-    velocity.
+    """Return the axes of an orbit at a state as rows.
+
+    The first axis is along the radius or along the velocity, the last one is the normal of the
+    orbit.
     """
     position, velocity = state
     normal = np.cross(position, velocity)

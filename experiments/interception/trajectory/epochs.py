@@ -49,11 +49,14 @@ LEAP_DAYS = (
 )
 """Days from which TAI - UTC is 10, 11, 12, ... s (IERS Bulletin C)."""
 FIRST_OFFSET_S = 10
+"""TAI - UTC from the first of these days on, s."""
 LEAPS_KNOWN_UNTIL = date(2027, 6, 28)
 """Last day for which the IERS says that the table is complete."""
 
 TT_FROM_TAI_S = Fraction("32.184")
+"""TT - TAI, s, by the definition of TT (IAU 1991)."""
 TAI_FROM_GPS_S = 19
+"""TAI - GPS, s: GPS time was equal to UTC on 6 January 1980, when TAI - UTC was 19 s."""
 SCALES = ("UTC", "TAI", "TT", "TDB", "GPS")
 """Time scales that are read. UT1, TCB, TCG and clocks of spacecraft have other lengths of the
 second.
@@ -85,8 +88,9 @@ class Epoch(NamedTuple):
 
 
 def parse_epoch(text: str) -> Epoch:
-    """Return an epoch such as ``2029-03-01T12:00:00.5``, ``2029-060T12:00:00.5Z`` or
-    ``2029-03-01T12:00:00 TDB``.
+    """Return an epoch such as ``2029-03-01T12:00:00.5`` or ``2029-03-01T12:00:00 TDB``.
+
+    The day can be the day of the year, ``2029-060T12:00:00.5Z``.
 
     A ValueError is raised for other text.
     """
@@ -96,13 +100,18 @@ def parse_epoch(text: str) -> Epoch:
     year, month, day_of_month, day_of_year, hour, minute, second, suffix = match.groups()
     day = _day(int(year), month, day_of_month, day_of_year)
 
-    whole = 60 * int(hour or 0) + int(minute or 0)
+    minutes = 60 * int(hour or 0) + int(minute or 0)
     seconds = Fraction(second or 0)
     if int(hour or 0) > 23 or int(minute or 0) > 59 or seconds >= 61:
         raise ValueError("has an hour, minute or second that does not exist")
-    if seconds >= 60 and (whole != 60 * 24 - 1 or day + timedelta(1) not in LEAP_DAYS[1:]):
+    # Second 60 exists only at the end of a day before a leap day.
+    if seconds >= 60 and (minutes != 60 * 24 - 1 or day + timedelta(1) not in LEAP_DAYS[1:]):
         raise ValueError("has a second 60, and there is no leap second at this time")
-    return Epoch(day, 60 * whole + seconds, known_scale(suffix) if suffix else None)
+
+    scale = None
+    if suffix:
+        scale = known_scale(suffix)
+    return Epoch(day, 60 * minutes + seconds, scale)
 
 
 def known_scale(name: str) -> str:
@@ -116,8 +125,7 @@ def known_scale(name: str) -> str:
 
 
 def seconds_in(epoch: Epoch, scale: str) -> Fraction:
-    """Return the seconds from J2000 to an epoch that is written in a scale, in a scale without
-    leaps.
+    """Return the seconds from J2000 to an epoch of a scale, in a scale without leaps.
 
     UTC counts as TAI. A ValueError is raised for UTC before 1972, whose seconds had other lengths.
     """
@@ -130,8 +138,9 @@ def seconds_in(epoch: Epoch, scale: str) -> Fraction:
 
 
 def converted(epoch: Epoch, scale: str, wanted: str) -> Fraction:
-    """Return the seconds from J2000 to an epoch that is written in a scale, as `seconds_in` counts
-    in another one.
+    """Return the seconds from J2000 to an epoch of a scale, as counted in another scale.
+
+    They are counted as by `seconds_in`.
     """
     seconds = seconds_in(epoch, scale)
     if scale == wanted or {scale, wanted} == {"UTC", "TAI"}:
@@ -150,11 +159,11 @@ def tdb_drift_s(seconds: Fraction, scale: str) -> float:
     Velocities are derivatives with respect to TDB, in which orbits around the Sun are computed. The
     drift is up to 3.3e-10 s/s: 1e-5 m/s at 30 km/s, or 9 m in ten days.
     """
-    return (
-        0.0
-        if scale == "TDB"
-        else float(_tdb_minus_tt(_to_tt(seconds, scale if scale != "UTC" else "TAI")))
-    )
+    if scale == "TDB":
+        return 0.0
+    # `seconds_in` counts UTC as TAI.
+    counted = "TAI" if scale == "UTC" else scale
+    return float(_tdb_minus_tt(_to_tt(seconds, counted)))
 
 
 def _day(year: int, month: str | None, day_of_month: str | None, day_of_year: str | None) -> date:
@@ -176,10 +185,12 @@ def _day(year: int, month: str | None, day_of_month: str | None, day_of_year: st
 def _to_tt(seconds: Fraction, scale: str) -> Fraction:
     if scale == "TT":
         return seconds
-    if scale == "TDB":  # the argument in TDB instead of TT changes the result by less than 1e-12 s
+    if scale == "TDB":
+        # The argument in TDB instead of TT changes the result by less than 1e-12 s.
         return seconds - _tdb_minus_tt(seconds)
-    tai = seconds + TAI_FROM_GPS_S if scale == "GPS" else seconds
-    return tai + TT_FROM_TAI_S
+    if scale == "GPS":
+        return seconds + TAI_FROM_GPS_S + TT_FROM_TAI_S
+    return seconds + TT_FROM_TAI_S
 
 
 def _from_tt(seconds: Fraction, scale: str) -> Fraction:
@@ -187,8 +198,9 @@ def _from_tt(seconds: Fraction, scale: str) -> Fraction:
         return seconds
     if scale == "TDB":
         return seconds + _tdb_minus_tt(seconds)
-    tai = seconds - TT_FROM_TAI_S
-    return tai - TAI_FROM_GPS_S if scale == "GPS" else tai
+    if scale == "GPS":
+        return seconds - TT_FROM_TAI_S - TAI_FROM_GPS_S
+    return seconds - TT_FROM_TAI_S
 
 
 def _tdb_minus_tt(seconds: Fraction) -> Fraction:

@@ -1,6 +1,4 @@
-"""Files that a trajectory file names: regular files in its folder, or in folders that the user
-allows.
-"""
+"""Files that a trajectory file names, in its folder or in folders that the user allows."""
 
 from __future__ import annotations
 

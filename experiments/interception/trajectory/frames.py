@@ -1,5 +1,6 @@
-"""Reference frames and centres in orbit ephemeris messages: inertial frames, and names that mean
-the same.
+"""Reference frames and centres in orbit ephemeris messages.
+
+Inertial frames, and names that mean the same.
 """
 
 from __future__ import annotations
@@ -76,8 +77,9 @@ class Frame(NamedTuple):
 
 
 def inertial_frame(name: str, epoch: str | None = None) -> Frame:
-    """Return the inertial frame of a REF_FRAME and its REF_FRAME_EPOCH; a ValueError is raised for
-    any other frame.
+    """Return the inertial frame of a REF_FRAME and its REF_FRAME_EPOCH.
+
+    A ValueError is raised for any other frame.
     """
     plain = re.sub("[^A-Z0-9]", "", name.upper())
     fixed, of_date, of_epoch = (_common_name(plain, names) for names in (FIXED, OF_DATE, OF_EPOCH))

@@ -1,6 +1,4 @@
-"""Interpolation of a table of states: the polynomials of Hermite and Lagrange through the states
-around an epoch.
-"""
+"""Interpolation of a table of states by the polynomials of Hermite and Lagrange."""
 
 from __future__ import annotations
 
@@ -107,13 +105,15 @@ def interpolate(
         [float(times[row] - epoch) + (drift_s(times[row]) - drift_at_epoch_s) for row in window]
     )
     used = states[window]
-    polynomial = hermite if method == "HERMITE" else lagrange
+    polynomial, other_polynomial = lagrange, hermite
+    if method == "HERMITE":
+        polynomial, other_polynomial = hermite, lagrange
     state = polynomial(relative_s, used)
     if len(used) > 2:
         farthest = np.argmax(np.abs(relative_s))
         other = polynomial(np.delete(relative_s, farthest), np.delete(used, farthest, axis=0))
     else:
-        other = (lagrange if method == "HERMITE" else hermite)(relative_s, used)
+        other = other_polynomial(relative_s, used)
 
     nearest = int(np.argmin(np.abs(relative_s)))
     return Interpolated(
@@ -127,8 +127,9 @@ def interpolate(
 
 
 def lagrange(times_s: Floats, states: Floats) -> Floats:
-    """Return the value at time zero of Lagrange's polynomials through positions and velocities,
-    shape (2, 3).
+    """Return the value at time zero of Lagrange's polynomials, shape (2, 3).
+
+    The polynomials of the positions and of the velocities are independent.
 
     The weight of state i is the product of t_j / (t_j - t_i) over all other states j; no time is
     zero.
@@ -166,8 +167,9 @@ def hermite(times_s: Floats, states: Floats) -> Floats:
 
 
 def _basis(times_s: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return Lagrange's weights at time zero, and the sums D_i and G_i of `hermite`, each of shape
-    (n,).
+    """Return Lagrange's weights at time zero, and the sums D_i and G_i, each of shape (n,).
+
+    The sums are defined in `hermite`.
     """
     differences = times_s[:, None] - times_s
     np.fill_diagonal(differences, 1.0)
@@ -180,8 +182,9 @@ def _basis(times_s: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _window(times: Sequence[Fraction], after: int, wanted: int) -> list[int]:
-    """Return the rows of up to a number of states around the interval that ends at row `after`, in
-    order of time.
+    """Return rows of states around the interval that ends at row `after`, in order of time.
+
+    There are up to `wanted` rows.
     """
     apart = SPACING * (times[after] - times[after - 1])
     before = [after - 1]

@@ -25,8 +25,9 @@ INERTIAL_CLASS = 1
 
 
 def kernel_files(names: Sequence[str], folder: Path, allowed: Sequence[Path]) -> list[Path]:
-    """Return the paths of kernels; raise `InputError` for a meta-kernel and for a file that may not
-    be opened.
+    """Return the paths of kernels.
+
+    Raise `InputError` for a meta-kernel and for a file that may not be opened.
     """
     files = []
     for name in names:
@@ -53,8 +54,9 @@ def loaded(files: Sequence[Path]) -> Iterator[Any]:
 
 
 def kernel_state(spice: Any, body: str, time_s: float, frame: str, centre: str) -> Floats:
-    """Return position and velocity of a body at a time of SPICE (TDB from J2000), m and m/s, shape
-    (2, 3).
+    """Return position and velocity of a body at a time of SPICE, m and m/s, shape (2, 3).
+
+    The time is TDB from J2000, s.
     """
     code = spice.namfrm(frame)
     if code == 0 or spice.frinfo(code)[1] != INERTIAL_CLASS:

@@ -44,8 +44,9 @@ _PAIR = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)\s*=\s*(.*)")
 
 
 class OemCovariance(NamedTuple):
-    """A covariance of position and velocity, m^2, m^2/s and m^2/s^2, its epoch and its frame, None
-    if not written.
+    """A covariance of position and velocity, m^2, m^2/s and m^2/s^2, with epoch and frame.
+
+    The frame is None if it is not written.
     """
 
     epoch: str
@@ -90,8 +91,9 @@ class OemSegment:
 
 
 def read_oem(content: bytes, source: str) -> list[OemSegment]:
-    """Return the segments of an OEM file; raise `InputError` with `source` and the line if it is
-    not valid.
+    """Return the segments of an OEM file.
+
+    Raise `InputError` with `source` and the line if it is not valid.
     """
     reading = _Reading(source)
     for number, line in enumerate(re.split("\r\n|\r|\n", _text(content, source)), start=1):
@@ -100,8 +102,9 @@ def read_oem(content: bytes, source: str) -> list[OemSegment]:
 
 
 def _text(content: bytes, source: str) -> str:
-    """Return the text of a file in UTF-8, or in Latin-1, which older programs write into
-    comments.
+    """Return the text of a file in UTF-8, or else in Latin-1.
+
+    Older programs write Latin-1 into comments.
     """
     if content[:100].lstrip().startswith((b"<", b"\xef\xbb\xbf<")):
         raise InputError(
@@ -117,8 +120,9 @@ def _text(content: bytes, source: str) -> str:
 
 
 class _Reading:
-    """A file that is being read line by line; `take` calls the function of the section in which the
-    line is.
+    """A file that is being read line by line.
+
+    `take` calls the function of the section in which the line is.
     """
 
     def __init__(self, source: str) -> None:

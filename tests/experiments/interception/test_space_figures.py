@@ -229,7 +229,7 @@ def test_courses_are_those_of_single_engagements(
 
 
 def test_courses_of_long_flights_keep_the_max_impulses(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("infoset.experiments.interception.course.MAX_STEPS", 40)
+    monkeypatch.setattr("infoset.experiments.interception.course.MAX_SHOWN_STEPS", 40)
     scenario = load_scenario("haiv-2013")
     courses = Courses(scenario, 2)
     assert len(courses.steps) <= 44
