@@ -59,8 +59,8 @@ class Watched:
         information = step.information.copy()
         self.impulses_m_s.append(float(step.impulse_m_s[0, 0]) if step.flying[0] else 0.0)
         if (
-            information._state.lower_label[0] < information._min_label_next()
-            and information._computes_phi[0]
+            information._state.lower_label[0] < information._state.min_label_next
+            and information._state.computes_phi[0]
         ):
             self.sets.append((step.step, information))
 
@@ -72,7 +72,7 @@ class Watched:
         for step, information in self.sets:
             state = information._state
             nearest = state.lower_label[0]
-            farthest = min(state.upper_label[0], information._min_label_next())
+            farthest = min(state.upper_label[0], information._state.min_label_next)
             for label in feasible_labels(information, nearest, farthest):
                 vertices = information.section_at(label).polygons[0].polygon()
                 if not len(vertices):

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from infoset.arrays import Flags, Floats
 from infoset.engine import section_life
 from infoset.engine.predicted_miss import ExtremePoints, PredictedMiss
-from infoset.engine.replays import LAST_REPLAY, ROWS, past_of, replay_label
+from infoset.engine.replays import replay_label
 from infoset.engine.set_state import SetState, SetStatus
+from infoset.engine.workspace import LAST_REPLAY, ROWS, past_of
 from infoset.geometry.convex_polygons import ConvexPolygons
 from infoset.limits import NUMBER, WHOLE, Limits
 
@@ -59,9 +60,6 @@ class Section:
         return self.polygons.linear_map(np.array([[1.0 / x, e / x**2], [0.0, 1.0 / x]]))
 
 
-_TRACKING = SetStatus.TRACKING.value
-
-
 class SetQueries:
     """Queries of B information sets with C lateral axes: z in a plane, y and z in space.
 
@@ -100,7 +98,7 @@ class SetQueries:
     @property
     def tracking(self) -> Flags:
         """Whether each set contains states above the range threshold, shape (B,)."""
-        return np.asarray(self._state.status == _TRACKING)
+        return self._state.tracking
 
     @property
     def inconsistent(self) -> Flags:
@@ -193,7 +191,7 @@ class SetQueries:
 
         They are zero for an empty section.
         """
-        summaries = self._state.summaries
+        summaries = self._state.summaries()
         feasible = self.feasible
         lower = summaries[..., section_life.LOWER_MISS]
         upper = summaries[..., section_life.UPPER_MISS]

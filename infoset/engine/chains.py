@@ -40,11 +40,13 @@ EPSILON = float(np.finfo(np.float64).eps)
 """One ulp of 1. A coordinate of a vertex has an error of about one ulp of its terms, V tau and m;
 where two of them are compared, 4 ulp allow for both, and for the two origins."""
 CAPACITY = 256
-"""Maximum number of vertices of a section, a power of two."""
+"""Maximum number of vertices of a section, a power of two. The sections of a flight of 4 h with
+10 000 steps have 110 vertices on average (docs/performance.md)."""
 MAX_ADDED = 4
 """Maximum number of vertices that one step adds: two at each of its two turns."""
 REDUCED = 160
-"""Number of vertices to which a section of CAPACITY vertices is reduced."""
+"""Number of vertices to which a section of CAPACITY vertices is reduced. Chosen: 24 steps pass
+before the next reduction."""
 ZERO, ONE, TWO = constants(3)
 FORWARD = ONE
 BACKWARD = -ONE
@@ -82,8 +84,16 @@ class Chain(Protocol):
 
 
 class SectionView(NamedTuple):
-    """A section, as kernels take it: the addresses of its chains, the rings with their vertices,
-    and its label, m.
+    """A section for kernels.
+
+    Parameters
+    ----------
+    right, left : Chain
+        Addresses of its chains.
+    rings : ndarray
+        Rings with the vertices of the chains of a batch.
+    label : float
+        Its label, m.
     """
 
     right: Chain
@@ -118,9 +128,7 @@ def write(chain: Chain, rings: Floats, i: int, v: float, m: float) -> None:
 
 @inlined
 def number_vertices(chain: Chain, count: int) -> None:
-    """Note that a chain consists of `count` vertices, numbered from zero, and that its peak is not
-    known.
-    """
+    """Number the vertices of a chain from zero to `count` - 1; its peak is not known then."""
     chain.begin = 0
     chain.end = count
     chain.peak = 0
@@ -205,9 +213,9 @@ def hand_over(
 ) -> None:
     """Move the vertices of a chain after its highest one to the front of the other chain.
 
-    `sign` is 1 if the giver is the right chain, else -1. `between` has V, m and height of the
-    giver's origin relative to the taker's, `same` the rounding errors of a difference of V, and of
-    the difference of the origins' heights.
+    `sign` is 1 if the giver is the right chain, else -1. `between` is the origin of the giver
+    relative to the origin of the taker: V, m and height. `same` are the rounding errors of a
+    difference of V, and of the difference of the heights of the origins.
 
     A decreasing time to go raises the right side, so only vertices whose predecessor is on the
     outer side are moved. Without a turn of the level, heights along it are equal to within
@@ -221,17 +229,19 @@ def hand_over(
     rise = sign * (m - tau * v)
     same_v = same[0]
     same_rise = same[1] + 4.0 * EPSILON * abs(m)
+    between_v, between_m, between_height = between
     front_v, front_m = read(taker, rings, front)
     front_rise = sign * (front_m - tau * front_v)
     while True:
-        if rise + sign * between[2] > front_rise + same_rise:
+        if rise + sign * between_height > front_rise + same_rise:
             front -= 1
-            front_v = v + between[0]
-            front_m = m + between[1]
+            front_v = v + between_v
+            front_m = m + between_m
             write(taker, rings, front, front_v, front_m)
             front_rise = sign * (front_m - tau * front_v)
         if back == first:
             break
+
         before_v, before_m = read(giver, rings, back - 1)
         before_rise = sign * (before_m - tau * before_v)
         if before_rise < rise - same_rise or sign * (v - before_v) > same_v:
@@ -239,10 +249,12 @@ def hand_over(
         # Vertices that coincide to within rounding must not stop the search.
         if before_rise < rise and abs(v - before_v) > same_v:
             break
+
         back -= 1
         v = before_v
         m = before_m
         rise = before_rise
+
     giver.end = back + 1
     taker.begin = front
 
@@ -256,6 +268,7 @@ def turn(section: SectionView, tau: float) -> None:
     same_v = 4.0 * EPSILON * right.reach
     same_m = 2.0 * EPSILON * (abs(right.m) + abs(left.m))
     same = (same_v, same_m + tau * same_v)
+
     v = (right.v - left.v) + (right.v_rest - left.v_rest)
     m = (right.m - left.m) + (right.m_rest - left.m_rest)
     height = origin_height(right, tau) - origin_height(left, tau)
@@ -303,20 +316,23 @@ def heights(section: SectionView, tau: float) -> tuple[float, float]:
 
 @inlined
 def cut_end(chain: Chain, rings: Floats, way: int, up: float, tau: float, level: float) -> int:
-    """Remove the part of a chain above a level, and add a vertex at the intersection; return its
-    number, the new end.
+    """Remove the part of a chain above a level, and add a vertex at the intersection; return the
+    number of this vertex, which is the new end.
 
     `way` is the direction from the end that is cut: FORWARD from the first vertex, BACKWARD from
     the last one. With `up` = 1 greater z is removed, with -1 lesser z. `level` is `up` times the
     height of the level relative to the chain's origin, m.
     """
-    end, other_end = (
-        (chain.begin, chain.end - 1) if way == FORWARD else (chain.end - 1, chain.begin)
-    )
+    end = chain.begin
+    other_end = chain.end - 1
+    if way == BACKWARD:
+        end = chain.end - 1
+        other_end = chain.begin
     v, m = read(chain, rings, end)
     height = up * (m - tau * v)
     if height <= level:
         return end
+
     while end != other_end:
         inner_v, inner_m = read(chain, rings, end + way)
         inner_height = up * (inner_m - tau * inner_v)
@@ -330,6 +346,7 @@ def cut_end(chain: Chain, rings: Floats, way: int, up: float, tau: float, level:
         v = inner_v
         height = inner_height
         end += way
+
     write(chain, rings, end, v, up * level + tau * v)
     return end
 
@@ -349,6 +366,7 @@ def cut(section: SectionView, tau: float, lower: float, upper: float) -> tuple[b
     overlap = min(maximum - lower, upper - minimum)
     if overlap < 0.0 or lower > upper:
         return False, min(overlap, upper - lower)
+
     right_height = origin_height(right, tau)
     left_height = origin_height(left, tau)
     if maximum > upper:
@@ -362,11 +380,11 @@ def cut(section: SectionView, tau: float, lower: float, upper: float) -> tuple[b
 
 @inlined
 def find_peak(chain: Chain, rings: Floats, sign: float, magnitude: float) -> int:
-    """Return the number of the vertex with the maximum (right chain) or minimum (left chain)
-    predicted miss; store it.
+    """Return and store the number of the vertex with the maximum predicted miss in the right chain,
+    the minimum one in the left chain.
 
-    `sign` is 1 for the right chain, -1 for the left one. `magnitude` is that of the terms of the
-    predicted misses, to which their rounding error is relative, m. The search starts at the
+    `sign` is 1 for the right chain, -1 for the left one. `magnitude` is the magnitude of the terms
+    of the predicted misses, to which their rounding error is relative, m. The search starts at the
     previous peak and ends where the miss decreases by more than rounding, so that vertices that
     nearly coincide do not stop it.
     """
@@ -376,6 +394,7 @@ def find_peak(chain: Chain, rings: Floats, sign: float, magnitude: float) -> int
     miss = sign * read(chain, rings, peak)[1]
     # 16 ulp, as for a cut: more than the errors of two misses.
     rounding = 16.0 * EPSILON * (abs(miss) + magnitude)
+
     start_at = peak
     for way in (1, -1):
         i = start_at + way
@@ -387,13 +406,14 @@ def find_peak(chain: Chain, rings: Floats, sign: float, magnitude: float) -> int
             elif here < miss - rounding:
                 break
             i += way
+
     chain.peak = peak
     return peak
 
 
 @inlined
 def first_near_peak(chain: Chain, rings: Floats, sign: float, tolerance: float) -> int:
-    """First vertex before the peak whose predicted miss equals that of the peak to within a
+    """First vertex from which on the predicted miss equals the miss at the peak to within a
     tolerance.
     """
     i = chain.peak
@@ -405,9 +425,7 @@ def first_near_peak(chain: Chain, rings: Floats, sign: float, tolerance: float) 
 
 @inlined
 def max_and_min_miss(section: SectionView, tau: float) -> tuple[float, float]:
-    """Return the maximum and the minimum predicted miss of a section; store their vertices as
-    peaks.
-    """
+    """Return the maximum and the minimum predicted miss, m; store their vertices as peaks."""
     right, left, rings, _ = section
     # A miss is z + V tau; both terms may be far greater than the sum.
     reach = tau * right.reach
@@ -420,18 +438,18 @@ def max_and_min_miss(section: SectionView, tau: float) -> tuple[float, float]:
 def extreme_points(
     section: SectionView, tau: float, relative: float, slack: float
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return points with the extremes of the predicted miss; `max_and_min_miss` must have stored
-    the peaks.
+    """Return V and m of the lowest point with the maximum predicted miss, and of the highest point
+    with the minimum one.
 
-    They are V and m of the lowest point with the maximum miss, and of the highest point with the
-    minimum. `relative` and `slack` are tolerances for equal misses, relative to the interval and to
-    the magnitudes of the terms.
+    `max_and_min_miss` must have stored the peaks. `relative` and `slack` are tolerances for equal
+    misses, relative to the interval and to the magnitudes of the terms.
     """
     right, left, rings, _ = section
     upper_v, upper = vertex(right, rings, right.peak)
     lower_v, lower = vertex(left, rings, left.peak)
     magnitude = tau * (abs(upper_v) + abs(lower_v)) + abs(upper) + abs(lower)
     tolerance = relative * (upper - lower) + slack * magnitude
+
     upper_at = first_near_peak(right, rings, 1.0, tolerance)
     lower_at = first_near_peak(left, rings, -1.0, tolerance)
     return vertex(right, rings, upper_at), vertex(left, rings, lower_at)
@@ -458,11 +476,13 @@ def margin_in(section: SectionView, tau: float, v: float, z: float) -> float:
     rounded = (tau * (last_v - v), (last_m - tau * last_v) - z)
     end = vertex_from(left, rings, left.end - 1, tau, v, z)
     last = vertex_from(right, rings, right.begin, tau, v, z)
+
     # The edge between the chains: a start rounded to absolute coordinates may be beyond the state
     # in a section that is thinner than this rounding. It is used for the distance only, which keeps
     # the last digit of published margins.
     nearest, _ = polygon.pass_edge(np.inf, FALSE, rounded, last, 0.0, 0.0)
     _, inside = polygon.pass_edge(np.inf, FALSE, end, last, 0.0, 0.0)
+
     for chain in (right, left):
         for i in range(chain.begin, chain.end):
             end = vertex_from(chain, rings, i, tau, v, z)
@@ -486,6 +506,7 @@ def outline(section: SectionView, tau: float, out: Floats) -> int:
             z = m - tau * v
             if i > chain.begin or made == 0 or not meets(out, made - 1, v, z, right.reach, tau):
                 made = polygon.append(out, made, v, z)
+
     while made > 1 and meets(out, made - 1, out[0, 0], out[0, 1], right.reach, tau):
         made -= 1
     return made
@@ -516,7 +537,12 @@ def reduce_outward(section: SectionView, tau: float, points: Floats) -> None:
     right, left, rings, _ = section
     in_right = right.end - right.begin
     in_left = left.end - left.begin
-    longer, sign = (right, 1.0) if in_right > in_left else (left, -1.0)
+    longer = left
+    sign = -1.0
+    if in_right > in_left:
+        longer = right
+        sign = 1.0
+
     count = ZERO
     for i in range(longer.begin, longer.end):
         v, m = read(longer, rings, i)
@@ -525,6 +551,7 @@ def reduce_outward(section: SectionView, tau: float, points: Floats) -> None:
     count, done = polygon_reduction.drop_inner_edges(points, count, most, points[CAPACITY + 2 :])
     if not done:
         count = polygon_reduction.box_around(points, count, sign, tau)
+
     for i in range(count):
         write(longer, rings, i, points[i, 0], points[i, 1])
         # |V| of a new vertex may exceed the previous bound.
@@ -537,11 +564,11 @@ def reduce_outward(section: SectionView, tau: float, points: Floats) -> None:
 def cut_misses(
     section: SectionView, tau: float, lower: float, upper: float, points: Floats
 ) -> tuple[bool, float]:
-    """Intersect a section with the band of predicted misses lower <= m <= upper; returns are those
-    of `cut`.
+    """Intersect a section with the band of predicted misses lower <= m <= upper.
 
-    This band is not parallel to the level, so that it may cut any edge: the chains are computed
-    anew. O(vertices). `points` is a working array of CAPACITY + 2 vertices.
+    Return whether it is not empty, and the overlap in m, as `cut` does. This band is not parallel
+    to the level, so that it may cut any edge: the chains are computed anew. O(vertices). `points`
+    is a working array of CAPACITY + 2 vertices.
     """
     right, left, rings, _ = section
     count = ZERO
@@ -552,14 +579,15 @@ def cut_misses(
     count, overlap = polygon.clip_to_band(points, count, 0.0, 1.0, lower, upper)
     if count == 0:
         return False, overlap
+
     bottom, top = polygon.extremes(points, count, -tau, 1.0)
     thickness = polygon.height(points, top, -tau, 1.0) - polygon.height(points, bottom, -tau, 1.0)
-    if thickness <= 16.0 * EPSILON * (
-        abs(points[top, 1]) + abs(points[bottom, 1]) + tau * right.reach
-    ):
+    magnitude = abs(points[top, 1]) + abs(points[bottom, 1]) + tau * right.reach
+    if thickness <= 16.0 * EPSILON * magnitude:
         # All heights are equal to within the slack of a cut: the vertices of extreme V are the ends
         # of both chains.
         bottom, top = polygon.extremes(points, count, -1.0, 0.0)
+
     write_chain(right, rings, points, count, bottom, top)
     write_chain(left, rings, points, count, top, bottom)
     return True, overlap

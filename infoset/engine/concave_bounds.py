@@ -6,7 +6,7 @@ import numpy as np
 
 from infoset._compile import ZERO, allocation_free
 from infoset.arrays import Floats
-from infoset.engine.replays import Records
+from infoset.engine.workspace import Records
 
 CERTAIN = 1e-13
 """Labels count as infeasible if their overlap is certainly less than minus this number times the
@@ -27,9 +27,9 @@ def bound_between(
     """Upper bound on [p, q] of a concave function with given values, plus a line through zero at
     its middle, by (12).
 
-    `values` are those of the function at increasing `labels`, of which `first` are at most p and
-    the others at least q. Outside of two of its points, a concave function lies below the line
-    through them. The bound is infinite if neither side has two points.
+    `values` are the values at increasing `labels`, of which `first` are at most p and the others at
+    least q. Outside of two of its points, a concave function lies below the line through them. The
+    bound is infinite if neither side has two points.
     """
     has_left = first >= 2
     has_right = labels.size - first >= 2
@@ -44,15 +44,17 @@ def bound_between(
         b = first + 1
         right_p = line_at(p, labels[a], values[a], labels[b], values[b])
         right_q = line_at(q, labels[a], values[a], labels[b], values[b])
+
     middle = 0.5 * (p + q)
-    best = max(
-        min(left_p, right_p) + slope * (p - middle), min(left_q, right_q) + slope * (q - middle)
-    )
+    bound_p = min(left_p, right_p) + slope * (p - middle)
+    bound_q = min(left_q, right_q) + slope * (q - middle)
+    bound = max(bound_p, bound_q)
     if has_left and has_right and (left_p < right_p) != (left_q < right_q):
+        # The lines intersect between p and q, where their minimum has a corner.
         share = (right_p - left_p) / ((right_p - left_p) - (right_q - left_q))
         x = p + share * (q - p)
-        best = max(best, left_p + share * (left_q - left_p) + slope * (x - middle))
-    return best
+        bound = max(bound, left_p + share * (left_q - left_p) + slope * (x - middle))
+    return bound
 
 
 @allocation_free
@@ -66,29 +68,30 @@ def is_infeasible_between(infeasible: Records, latest: Floats) -> bool:
     last_event = infeasible[0].emptied_at
     for i in range(1, len(infeasible)):
         last_event = max(last_event, infeasible[i].emptied_at)
-    known = latest[0]
-    values = latest[1]
+
+    labels = latest[0]
+    overlaps = latest[1]
     count = ZERO
     for i in range(len(infeasible)):
-        if infeasible[i].emptied_at == last_event and (
-            count == 0 or infeasible[i].label > known[count - 1]
-        ):
-            known[count], values[count] = infeasible[i].label, infeasible[i].overlap
+        record = infeasible[i]
+        is_new = count == 0 or record.label > labels[count - 1]
+        if record.emptied_at == last_event and is_new:
+            labels[count] = record.label
+            overlaps[count] = record.overlap
             count += 1
+    labels = labels[:count]
+    overlaps = overlaps[:count]
+
     minimum = infeasible[0].label
     maximum = infeasible[len(infeasible) - 1].label
-    last = known[count - 1]
-    rounding = -CERTAIN * maximum
-    known = known[:count]
-    values = values[:count]
-    if (
-        minimum < known[0]
-        and bound_between(known, values, ZERO, minimum, known[0], 0.0) >= rounding
-    ):
+    certain = -CERTAIN * maximum
+    lowest = labels[0]
+    highest = labels[count - 1]
+    if minimum < lowest and bound_between(labels, overlaps, ZERO, minimum, lowest, 0.0) >= certain:
         return False
     for i in range(count - 1):
-        if bound_between(known, values, i + 1, known[i], known[i + 1], 0.0) >= rounding:
+        if bound_between(labels, overlaps, i + 1, labels[i], labels[i + 1], 0.0) >= certain:
             return False
-    return bool(
-        last == maximum or bound_between(known, values, count, last, maximum, 0.0) < rounding
-    )
+    if highest < maximum:
+        return bool(bound_between(labels, overlaps, count, highest, maximum, 0.0) < certain)
+    return True

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import copy
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from infoset.arrays import Flags, Floats, Integers
 
 ANGLE, IMPULSE, PREDICTION, RATE, WIDENING = range(5)
 """Kinds of events."""
 ROOM_AT_START = 64
+"""Initial room of a history, in events; it is doubled when it is full."""
 
 
 class EventLog(NamedTuple):
@@ -63,8 +65,8 @@ NO_SIGHT = LastSight(False, 0.0, 0.0, 0, 0.0)
 
 
 class History:
-    """Events of a batch of B engagements: the kinds are common to all of them, the values belong to
-    one each.
+    """Events of a batch of B engagements. All engagements have the same kinds of events, each with
+    values of its own.
 
     Attributes
     ----------
@@ -103,10 +105,11 @@ class History:
         """Append an event, with values of shape (C, B), and return its number."""
         event = self.events
         if event == self.kinds.size:
-            self.kinds = np.concatenate((self.kinds, np.zeros_like(self.kinds)))
-            self.errors = np.concatenate((self.errors, np.zeros_like(self.errors)))
-            self.values = np.concatenate((self.values, np.zeros_like(self.values)))
-            self.applies = np.concatenate((self.applies, np.zeros_like(self.applies)))
+            self.kinds = _doubled(self.kinds)
+            self.errors = _doubled(self.errors)
+            self.values = _doubled(self.values)
+            self.applies = _doubled(self.applies)
+
         self.kinds[event] = kind
         self.errors[event] = error
         self._has_rates |= kind == RATE
@@ -147,3 +150,8 @@ class History:
             if isinstance(value, np.ndarray):
                 setattr(twin, name, value.copy())
         return twin
+
+
+def _doubled(array: NDArray[Any]) -> NDArray[Any]:
+    """Return a copy of an array with twice as many rows; the new ones are zero."""
+    return np.concatenate((array, np.zeros_like(array)))

@@ -15,9 +15,9 @@ from infoset.model import Interval, SetModel
 
 BOUND_SLACK = 1e-9
 """Relative enlargement of the bounds of the guaranteed model; rounding errors are far smaller."""
-ROUNDING = 16.0 * sys.float_info.epsilon
-"""Enlargement of the box, in the largest values that its coordinates take: that of a cut, which is
-16 ulp.
+BOX_ROUNDING = 16.0 * sys.float_info.epsilon
+"""Enlargement of the box, relative to the largest values of its coordinates: 16 ulp, as for a
+cut.
 """
 
 
@@ -110,6 +110,7 @@ def section_laws(model: SetModel) -> tuple[SectionLaw, ...]:
     laws = [_law(model.axis(name)) for name in model.axes]
     if len(laws) == 1:
         return tuple(laws)
+
     psi = model.pointing_error_rad if model.is_guaranteed else 0.0
     return tuple(
         law._replace(
@@ -137,16 +138,14 @@ def law_of(laws: Laws, channel: int) -> SectionLaw:
 
 
 def impulse_doubts(impulse: Floats, law: SectionLaw) -> Floats:
-    """Return the error bounds of impulses of shape (C, B) along an axis, m/s, shape (B,), as
-    `impulse_doubt` does.
-    """
+    """Return the bounds of `impulse_doubt` for impulses of shape (C, B), m/s, shape (B,)."""
     along = np.abs(impulse[law.channel])
     if law.pointing_across == 0.0:
         return np.asarray(law.impulse_error * along)
+
     size = np.hypot.reduce(impulse, axis=0)
-    return np.asarray(
-        law.impulse_error * along + (law.pointing_along * along + law.pointing_across * size)
-    )
+    pointing = law.pointing_along * along + law.pointing_across * size
+    return np.asarray(law.impulse_error * along + pointing)
 
 
 def _law(model: SetModel) -> SectionLaw:
@@ -164,27 +163,31 @@ def _law(model: SetModel) -> SectionLaw:
     slope = sensor.error_slope_rad_per_m
     error = sensor.constant_error_rad
     half_v = model.acceleration_m_s2 * model.step_s
+    impulse_error = 0.0
     guaranteed = model.is_guaranteed
     if guaranteed:
         slope *= (1.0 + math.copysign(eta, slope)) * (1.0 + BOUND_SLACK)
         error *= 1.0 + BOUND_SLACK
+        impulse_error = (1.0 + model.execution_error_relative) / (1.0 - eta) - 1.0
+
     z_min, z_max = _scaled_outward(box.z_m, eta)
     vz_min, vz_max = _scaled_outward(box.vz_m_s, eta)
     # The true distance of a label is at least (1 - eta) x.
     centroid = sensor.centroid_error_m * (1.0 + BOUND_SLACK) / (1.0 - eta)
     min_label, max_label = model.label_limits_m
     if guaranteed:
+        # Gravity changes the scale 1/(1 + eta), and thereby V where z is not zero. The rounding
+        # term keeps coordinates that are known exactly inside the set.
         offset = max(abs(z) for z in box.z_m)
         speed = max(abs(v) for v in box.vz_m_s)
         rate = model.closing_speed_m_s / min_label
-        # Gravity changes the scale 1/(1 + eta), and thereby V where z is not zero. The rounding
-        # term keeps coordinates that are known exactly inside the set.
-        slack = rate * offset * model.gravity_speed_change + ROUNDING * (speed + rate * offset)
+        slack = rate * offset * model.gravity_speed_change + BOX_ROUNDING * (speed + rate * offset)
         vz_min = vz_min - slack
         vz_max = vz_max + slack
-        slack = ROUNDING * (offset + speed * max_label / model.closing_speed_m_s)
+        slack = BOX_ROUNDING * (offset + speed * max_label / model.closing_speed_m_s)
         z_min = z_min - slack
         z_max = z_max + slack
+
     return SectionLaw(
         closing_speed=float(model.closing_speed_m_s),
         step=float(model.step_s),
@@ -195,9 +198,7 @@ def _law(model: SetModel) -> SectionLaw:
         # end: their sum contains the lens.
         half_v_at_start=0.5 * float(half_v) if guaranteed else 0.0,
         disturbance_lead=0.0 if guaranteed else 0.5 * float(model.step_s),
-        impulse_error=(1.0 + model.execution_error_relative) / (1.0 - eta) - 1.0
-        if guaranteed
-        else 0.0,
+        impulse_error=impulse_error,
         error_at_zero_range=float(error),
         error_slope=float(slope),
         exact_angles=guaranteed,
@@ -228,7 +229,12 @@ def _scaled_outward(interval: Interval, eta: float) -> Interval:
     if eta == 0.0:
         return float(minimum), float(maximum)
     slack = 1.0 + BOUND_SLACK
-    return (
-        slack * minimum / (1.0 - eta) if minimum < 0.0 else minimum / (1.0 + eta) / slack,
-        slack * maximum / (1.0 - eta) if maximum > 0.0 else maximum / (1.0 + eta) / slack,
-    )
+    if minimum < 0.0:
+        minimum = slack * minimum / (1.0 - eta)
+    else:
+        minimum = minimum / (1.0 + eta) / slack
+    if maximum > 0.0:
+        maximum = slack * maximum / (1.0 - eta)
+    else:
+        maximum = maximum / (1.0 + eta) / slack
+    return minimum, maximum

@@ -18,7 +18,7 @@ from infoset._compile import ZERO, allocation_free, inlined
 from infoset.arrays import Floats
 from infoset.engine import chains
 from infoset.engine.chains import SectionView
-from infoset.engine.history import ANGLE, IMPULSE, PREDICTION, LastSight
+from infoset.engine.history import ANGLE, IMPULSE, PREDICTION, WIDENING, LastSight
 from infoset.engine.section_law import SectionLaw
 
 CUT_SLACK = 16.0 * chains.EPSILON
@@ -33,6 +33,7 @@ ANGLE_SLACK = 1e-12
 """Added to an angle of about 1 rad, whose iteration has rounding errors of some 1e-16 rad."""
 
 NEVER_EMPTIED = np.iinfo(np.int64).max
+"""Event at which a feasible label became empty: after all others."""
 
 # Columns of a section's summary.
 LOWER_MISS, UPPER_MISS, Z_MIN, Z_MAX = range(4)
@@ -56,18 +57,21 @@ def start_section(section: SectionView, room: float, law: SectionLaw) -> None:
     """Write the section at t = 0: the box of part 1 of Lemma 1, or the rectangle, with half a
     disturbance of Lemma 3.
 
-    Both are enlarged by `room` along z, m: zero, or what the labels of a window need in the section
-    of its middle. The rectangle is that of the paper (section 4), but with V_x at the end of its
-    interval that makes the rectangle larger. The printed formula always takes the lower end; both
-    agree if z can have either sign.
+    Both are enlarged by `room` along z, m: zero for a single label, for the middle of a window the
+    bound by which z differs between the labels of the window and the middle.
+
+    The rectangle is the one of the paper (section 4), but with V_x at the end of its interval that
+    makes the rectangle larger. The printed formula always takes the lower end; both agree if z can
+    have either sign.
     """
     x = section.label
     e = law.closing_speed
     z_min = law.z_min
     z_max = law.z_max
-    shift_at_min = shift_at_max = 0.0
     lowest = law.vz_min
     highest = law.vz_max
+    shift_at_min = 0.0
+    shift_at_max = 0.0
     if law.rectangle:
         lowest -= max(law.vx_min * z_min, law.vx_max * z_min) / x
         highest -= min(law.vx_min * z_max, law.vx_max * z_max) / x
@@ -75,24 +79,18 @@ def start_section(section: SectionView, room: float, law: SectionLaw) -> None:
         shift_at_max = -e * math.atan(z_max / x)
         z_min = math.atan(z_min / x) * x
         z_max = math.atan(z_max / x) * x
-    z_min = z_min - room
-    z_max = z_max + room
+
     tau = time_to_go(x, ZERO, law)
-    chains.start(
-        section,
-        tau,
-        (lowest + shift_at_min, highest + shift_at_min, z_min),
-        (lowest + shift_at_max, highest + shift_at_max, z_max),
-    )
+    bottom = (lowest + shift_at_min, highest + shift_at_min, z_min - room)
+    top = (lowest + shift_at_max, highest + shift_at_max, z_max + room)
+    chains.start(section, tau, bottom, top)
     if law.half_v_at_start > 0.0:
         chains.spread(section, tau, law.half_v_at_start)
 
 
 @inlined
 def nearest_range(travelled: float, law: SectionLaw) -> float:
-    """Return the minimum range of a label in the set after the range has decreased by `travelled`,
-    m.
-    """
+    """Return the minimum range of a label, m, after the range has decreased by `travelled`, m."""
     return max(law.label_min - travelled, law.min_range)
 
 
@@ -100,14 +98,14 @@ def nearest_range(travelled: float, law: SectionLaw) -> float:
 def steepest_angles(
     alpha: float, across: float, range_m: float, law: SectionLaw
 ) -> tuple[float, float]:
-    """Return the maximum sizes of two measured angles, rad, that agree with the measurements up to
-    a range.
+    """Return the maximum sizes of two angles, rad, that agree with their measurements up to a
+    range.
 
     The solution s of Assumption 5 for both axes, with the distances (14). `alpha` and `across` are
     the measured angles of this axis and of the other one. The distance is at most x/(cos(own)
     cos(other)). If one of the angles is unbounded, the first is pi/2 and the second zero.
 
-    The bound of a camera is largest at the minimum distance, that of the nearest label. Another
+    The bound of a camera is largest at the minimum distance, which the nearest label has. Another
     error bound that grows with the distance r grows with the angles: in a plane r = x/cos(alpha),
     in space r is at most x/(cos(alpha_y) cos(alpha_z)). The maximum angles are the minimum solution
     of s = |alpha_m| + a + h(r(s)). Three fixed-point iterations approach it from below; a fourth
@@ -120,8 +118,11 @@ def steepest_angles(
         centroid = law.centroid_error / nearest_range(law.label_max - range_m, law)
     minimum = abs(alpha) + law.error_at_zero_range + centroid
     other_min = abs(across) + law.other_error_at_zero_range + centroid
-    before = own = minimum + growth
-    other_before = other = other_min + other_growth
+
+    own = minimum + growth
+    other = other_min + other_growth
+    before = own
+    other_before = other
     for _ in range(3):
         if own >= RIGHT_ANGLE or other >= RIGHT_ANGLE:
             return RIGHT_ANGLE, 0.0
@@ -131,14 +132,15 @@ def steepest_angles(
         own = minimum + growth / cosine / other_cosine
         other_before = other
         other = other_min + other_growth / cosine / other_cosine
+
     own += (own - before) + ANGLE_SLACK
     other += (other - other_before) + ANGLE_SLACK
     if own >= RIGHT_ANGLE or other >= RIGHT_ANGLE:
         return RIGHT_ANGLE, 0.0
     cosine = math.cos(own)
     other_cosine = math.cos(other)
-    passed = minimum + growth / cosine / other_cosine <= own
-    if passed and other_min + other_growth / cosine / other_cosine <= other:
+    has_passed = minimum + growth / cosine / other_cosine <= own
+    if has_passed and other_min + other_growth / cosine / other_cosine <= other:
         return own, other
     return RIGHT_ANGLE, 0.0
 
@@ -169,20 +171,21 @@ def slope_band(
 def linear_slope_band(
     alpha: float, across: float, travelled: float, x: float, law: SectionLaw
 ) -> tuple[float, float]:
-    """Return what `slope_band` does for an error bound that rises with the range, or that of a
+    """Return the band of `slope_band` for an error bound that rises with the range, or for a
     camera: (21).
 
     Bounds over all labels need an upper bound whose product with x is a concave function of x.
     Therefore these two error bounds have a wider band, whose product with x is linear. If the bound
     h(x) rises with range, x h(x) is convex: a chord and a tangent are above it. With the bound p +
     c/x of a camera, x tan(alpha + p + c/x) is convex: a tangent in the angle, with the slope at the
-    steepest angle of all labels, is above it.
+    steepest angle of all labels, is above it. The band is unbounded if an angle may be pi/2.
     """
     bound = law.error_at_zero_range + law.error_slope * x
     if law.centroid_error > 0.0 and x > 0.0:
         bound += law.centroid_error / x
     if not law.exact_angles:
         return alpha - bound, alpha + bound
+
     far = law.label_max - travelled
     own, other = steepest_angles(alpha, across, far, law)
     if own >= RIGHT_ANGLE:
@@ -191,9 +194,9 @@ def linear_slope_band(
     if law.error_slope > 0.0:
         near = max(law.label_min - travelled, 0.0)
         # The error bound depends on the true distance, at most x/(cos(own) cos(other)).
-        bound = law.error_at_zero_range + law.error_slope * (
-            (near + far - near * far / x) / cosine / math.cos(other)
-        )
+        chord = near + far - near * far / x
+        distance = chord / cosine / math.cos(other)
+        bound = law.error_at_zero_range + law.error_slope * distance
     bound = bound / cosine**2
     return math.tan(alpha) - bound, math.tan(alpha) + bound
 
@@ -202,21 +205,20 @@ def linear_slope_band(
 def measure_section(
     section: SectionView, elapsed: int, alpha: float, across: float, law: SectionLaw
 ) -> tuple[bool, float]:
-    """Cut a section by an angle measurement; return what `chains.cut` does. `across` is the angle
-    of the other axis.
+    """Cut a section by an angle measurement.
 
-    By (8), z lies between x tan(alpha - b) and x tan(alpha + b), with the error bound b of the
-    angle at range x. The band is widened by 16 ulp, so that rounding does not exclude true states
-    on the border, which extremal noise produces. The ulp is that of the terms of a height and does
-    not decrease with the range.
+    Return whether it is not empty, and the overlap of section and band, m, see `chains.cut`.
+    `across` is the angle of the other axis. By (8), z lies between x tan(alpha - b) and x tan(alpha
+    + b), with the error bound b of the angle at range x. The band is widened by 16 ulp, so that
+    rounding does not exclude true states on the border, which extremal noise produces. The ulp is
+    relative to the terms of a height and does not decrease with the range.
     """
     label = section.label
     x = range_of(label, elapsed, law)
     bound = law.error_at_zero_range + law.error_slope * x
     lower, upper = slope_band(alpha, across, law.closing_speed * (law.step * elapsed), x, law)
-    slack = CUT_SLACK * (
-        label * (abs(alpha) + bound) + section.right.reach * (label / law.closing_speed)
-    )
+    terms = label * (abs(alpha) + bound) + section.right.reach * (label / law.closing_speed)
+    slack = CUT_SLACK * terms
     return chains.cut(section, x / law.closing_speed, x * lower - slack, x * upper + slack)
 
 
@@ -251,24 +253,22 @@ def pointing_doubt(impulse: float, across: float, law: SectionLaw) -> float:
 
 @inlined
 def impulse_doubt(impulse: float, across: float, law: SectionLaw) -> float:
-    """Return the error bound of an impulse along an axis, m/s: (2), in space (15); `across` is
-    along the other axis.
+    """Return the error bound of an impulse, m/s: (2), in space (15); `across` is along the other
+    axis.
     """
     return abs(impulse) * law.impulse_error + pointing_doubt(impulse, across, law)
 
 
 @inlined
 def across_of(values: Floats, i: int, law: SectionLaw) -> float:
-    """Return the value with number `i` along the other axis, of values of shape (C, N); zero in a
-    plane.
-    """
+    """Return value `i` along the other axis, of values of shape (C, N); zero in a plane."""
     return values[law.other, i] if law.other >= 0 else 0.0
 
 
 @inlined
 def widen_section(section: SectionView, elapsed: int, law: SectionLaw) -> None:
-    """Enlarge a section by the error bound b of one angle measurement: by e b in V, or x b in the
-    predicted miss.
+    """Enlarge a section by the error bound b of an angle: by e b in V, or x b in the predicted
+    miss.
     """
     x = range_of(section.label, elapsed, law)
     bound = law.error_at_zero_range + law.error_slope * x + law.centroid_error / x
@@ -279,10 +279,9 @@ def widen_section(section: SectionView, elapsed: int, law: SectionLaw) -> None:
 def shift_section(
     section: SectionView, elapsed: int, impulse: float, across: float, law: SectionLaw
 ) -> None:
-    """Shift a section by an impulse k: V becomes V - k, and is widened by the error bound of k, (2)
-    or (15).
+    """Shift a section by an impulse k, V becomes V - k, and widen it by the error bound of k.
 
-    `across` is the impulse along the other axis.
+    The error bound is (2) or (15). `across` is the impulse along the other axis.
     """
     tau = time_to_go(section.label, elapsed, law)
     doubt = impulse_doubt(impulse, across, law)
@@ -293,10 +292,10 @@ def shift_section(
 
 @inlined
 def predict_section(section: SectionView, elapsed: int, law: SectionLaw) -> None:
-    """Move a section to step `elapsed`: the level turns, and the segment of the disturbance, 8 ulp
-    longer, is added.
+    """Move a section to step `elapsed`: turn the level and add the segment of the disturbance.
 
-    By Lemma 3, the segment is nu times the step in V, with both halves of adjacent steps.
+    By Lemma 3, the segment is nu times the step in V, with both halves of adjacent steps; it is
+    made 8 ulp longer.
     """
     tau = time_to_go(section.label, elapsed, law)
     chains.turn(section, tau + law.disturbance_lead)
@@ -306,11 +305,36 @@ def predict_section(section: SectionView, elapsed: int, law: SectionLaw) -> None
 
 
 @inlined
+def move_section(
+    section: SectionView,
+    kind: int,
+    value: float,
+    across: float,
+    elapsed: int,
+    law: SectionLaw,
+    points: Floats,
+) -> None:
+    """Apply an event to a section that is not a measurement: a prediction, an impulse or an
+    enlargement.
+
+    `elapsed` is the number of predictions before the event. `points` is a working array.
+    """
+    if kind == PREDICTION:
+        if chains.is_crowded(section):
+            chains.reduce_outward(section, time_to_go(section.label, elapsed, law), points)
+        predict_section(section, elapsed + 1, law)
+    elif kind == IMPULSE:
+        shift_section(section, elapsed, value, across, law)
+    elif kind == WIDENING:
+        widen_section(section, elapsed, law)
+
+
+@inlined
 def summarise_section(
     section: SectionView, elapsed: int, law: SectionLaw, summaries: Floats, b: int, s: int
 ) -> None:
-    """Write the extremes (13), (14) of the paper: those of the predicted miss z + V x/e -+ nu/2
-    (x/e)^2 of a section.
+    """Write the extremes of the predicted miss z + V x/e -+ nu/2 (x/e)^2 of a section, (13) and
+    (14) of the paper.
 
     `summaries` has the shape (C, B, S, columns).
     """

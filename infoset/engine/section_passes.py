@@ -14,8 +14,7 @@ from infoset.arrays import Flags, Floats, Integers
 from infoset.engine import chain_storage, chains
 from infoset.engine.chain_storage import Chains, view_of
 from infoset.engine.chains import SectionView
-from infoset.engine.history import EventLog, LastSight
-from infoset.engine.section_law import Laws, SectionLaw, law_of
+from infoset.engine.section_law import Laws, law_of
 from infoset.engine.section_life import (
     CUT_SLACK,
     LOWER_MISS,
@@ -30,23 +29,22 @@ from infoset.engine.section_life import (
     predict_section,
     range_of,
     shift_section,
-    sight_after,
     start_section,
     steepest_angles,
     summarise_section,
     time_to_go,
 )
-from infoset.engine.section_window import Rate, measure_rate_section, new_window
 
 TIE_TOLERANCE = 1e-9
 """Misses of two vertices that differ by less than this part of the interval of misses count as
-equal, those of one edge; their rounding errors are far smaller."""
+equal, as if an edge of equal misses joined them; their rounding errors are far smaller."""
 
 MOVED, SUMMARISED, WITH_HEIGHTS = constants(3)
-"""What `step_all` brings up to date: sections, and with each further value also summaries, and
-their columns of z.
+"""Results that `step_all` brings up to date: MOVED the sections, SUMMARISED also their summaries,
+WITH_HEIGHTS also the columns of z of the summaries.
 """
 NO_EVENT = -1
+"""Number of the event of a step without a measurement."""
 
 
 class Slot(Protocol):
@@ -57,7 +55,8 @@ class Slot(Protocol):
     label : float
         Label, m.
     feasible : bool
-        Whether the slot contains sections that are not empty.
+        Whether the slot contains sections that are not empty. A section that was removed with its
+        label is not feasible either, and its `emptied_at` is NEVER_EMPTIED.
     emptied_at : int
         Number of the event that made a section empty, or NEVER_EMPTIED.
     overlap : float
@@ -180,18 +179,15 @@ def list_rows(channel: int, event: int, measured: Flags, wanted: int, sections: 
     stale = sections.stale
     count = 0
     for b in range(len(used)):
-        if (
-            behind[b]
-            or measured[b]
-            or (stale[b] and wanted >= SUMMARISED)
-            or wanted == WITH_HEIGHTS
-        ):
-            for s in range(used[b]):
-                if is_cut(sections, channel, event, b, s):
-                    rows[count, 0] = row_of(sections, channel, b, s)
-                    rows[count, 1] = b
-                    rows[count, 2] = s
-                    count += 1
+        is_summarised = wanted == WITH_HEIGHTS or (stale[b] and wanted == SUMMARISED)
+        if not (behind[b] or measured[b] or is_summarised):
+            continue
+        for s in range(used[b]):
+            if is_cut(sections, channel, event, b, s):
+                rows[count, 0] = row_of(sections, channel, b, s)
+                rows[count, 1] = b
+                rows[count, 2] = s
+                count += 1
     return count
 
 
@@ -208,10 +204,10 @@ def step_all(
     """Predict, cut and summarise the feasible sections in one pass; return the number of labels
     that became empty.
 
-    Sections that are behind are moved to the present step `elapsed`. Those of the engagements that
-    are `measured`, shape (B,), are cut by angles `alpha`, shape (C, B), rad, and summarised.
-    `event` is the number of the measurement, `NO_EVENT` without one. `wanted` is what is brought up
-    to date besides: `MOVED`, `SUMMARISED` or `WITH_HEIGHTS`.
+    Sections that are behind are moved to the present step `elapsed`. The sections of engagements
+    that are `measured`, shape (B,), are cut by angles `alpha`, shape (C, B), rad, and summarised.
+    `event` is the number of the measurement, `NO_EVENT` without one. `wanted` is `MOVED`,
+    `SUMMARISED` or `WITH_HEIGHTS`: the results that are brought up to date for all engagements.
     """
     newly_emptied = 0
     slots = sections.slots
@@ -229,92 +225,28 @@ def step_all(
             section = view_of(sections.chains, rows[k, 0], slot.label)
             if behind[b]:
                 predict_section(section, elapsed, law)
+
             if measured[b]:
-                is_feasible, overlap = measure_section(
-                    section, elapsed, alpha[channel, b], across_of(alpha, b, law), law
+                across = across_of(alpha, b, law)
+                nonempty, overlap = measure_section(
+                    section, elapsed, alpha[channel, b], across, law
                 )
-                if not is_feasible:
+                if not nonempty:
                     newly_emptied += mark_empty(slot, channel, event, overlap)
+                # Another axis may have made the label empty.
                 if not slot.feasible:
                     continue
+
             if measured[b] or (stale[b] and wanted >= SUMMARISED):
                 summarise_section(section, elapsed, law, summaries, b, s)
             if wanted == WITH_HEIGHTS:
                 minimum, maximum = chains.heights(section, time_to_go(slot.label, elapsed, law))
                 summaries[channel, b, s, Z_MIN] = minimum
                 summaries[channel, b, s, Z_MAX] = maximum
+
     for b in range(len(behind)):
         behind[b] = False
         stale[b] = stale[b] and not measured[b] and wanted < SUMMARISED
-    return newly_emptied
-
-
-@allocation_free
-def follow_sight(log: EventLog, done: int, b: int, sights: Floats, law: SectionLaw) -> LastSight:
-    """Return the last sight of an engagement along an axis.
-
-    `sights` contains the last sights after `done` events, shape (C, B, columns), and is updated.
-    """
-    c = law.channel
-    sight = LastSight(
-        sights[c, b, 0] != 0.0,
-        sights[c, b, 1],
-        sights[c, b, 2],
-        int(sights[c, b, 3]),
-        sights[c, b, 4],
-    )
-    for event in range(done, log.number):
-        values = log.values[event]
-        across = across_of(values, b, law)
-        applies = log.applies[event, b]
-        sight = sight_after(sight, log.kinds[event], values[c, b], across, applies, law)
-    sights[c, b, 0] = 1.0 if sight.known else 0.0
-    sights[c, b, 1], sights[c, b, 2] = sight.alpha, sight.across
-    sights[c, b, 3], sights[c, b, 4] = sight.steps, sight.fired
-    return sight
-
-
-@entry
-def measure_rate_all(
-    log: EventLog,
-    error: float,
-    done: int,
-    sights: Floats,
-    sections: Sections,
-    laws: Laws,
-    points: Floats,
-) -> int:
-    """Cut the feasible sections by the rates of the latest event and summarise them; return how
-    many became empty.
-
-    `error` is the error bound of the rates, rad/s; `sights` has the last sights after `done` events
-    and is updated.
-    """
-    newly_emptied = 0
-    slots = sections.slots
-    used = sections.used
-    event = log.number - 1
-    active = log.applies[event]
-    omega = log.values[event]
-    for b in range(len(used)):
-        for channel in range(laws.shape[0]):
-            law = law_of(laws, channel)
-            sight = follow_sight(log, done, b, sights, law)
-            rate = Rate(omega[channel, b], error, sight)
-            for s in range(used[b]):
-                if not (active[b] and is_cut(sections, channel, event, b, s)):
-                    continue
-                section = section_of(sections, channel, b, s)
-                label = slots[b, s].label
-                alone = new_window(label, label, law)
-                is_feasible, overlap, _ = measure_rate_section(
-                    section, label, log.elapsed, rate, alone, law, points
-                )
-                if not is_feasible:
-                    newly_emptied += mark_empty(slots[b, s], channel, event, overlap)
-                if slots[b, s].feasible:
-                    summarise_section(section, log.elapsed, law, sections.summaries, b, s)
-        sections.stale[b] = sections.stale[b] and not active[b]
     return newly_emptied
 
 
@@ -335,6 +267,7 @@ def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, 
             across = across_of(impulse, b, law)
             if along == 0.0 and across == 0.0:
                 continue
+
             for s in range(used[b]):
                 slot = slots[b, s]
                 if not slot.feasible:
@@ -360,8 +293,8 @@ def make_room_all(
 
     Every section must be able to gain `added` vertices. Return the number of floats by which the
     rings are too small, for which memory must be allocated, and the number of vertices that every
-    section may gain. It is less than `MAX_ADDED` if a section must be reduced first; `widen`
-    reduces those of the active engagements.
+    section may gain. It is less than `MAX_ADDED` if a section must be reduced first; with `widen`,
+    the sections of the active engagements are reduced. `points` is a working array.
     """
     slots = sections.slots
     used = sections.used
@@ -377,6 +310,7 @@ def make_room_all(
                 section = section_of(sections, channel, b, s)
                 if widen and active[b] and chains.is_crowded(section):
                     chains.reduce_outward(section, time_to_go(slot.label, elapsed, law), points)
+
                 count = chains.count_of(section)
                 room = chain_storage.room_of(section)
                 wanted = chain_storage.room_for(min(count + added, chains.CAPACITY), room)
@@ -405,30 +339,29 @@ def widest_all(elapsed: int, sections: Sections, laws: Laws, exists: Flags, ends
         law = law_of(laws, channel)
         summaries = sections.summaries
         for b in range(len(used)):
-            lowest = highest = -1
+            lowest = -1
+            highest = -1
+            lower = np.inf
+            upper = -np.inf
             for s in range(used[b]):
                 # Only sections of stopped engagements can be at range zero.
                 if not slots[b, s].feasible or range_of(slots[b, s].label, elapsed, law) == 0.0:
                     continue
-                if (
-                    lowest < 0
-                    or summaries[channel, b, s, LOWER_MISS]
-                    < summaries[channel, b, lowest, LOWER_MISS]
-                ):
+                if lowest < 0 or summaries[channel, b, s, LOWER_MISS] < lower:
                     lowest = s
-                if (
-                    highest < 0
-                    or summaries[channel, b, s, UPPER_MISS]
-                    > summaries[channel, b, highest, UPPER_MISS]
-                ):
+                    lower = summaries[channel, b, s, LOWER_MISS]
+                if highest < 0 or summaries[channel, b, s, UPPER_MISS] > upper:
                     highest = s
+                    upper = summaries[channel, b, s, UPPER_MISS]
             if lowest < 0:
                 continue
+
             exists[b] = True
             for end, s in ((0, lowest), (1, highest)):
                 tau = time_to_go(slots[b, s].label, elapsed, law)
                 x = range_of(slots[b, s].label, elapsed, law)
                 section = section_of(sections, channel, b, s)
+                # The point of the upper end comes first.
                 points = chains.extreme_points(section, tau, TIE_TOLERANCE, CUT_SLACK)
                 v, m = points[1 - end]
                 alpha = (m - tau * v) / x
@@ -505,9 +438,7 @@ def write_outline(section: Chains, n: int, tau: float, out: Floats) -> int:
 
 @entry
 def steepest_all(alpha: Floats, farthest: float, laws: Laws, steepest: Floats) -> None:
-    """Write the maximum sizes of angles of shape (C, B) up to a range: those of `steepest_angles`,
-    shape (2, B).
-    """
+    """Write the results of `steepest_angles` for angles of shape (C, B), shape (2, B)."""
     law = law_of(laws, ZERO)
     for b in range(alpha.shape[1]):
         steepest[0, b], steepest[1, b] = steepest_angles(

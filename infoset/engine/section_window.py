@@ -1,10 +1,10 @@
-"""Sections of a window of labels, in the coordinates (V, Pi) of its middle: the set of them is
+"""Sections of a window of labels, in the coordinates (V, Pi) of its middle, in which the set is
 convex on the window.
 
-The exact band of a measured rate is not convex in (z, V, label). Its direction, that of the
-predicted miss Pi, is the same for all labels in (Pi, V), and there the bands of angles can be
-replaced by convex ones that are little wider. See "With a rate sensor" in docs/guarantee.md. The
-window of one label is the label itself, with its exact bands.
+The exact band of a measured rate is not convex in (z, V, label). In (Pi, V), with the predicted
+miss Pi, its direction is the same for all labels, and the bands of angles can be replaced by convex
+ones that are little wider. See "With a rate sensor" in docs/guarantee.md. The window of one label
+is the label itself, with its exact bands.
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from infoset.engine.history import IMPULSE, PREDICTION, RATE, LastSight
 from infoset.engine.section_law import SectionLaw
 from infoset.engine.section_life import (
     CUT_SLACK,
-    SUM_SLACK,
     impulse_doubt,
     range_of,
     slope_band,
@@ -30,8 +29,8 @@ from infoset.engine.section_life import (
 
 
 class Window(NamedTuple):
-    """Labels from `near` to `far`, m, and what the events so far change between them and their
-    middle c.
+    """Labels from `near` to `far`, m, and the changes of their sections relative to the section of
+    their middle c, by the events so far.
 
     A motion with label l and predicted miss Pi is the point Pi + turned (l - c)/e of the section,
     to within the sum `loose` times half the width of the window over e, by (13).
@@ -54,30 +53,34 @@ class Window(NamedTuple):
     most: float
 
 
-class Stretch(NamedTuple):
-    """Events without a cut, from step `began` on, which are applied at once; times are those since
-    the beginning.
+class AxisEvent(NamedTuple):
+    """An event that applies, along one axis.
 
     Parameters
     ----------
-    began : int
-        Step of the last cut.
-    bounds, moments : float
-        Sum of the bounds of changes of V, m/s, and of bound times time, m.
-    turned, impulses : float
-        Sum of the impulses, m/s, and of impulse times time, m.
+    kind : int
+        Kind of the event.
+    value, across : float
+        Its value along this axis and along the other one, as in `EventLog`.
+    error : float
+        Error bound of a measured rate, rad/s; zero for the other kinds.
     """
 
-    began: int
-    bounds: float
-    moments: float
-    turned: float
-    impulses: float
+    kind: int
+    value: float
+    across: float
+    error: float
 
 
 class Rate(NamedTuple):
-    """A measured rate of the line of sight along one axis, its error bound, rad/s, and the last
-    angle before it.
+    """A measured rate of the line of sight along one axis.
+
+    Parameters
+    ----------
+    omega, error : float
+        The rate and its error bound, rad/s.
+    sight : LastSight
+        The last angle before it.
     """
 
     omega: float
@@ -106,94 +109,35 @@ def new_window(near: float, far: float, law: SectionLaw) -> Window:
 
 
 @inlined
-def window_after(
-    window: Window,
-    kind: int,
-    value: float,
-    across: float,
-    error: float,
-    elapsed: int,
-    law: SectionLaw,
-) -> Window:
-    """Return a window after one more event that applies; `elapsed` is the number of predictions up
-    to it.
-    """
+def window_after(window: Window, event: AxisEvent, elapsed: int, law: SectionLaw) -> Window:
+    """Return a window after one more event; `elapsed` is the number of predictions up to it."""
     near, far, turned, loose, fastest, most = window
     tau = max(time_to_go(far, elapsed, law), 0.0)
-    if kind == PREDICTION:
+    size = abs(event.value)
+    if event.kind == PREDICTION:
         loose += law.half_v
         fastest += law.half_v
         most += law.half_v * (tau + law.step)
-    elif kind == IMPULSE:
-        doubt = impulse_doubt(value, across, law)
-        turned += value
+    elif event.kind == IMPULSE:
+        doubt = impulse_doubt(event.value, event.across, law)
+        turned += event.value
         loose += doubt
-        fastest += abs(value) + doubt
-        most += (abs(value) + doubt) * tau
-    elif kind == RATE and range_of(near, elapsed, law) > 0.0:
+        fastest += size + doubt
+        most += (size + doubt) * tau
+    elif event.kind == RATE and range_of(near, elapsed, law) > 0.0:
         # |z/x| is at most |Pi|/x + |V|/e.
         steepest = most / range_of(near, elapsed, law) + fastest / law.closing_speed
         widest = 1.0 + steepest * steepest if law.exact_angles else 1.0
-        most = min(most, (abs(value) + error) * widest * range_of(far, elapsed, law) * tau)
+        most = min(most, (size + event.error) * widest * range_of(far, elapsed, law) * tau)
     return Window(near, far, turned, loose, fastest, most)
 
 
 @inlined
-def new_stretch(began: int) -> Stretch:
-    """Return a stretch without events."""
-    return Stretch(began, 0.0, 0.0, 0.0, 0.0)
-
-
-@inlined
-def stretch_after(
-    stretch: Stretch,
-    kind: int,
-    value: float,
-    across: float,
-    fastest: float,
-    elapsed: int,
-    law: SectionLaw,
-) -> Stretch:
-    """Return a stretch after one more event that applies; `fastest` is that of `Window`."""
-    began, bounds, moments, turned, impulses = stretch
-    time = law.step * (elapsed - began)
-    bound = 0.0
-    if kind == PREDICTION:
-        bound = law.half_v + SUM_SLACK * fastest
-    elif kind == IMPULSE:
-        bound = impulse_doubt(value, across, law)
-        turned += value
-        impulses += value * time
-    return Stretch(began, bounds + bound, moments + bound * time, turned, impulses)
-
-
-@allocation_free
-def apply_stretch(
-    section: SectionView, stretch: Stretch, elapsed: int, law: SectionLaw, points: Floats
-) -> None:
-    """Move a section over a stretch to step `elapsed`: impulses at once, and the bounds of changes
-    of V at both ends.
-
-    By Lemma 9a, two segments along the levels of both ends contain those of all changes of V
-    between them.
-    """
-    before = time_to_go(section.label, stretch.began, law)
-    now = time_to_go(section.label, elapsed, law)
-    late = stretch.moments / (before - now) if elapsed > stretch.began else stretch.bounds
-    if chains.is_crowded(section):
-        chains.reduce_outward(section, before, points)
-    chains.spread(section, before, max(stretch.bounds - late, 0.0))
-    chains.shift(section, before, -stretch.turned)
-    for chain in (section.right, section.left):
-        chains.move(chain, 0.0, stretch.impulses)
-    chains.turn(section, now)
-    chains.spread(section, now, late)
-
-
-@inlined
 def nearly_tangent(angle: float, up: float, law: SectionLaw) -> float:
-    """Return a slope that is at most the tangent of an angle below 0.5 rad for `up` = 1, at least
-    for `up` = -1.
+    """Return a slope near the tangent of an angle below 0.5 rad: at most the tangent for `up` = 1,
+    at least for `up` = -1.
+
+    The tangent of a positive angle a is at least a + a^3/3, and up to 0.5 rad at most a + 0.4 a^3.
     """
     if not law.exact_angles:
         return angle
@@ -211,9 +155,9 @@ def measure_in_window(
 ) -> tuple[bool, float, bool]:
     """Cut the section of a label by a measured angle, with the convex band of its window.
 
-    Return what `chains.cut` does, and whether the band cuts something; if not, the overlap is a
-    lower bound. `angles` are the angles of this axis and of the other one, rad. By (13b), in the
-    form with the smaller last term.
+    Return whether the section is not empty, the overlap, m, see `chains.cut`, and whether the band
+    cuts a part; if not, the overlap is a lower bound. `angles` are the angles of this axis and of
+    the other one, rad. The band is (13b), in the form with the smaller last term.
     """
     e = law.closing_speed
     half = half_time(window, law)
@@ -224,17 +168,17 @@ def measure_in_window(
     far = window.far - travelled
     middle = section.label - travelled
     by_speed = half == 0.0 or near <= 0.0 or window.fastest * near <= window.most * e
-    scale = x if by_speed else middle
-    room = window.loose * half + (
-        window.fastest * half if by_speed else window.most * (half * e / near)
-    )
+    if by_speed:
+        scale = x
+        room = window.loose * half + window.fastest * half
+    else:
+        scale = middle
+        room = window.loose * half + window.most * (half * e / near)
     turn = window.turned * ((label - section.label) / e)
     bound = law.error_at_zero_range + law.error_slope * x
-    slack = (
-        CUT_SLACK
-        * (section.label * (abs(alpha) + bound) + section.right.reach * (section.label / e))
-        + room
-    )
+    terms = section.label * (abs(alpha) + bound) + section.right.reach * (section.label / e)
+    slack = CUT_SLACK * terms + room
+
     # Most bands cut nothing: a narrower one without tangents shows it in half the time.
     minimum, maximum = chains.heights(section, middle / e)
     if abs(alpha) + bound < 0.5:
@@ -242,15 +186,16 @@ def measure_in_window(
         upper = scale * nearly_tangent(alpha + bound, 1.0, law) + turn + slack
         if lower <= minimum and maximum <= upper:
             return True, min(maximum - lower, upper - minimum), False
+
     lower, upper = slope_band(alpha, across, travelled, x if by_speed else near, law)
     if not by_speed:
         lower_far, upper_far = slope_band(alpha, across, travelled, far, law)
         lower = min(lower, lower_far)
         upper = max(upper, upper_far)
-    feasible, overlap = chains.cut(
+    nonempty, overlap = chains.cut(
         section, middle / e, scale * lower + turn - slack, scale * upper + turn + slack
     )
-    return feasible, overlap, overlap < maximum - minimum
+    return nonempty, overlap, overlap < maximum - minimum
 
 
 @inlined
@@ -269,7 +214,9 @@ def rate_band(
     lower = rate.omega - rate.error
     upper = rate.omega + rate.error
     curve = x * x / law.closing_speed
-    chord = ((near + far) * x - near * far) / law.closing_speed if far > near else curve
+    chord = curve
+    if far > near:
+        chord = ((near + far) * x - near * far) / law.closing_speed
     lower *= widest * chord if lower < 0.0 else curve
     upper *= widest * chord if upper > 0.0 else curve
     turn = window.turned * ((label - middle_of(window)) / law.closing_speed)
@@ -279,8 +226,8 @@ def rate_band(
 
 @allocation_free
 def max_slope(elapsed: int, sight: LastSight, window: Window, law: SectionLaw) -> float:
-    """Return a bound of |z/x| in a window: from the last angle, or the box without one, and the
-    motion since.
+    """Return a bound of |z/x| in a window, from the last angle, or from the initial box without
+    one, and the motion since.
     """
     e = law.closing_speed
     travelled = law.closing_speed * (law.step * elapsed)
@@ -289,6 +236,7 @@ def max_slope(elapsed: int, sight: LastSight, window: Window, law: SectionLaw) -
     far = window.far - travelled
     near_then = near + e * ago
     far_then = far + e * ago
+
     if sight.known:
         lower, upper = slope_band(sight.alpha, sight.across, travelled - e * ago, near_then, law)
         steepest = max(abs(lower), abs(upper))
@@ -299,6 +247,7 @@ def max_slope(elapsed: int, sight: LastSight, window: Window, law: SectionLaw) -
         steepest = max(abs(law.z_min), abs(law.z_max)) / near_then
     if sight.steps == 0:
         return steepest
+
     fastest = max(abs(law.vz_min), abs(law.vz_max)) + sight.fired * (1.0 + law.impulse_error)
     fastest += law.disturbance * (law.step * elapsed)
     return (steepest * far_then + fastest * ago) / near if near > 0.0 else np.inf
@@ -317,28 +266,27 @@ def measure_rate_section(
     """Cut the section of a label by a line-of-sight rate: by (9), a band of the predicted miss
     omega x^2 / e.
 
-    Return what `chains.cut` does, with the overlap in metres of predicted miss, and whether the
-    band cuts something.
+    Return whether the section is not empty, the overlap in metres of predicted miss, and whether
+    the band cuts a part. `points` is a working array.
     """
     middle = section.label
     tau = time_to_go(middle, elapsed, law)
-    slack = (
-        CUT_SLACK
-        * (middle * (abs(rate.omega) + rate.error) + section.right.reach)
-        * (middle / law.closing_speed)
-    )
+    terms = middle * (abs(rate.omega) + rate.error) + section.right.reach
+    slack = CUT_SLACK * terms * (middle / law.closing_speed)
     # The section already contains the first half of the next step's disturbance, which does not
     # commute with the cut.
     slack += tau * law.half_v_at_start
+
     # Most bands cut nothing even without the factor 1/cos^2, which takes longer than the rest.
     lower, upper = rate_band(label, elapsed, rate, 1.0, window, law)
     upper_miss, lower_miss = chains.max_and_min_miss(section, tau)
     if lower - slack <= lower_miss and upper_miss <= upper + slack:
         return True, min(upper_miss - lower, upper - lower_miss) + slack, False
+
     if law.exact_angles:
         steepest = max_slope(elapsed, rate.sight, window, law)
         lower, upper = rate_band(label, elapsed, rate, 1.0 + steepest * steepest, window, law)
     if chains.is_crowded(section):
         chains.reduce_outward(section, tau, points)
-    feasible, overlap = chains.cut_misses(section, tau, lower - slack, upper + slack, points)
-    return feasible, overlap, overlap < upper_miss - lower_miss
+    nonempty, overlap = chains.cut_misses(section, tau, lower - slack, upper + slack, points)
+    return nonempty, overlap, overlap < upper_miss - lower_miss

@@ -14,12 +14,20 @@ from infoset.arrays import Flags, Floats, Integers, some
 from infoset.engine import chain_storage, chains, section_life, section_passes
 from infoset.engine.chain_storage import Chains
 from infoset.engine.guaranteed_miss import GuaranteedMiss
-from infoset.engine.history import PREDICTION, History
+from infoset.engine.history import ANGLE, IMPULSE, PREDICTION, RATE, WIDENING, History
 from infoset.engine.location import refine_all
-from infoset.engine.replays import past_of
-from infoset.engine.section_law import SectionLaw, impulse_doubts, law_table, section_laws
+from infoset.engine.rate_passes import measure_rate_all
+from infoset.engine.section_law import (
+    BOUND_SLACK,
+    SectionLaw,
+    impulse_doubts,
+    law_table,
+    section_laws,
+)
+from infoset.engine.section_life import CUT_SLACK, NEVER_EMPTIED
 from infoset.engine.section_passes import MOVED, NO_EVENT, SUMMARISED, WITH_HEIGHTS, Sections
-from infoset.model import SetModel
+from infoset.engine.workspace import past_of
+from infoset.model import Recovery, SetModel
 
 
 class SetStatus(Enum):
@@ -42,6 +50,10 @@ class SetStatus(Enum):
 class SetState:
     """State of B information sets, updated in place. A set and its read-only views share one
     object.
+
+    Only the methods of this class change the state, and they take checked arguments. Predictions
+    and summaries of the stored sections are postponed to the next measurement or query, so that one
+    pass over the memory does both; a query therefore may write the sections, but changes no result.
 
     Attributes
     ----------
@@ -70,12 +82,13 @@ class SetState:
         self.laws = section_laws(model)
         self.table = law_table(self.laws)
         minimum, maximum = model.label_limits_m
-        labels = np.full((batch, max(model.sections, 2 * model.fewest_sections + 1)), maximum)
-        labels[:, : model.sections] = (
-            np.linspace(minimum, maximum, model.sections)
-            if model.sections > 1
-            else 0.5 * (minimum + maximum)
-        )
+        # A new grid has one label more than twice the fewest sections.
+        self._grid = 2 * model.fewest_sections + 1
+        labels = np.full((batch, max(model.sections, self._grid)), maximum)
+        if model.sections > 1:
+            labels[:, : model.sections] = np.linspace(minimum, maximum, model.sections)
+        else:
+            labels[:, 0] = 0.5 * (minimum + maximum)
         used = np.full(batch, model.sections)
         self.sections = section_passes.room_for_sections(len(self.laws), labels, used)
         self.history = History(len(self.laws), batch)
@@ -87,7 +100,9 @@ class SetState:
         self.lost_label = np.zeros(batch)
         has_phi = guarantee and model.is_guaranteed
         self.phi = GuaranteedMiss(self.laws[0], batch, model.speed_error) if has_phi else None
-        self._none, self._no_angles = np.zeros(batch, dtype=bool), np.empty((len(self.laws), 0))
+
+        self._none = np.zeros(batch, dtype=bool)
+        self._no_angles = np.empty((len(self.laws), 0))
         # Vertices that every section may still gain.
         self._spare = 0
         section_passes.start_all(self.sections, self.table)
@@ -95,7 +110,7 @@ class SetState:
 
     @property
     def law(self) -> SectionLaw:
-        """Constants of the model that all axes have in common, in those of one axis."""
+        """Constants that all axes have in common, as the constants of one axis."""
         return self.laws[-1]
 
     @property
@@ -107,6 +122,18 @@ class SetState:
     def elapsed(self) -> int:
         """Number of steps so far."""
         return self.history.elapsed
+
+    @property
+    def tracking(self) -> Flags:
+        """Whether each set contains states above the range threshold, shape (B,)."""
+        return np.asarray(self.status == SetStatus.TRACKING.value)
+
+    @property
+    def computes_phi(self) -> Flags:
+        """Engagements in which Phi is updated, also without feasible labels above the threshold."""
+        is_stopped = self.status == SetStatus.STOPPED.value
+        is_empty = self.status == SetStatus.EMPTY.value
+        return np.asarray(~is_stopped & ~is_empty)
 
     @property
     def labels(self) -> Floats:
@@ -126,67 +153,160 @@ class SetState:
         return counts
 
     @property
-    def ranges(self) -> Floats:
-        """Range of every slot now, m, shape (B, S)."""
-        return self.labels - self.law.closing_speed * (self.law.step * self.elapsed)
+    def travelled(self) -> float:
+        """Decrease of the nominal range since t = 0, m."""
+        return self.law.closing_speed * (self.law.step * self.elapsed)
 
     @property
-    def summaries(self) -> Floats:
-        """Summaries of the feasible sections, shape (C, B, S, columns). The columns of z may be out
-        of date.
-        """
-        if some(self.sections.stale):
-            self._update(SUMMARISED)
-        return self.sections.summaries
+    def ranges(self) -> Floats:
+        """Range of every slot now, m, shape (B, S)."""
+        return self.labels - self.travelled
 
-    def extreme_angles(self) -> Floats:
-        """Return the extreme angles of the feasible sections in the format of
-        `section_passes.extreme_angles_all`.
-        """
-        # The predicted misses are usually needed next: one pass computes both.
-        self._update(WITH_HEIGHTS)
-        extremes = np.zeros((4, len(self.laws), self.batch))
-        section_passes.extreme_angles_all(self.elapsed, self.sections, self.table, extremes)
-        return extremes
+    @property
+    def min_label_next(self) -> float:
+        """Minimum label, m, whose range is not below the threshold after the next step."""
+        elapsed_s = self.model.step_s * (self.elapsed + 1)
+        return self.model.min_range_m + self.model.closing_speed_m_s * elapsed_s
 
-    def _catch_up(self) -> None:
-        """Move the sections that are behind to the present step."""
-        if some(self.sections.behind):
-            self._update(MOVED)
-
-    def _update(self, wanted: int) -> None:
-        section_passes.step_all(
-            self._none, self._no_angles, NO_EVENT, self.elapsed, wanted, self.sections, self.table
+    def measure_angle(self, alpha: Floats, where: Flags) -> None:
+        """Cut every section by measured angles of shape (C, B), rad."""
+        active = self.tracking & where
+        event = self.history.record(ANGLE, alpha, active)
+        before = (self.lower_label.copy(), self.upper_label.copy())
+        newly_emptied = section_passes.step_all(
+            active, alpha, event, self.elapsed, MOVED, self.sections, self.table
         )
+        if newly_emptied:
+            self._handle_emptied(active, event, *before)
 
-    def _make_room(self, active: Flags) -> None:
-        """Give each feasible section room for the vertices that one step adds.
-
-        Only the active engagements change, but the others may use their room later without another
-        count.
-        """
-        self._spare -= chains.MAX_ADDED
-        if self._spare >= 0:
-            return
+    def measure_rate(self, omega: Floats, error: float, where: Flags) -> None:
+        """Cut every section by measured rates of shape (C, B), rad/s, with an error bound."""
+        active = self.tracking & where
+        error = error * (1.0 + BOUND_SLACK)
+        history = self.history
+        event = history.record(RATE, omega, active, error)
+        before = (self.lower_label.copy(), self.upper_label.copy())
+        self._catch_up()
+        self._make_room(active)
         points = chain_storage.working_room()
-        added = chain_storage.ROOM_AHEAD
-        make_room = section_passes.make_room_all
-        floats, spare = make_room(
-            active, added, self.elapsed, self.sections, self.table, points, False
+        newly_emptied = measure_rate_all(
+            history.log, error, history.seen, history.sights, self.sections, self.table, points
         )
-        if floats or spare < chains.MAX_ADDED:
-            self._add_room(floats)
-            _, spare = make_room(
-                active, added, self.elapsed, self.sections, self.table, points, True
-            )
-        self._spare = spare - chains.MAX_ADDED
+        history.seen = history.events
+        if newly_emptied:
+            self._handle_emptied(active, event, *before)
 
-    def _add_room(self, floats: int) -> None:
-        """Allocate `floats` more floats of the rings."""
-        records, rings = self.sections.chains
-        self.sections = self.sections._replace(
-            chains=Chains(records, chain_storage.with_room(rings, floats))
+    def measure_range(
+        self, measured: Floats, relative_error: float, alpha: Floats | None, where: Flags
+    ) -> None:
+        """Keep the labels that agree with measured ranges of shape (B,), m.
+
+        `alpha` are angles of shape (C, B), rad, measured at the same time, or None.
+        """
+        active = self.tracking & where
+        travelled = self.travelled
+        slack = CUT_SLACK * (measured + travelled)
+        eta = self.model.speed_error
+        nearer = self._min_cosine(alpha) if self.model.is_guaranteed else 1.0
+        lower = measured * nearer / ((1.0 + relative_error) * (1.0 + eta)) + travelled - slack
+        upper = measured / ((1.0 - relative_error) * (1.0 - eta)) + travelled + slack
+        before = (self.lower_label.copy(), self.upper_label.copy())
+        self.lower_label[active] = np.maximum(self.lower_label, lower)[active]
+        self.upper_label[active] = np.minimum(self.upper_label, upper)[active]
+        _, removed = self._keep_labels(active)
+        if removed:
+            self._handle_emptied(active, None, *before)
+
+    def _min_cosine(self, alpha: Floats | None) -> Floats:
+        """Lower bound of x over the distance, shape (B,): from measured angles, or from the maximum
+        velocity.
+        """
+        travelled = self.travelled
+        if alpha is not None:
+            steepest = np.empty((2, self.batch))
+            farthest = self.law.label_max - travelled
+            section_passes.steepest_all(alpha, farthest, self.table, steepest)
+            return np.asarray(np.cos(steepest[0]) * np.cos(steepest[1]))
+        box = self.model.bounds
+        elapsed_s = self.elapsed * self.model.step_s
+        impulses = self.history.total_impulse() * (1.0 + self.model.execution_error_relative)
+        disturbance = float(np.hypot.reduce([law.disturbance for law in self.laws]))
+        fastest = impulses + box.lateral_speed_m_s + disturbance * elapsed_s
+        offset = box.offset_m + fastest * elapsed_s
+        nearest = (self.lower_label - travelled) * (1.0 - self.model.speed_error)
+        return np.asarray(np.cos(np.arctan2(offset, np.maximum(nearest, 0.0))))
+
+    def _keep_labels(self, active: Flags) -> tuple[Flags, int]:
+        """Remove the feasible sections with labels beyond the limits; return a mask of them and
+        their number.
+        """
+        removed = np.zeros(self.labels.shape, dtype=bool)
+        number = section_passes.keep_labels_all(
+            active, self.lower_label, self.upper_label, self.sections, removed
         )
+        return removed, number
+
+    def _handle_emptied(
+        self, active: Flags, event: int | None, lower: Floats, upper: Floats
+    ) -> None:
+        """Refine the sets that a measurement has left with few sections, and recover the sets that
+        it has made empty.
+
+        `event` is the number of the measurement, None for a range, which the history does not
+        contain. `lower` and `upper`, shape (B,), are the limits of the labels before it, m.
+        """
+        empty = self._refine_if_few(active)
+        is_below_threshold = empty & self.some_left
+        self.status[empty] = SetStatus.EMPTY.value
+        self.status[is_below_threshold] = SetStatus.REFUTED.value
+        lost = empty & ~is_below_threshold
+        if not some(lost):
+            return
+
+        for b in np.flatnonzero(lost & (self.lost_step < 0)):
+            self.lost_step[b] = self.elapsed
+            self.lost_label[b] = self._nearest_to_feasible(int(b), event, lower[b], upper[b])
+        if self.model.recovery is not Recovery.NONE:
+            self._recover(lost, event, lower, upper)
+
+    def _refine_if_few(self, active: Flags) -> Flags:
+        """Make a new grid where too few sections are left; return which sets are empty."""
+        few = active & (self.section_counts < self.model.fewest_sections)
+        if some(few):
+            self.refine(few, self._grid)
+            few &= ~self.feasible.any(axis=1)
+        return few
+
+    def _nearest_to_feasible(self, b: int, event: int | None, lower: float, upper: float) -> float:
+        """Label, m, whose section was closest to the band of a measurement that emptied the set."""
+        slots = self.sections.slots[b, : self.sections.used[b]]
+        emptied_now = slots["emptied_at"] == event
+        if event is not None and emptied_now.any():
+            return float(slots["label"][np.where(emptied_now, slots["overlap"], -np.inf).argmax()])
+        middle = 0.5 * (self.lower_label[b] + self.upper_label[b])
+        return float(min(max(middle, lower), upper))
+
+    def _recover(self, empty: Flags, event: int | None, lower: Floats, upper: Floats) -> None:
+        """Discard the measurement that made sets empty: restore the last consistent sets, predict
+        and enlarge them. The arguments are explained in `_handle_emptied`.
+        """
+        if event is not None:
+            self.history.retract(event, empty)
+        self.history.record(WIDENING, applies=empty)
+
+        # The labels that this measurement has emptied or removed are feasible again. Their polygons
+        # are not restored: the refinement below computes others.
+        slots = self.sections.slots
+        is_used = np.arange(slots.shape[1]) < self.sections.used[:, None]
+        was_feasible = slots["emptied_at"] == NEVER_EMPTIED
+        if event is not None:
+            was_feasible |= slots["emptied_at"] == event
+        slots["feasible"][empty] = (is_used & was_feasible)[empty]
+        self.lower_label[empty] = lower[empty]
+        self.upper_label[empty] = upper[empty]
+        self.status[empty] = SetStatus.TRACKING.value
+        self.refine(empty, self._grid)
+        self.status[empty & (self.section_counts == 0)] = SetStatus.EMPTY.value
 
     def refine(self, wanted: Flags, number: int) -> None:
         """Replace the sections of the wanted engagements by a grid over their feasible labels,
@@ -203,45 +323,111 @@ class SetState:
     def _min_label(self) -> float:
         return float(np.where(self.feasible, self.labels, np.inf).min())
 
-    def measure_rate(self, error: float) -> int:
-        """Cut the feasible sections by the rates of the latest event; return the number of labels
-        that became empty.
-        """
-        history = self.history
-        self._catch_up()
-        self._make_room(history.applies[history.events - 1])
-        points = chain_storage.working_room()
-        newly_emptied = section_passes.measure_rate_all(
-            history.log, error, history.seen, history.sights, self.sections, self.table, points
-        )
-        history.seen = history.events
-        return newly_emptied
-
-    def shift(self, active: Flags, impulse: Floats) -> None:
+    def shift(self, impulse: Floats, where: Flags) -> None:
         """Shift the feasible sections and their summaries by impulses of shape (C, B), m/s."""
+        active = self.computes_phi & where & impulse.any(axis=0)
+        if not some(active):
+            return
+        self.history.record(IMPULSE, impulse, active)
         self._catch_up()
         section_passes.shift_all(active, impulse, self.elapsed, self.sections, self.table)
 
-    def predict(self, active: Flags) -> None:
-        """Move the feasible sections one step.
-
-        The move is postponed to the next measurement or query, so that one pass over the memory
-        does both.
+    def drop_below_threshold(self) -> Flags:
+        """Remove the sections whose range will be below the threshold after the next step; return a
+        mask of them, shape (B, S).
         """
+        active = self.tracking
+        min_label = self.min_label_next
+        computes_phi = self.computes_phi
+        if self.phi is not None:
+            limits = (self.lower_label, self.upper_label)
+            self.phi.leave(computes_phi, *limits, self.sections, self.history)
+        if self.model.is_guaranteed:
+            # A label between the stored ones may pass the threshold. The status must not depend on
+            # whether Phi is computed.
+            self.some_left |= active & (self.lower_label < min_label)
+        np.maximum(self.lower_label, min_label, out=self.lower_label, where=computes_phi)
+        if self.min_label >= min_label:
+            return np.zeros(self.labels.shape, dtype=bool)
+
+        left, number = self._keep_labels(active)
+        if number:
+            self.some_left |= left.any(axis=1)
+            self.status[self._refine_if_few(active)] = SetStatus.FINISHED.value
+        return left
+
+    def predict(self) -> None:
+        """Move the feasible sections one step; the move is postponed."""
+        active = self.tracking
         self._catch_up()
         self._make_room(active)
         self.history.record(PREDICTION)
         self.sections.behind[:] = active
         self.sections.stale[active] = True
 
-    def keep_labels(self, active: Flags) -> tuple[Flags, int]:
-        """Remove the feasible sections with labels beyond the limits; return a mask of them and
-        their number.
+    def stop(self, where: Flags) -> None:
+        """Stop the computation of some engagements."""
+        self.status[where] = SetStatus.STOPPED.value
+
+    def _catch_up(self) -> None:
+        """Move the sections that are behind to the present step."""
+        if some(self.sections.behind):
+            self._update(MOVED)
+
+    def _update(self, wanted: int) -> None:
+        """Bring the sections and summaries up to date that `wanted` names, see `step_all`."""
+        section_passes.step_all(
+            self._none, self._no_angles, NO_EVENT, self.elapsed, wanted, self.sections, self.table
+        )
+
+    def _make_room(self, active: Flags) -> None:
+        """Give each feasible section room for the vertices that one step adds.
+
+        Only the active engagements change, but the others may use their room later without another
+        count.
         """
-        removed = np.zeros(self.labels.shape, dtype=bool)
-        lower = self.lower_label
-        upper = self.upper_label
-        return removed, section_passes.keep_labels_all(active, lower, upper, self.sections, removed)
+        self._spare -= chains.MAX_ADDED
+        if self._spare >= 0:
+            return
+        floats, spare = self._room(active, widen=False)
+        if floats or spare < chains.MAX_ADDED:
+            self._add_room(floats)
+            _, spare = self._room(active, widen=True)
+        self._spare = spare - chains.MAX_ADDED
+
+    def _room(self, active: Flags, widen: bool) -> tuple[int, int]:
+        """Return the floats of the rings that are missing, and the vertices that every section may
+        gain; `widen` the rings.
+        """
+        points = chain_storage.working_room()
+        added = chain_storage.ROOM_AHEAD
+        return section_passes.make_room_all(
+            active, added, self.elapsed, self.sections, self.table, points, widen
+        )
+
+    def _add_room(self, floats: int) -> None:
+        """Allocate `floats` more floats of the rings."""
+        records, rings = self.sections.chains
+        wider = Chains(records, chain_storage.with_room(rings, floats))
+        self.sections = self.sections._replace(chains=wider)
+
+    def summaries(self) -> Floats:
+        """Return the summaries of the feasible sections, shape (C, B, S, columns). The columns of z
+        may be out of date.
+        """
+        if some(self.sections.stale):
+            self._update(SUMMARISED)
+        return self.sections.summaries
+
+    def extreme_angles(self) -> Floats:
+        """Return the extreme angles of the feasible sections in the format of
+        `section_passes.extreme_angles_all`.
+        """
+        # The predicted misses are usually needed next: one pass computes both.
+        self._update(WITH_HEIGHTS)
+        extremes = np.zeros((4, len(self.laws), self.batch))
+        section_passes.extreme_angles_all(self.elapsed, self.sections, self.table, extremes)
+        return extremes
 
     def widest(self, pending: Sequence[tuple[float, Floats]] = ()) -> tuple[Flags, Floats]:
         """Return the predicted-miss interval of each engagement in the format of
@@ -260,9 +446,10 @@ class SetState:
         """Return the summaries with the predicted misses after later impulses, as `shift` would
         change them.
         """
+        summaries = self.summaries()
         if not pending:
-            return self.summaries
-        summaries = self.summaries.copy()
+            return summaries
+        summaries = summaries.copy()
         to_go = self.ranges / self.law.closing_speed
         for time_s, impulse in pending:
             lever = np.maximum(to_go - time_s, 0.0)
@@ -282,9 +469,7 @@ class SetState:
         2).
         """
         points = chain_storage.working_room()
-        time_to_go = (
-            label - self.law.closing_speed * (self.law.step * self.elapsed)
-        ) / self.law.closing_speed
+        time_to_go = (label - self.travelled) / self.law.closing_speed
         return points[: section_passes.write_outline(sections, row, time_to_go, points)].copy()
 
     def copy(self) -> SetState:

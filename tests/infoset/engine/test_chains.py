@@ -1,7 +1,7 @@
 """Sections kept as two chains, against exact rational polygons in the coordinates (V, m).
 
 What rounding may do is bounded beforehand, in units `U` of the magnitudes that a section had over
-its life: `R` for V, `G` for m and z (the maximum m plus the first time to go times `R`). An
+its history: `R` for V, `G` for m and z (the maximum m plus the first time to go times `R`). An
 operation that writes a vertex sums a few numbers, of up to `2 R` in V and `2 G` in m: it puts the
 vertex off by less than `8 U R` and `16 U G`. A height that is compared is off by less than `16 U G`
 as well. Moves of the origins are compensated and add nothing.
@@ -48,7 +48,7 @@ Level = tuple[float, float, float]
 
 RIGHT, LEFT = range(2)
 U = Fraction(1, 2**53)
-ROW = 1  # of three: what is done to one section must leave its neighbours alone
+ROW = 1  # the middle one of three: an operation on a section must not change its neighbours
 checked = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 briefly = settings(checked, max_examples=12)
 
@@ -58,7 +58,7 @@ briefly = settings(checked, max_examples=12)
 
 
 def upward(tau: float) -> Exact:
-    """The normal that tells heights: z = m - tau V."""
+    """The normal of heights z = m - tau V."""
     return -Fraction(tau), Fraction(1)
 
 
@@ -207,7 +207,7 @@ class Section:
         return not any(part.any() for part in (*fields, *rings))
 
 
-class Life:
+class TrackedSection:
     """A section with its exact polygons, narrow and wide, and the bounds of the module's
     docstring.
     """
@@ -232,7 +232,7 @@ class Life:
 
     @property
     def tolerance(self) -> Fraction:
-        """What the box is worth in height."""
+        """Height of the box."""
         return self.box[1] + Fraction(self.section.tau) * self.box[0]
 
     def turn(self, tau: float) -> None:
@@ -243,13 +243,15 @@ class Life:
     def spread(self, half_v: float) -> None:
         self.section.spread(half_v)
         half = (Fraction(half_v), Fraction(half_v) * Fraction(self.section.tau))
-        self.narrow, self.wide = with_segment(self.narrow, half), with_segment(self.wide, half)
+        self.narrow = with_segment(self.narrow, half)
+        self.wide = with_segment(self.wide, half)
         self.grow(half)
 
     def shift(self, v: float) -> None:
         self.section.shift(v)
         by = (Fraction(v), Fraction(v) * Fraction(self.section.tau))
-        self.narrow, self.wide = moved(self.narrow, by), moved(self.wide, by)
+        self.narrow = moved(self.narrow, by)
+        self.wide = moved(self.wide, by)
         self.grow((abs(by[0]), abs(by[1])))
 
     def grow(self, by: Exact) -> None:
@@ -289,7 +291,7 @@ class Life:
         return bool(nonempty)
 
     def check(self) -> None:
-        """All that holds after any operation."""
+        """Assert all properties that hold after any operation."""
         section = self.section
         normal = upward(self.section.tau)
         right = section.chain(RIGHT)
@@ -302,8 +304,7 @@ class Life:
             abs(v) for v, _ in right + left
         )
         if not self.narrow:
-            # Thinner than rounding: which vertex is the higher or the more to the right is
-            # anybody's guess.
+            # The section is thinner than rounding: the order of its vertices is not determined.
             return
         tolerance = self.tolerance
         for chain, sign in ((right, 1), (left, -1)):
@@ -312,8 +313,8 @@ class Life:
         self.check_extremes(right, left)
 
     def check_extremes(self, right: list[Exact], left: list[Exact]) -> None:
-        """Heights and peaks lie between those of the narrow and the wide polygon, and are those of
-        the vertices.
+        """Heights and peaks lie between the extremes of the narrow and of the wide polygon, and are
+        the extremes of the vertices.
         """
         section = self.section
         normal = upward(self.section.tau)
@@ -341,7 +342,7 @@ class Life:
             assert_contains(corners, self.narrow, self.box)
 
 
-# Life stories: plain numbers, put in proportion to the section when they are told.
+# Sequences of operations: plain numbers, scaled with the section when they are applied.
 
 UNIT = st.one_of(
     st.integers(-(2**40), 2**40).map(lambda i: i / 2**40),
@@ -361,7 +362,7 @@ class Start(NamedTuple):
 
 
 class Band(NamedTuple):
-    """How a band lies to the section that it meets."""
+    """Position of a band relative to a section."""
 
     kind: str
     parts: tuple[float, float]
@@ -370,7 +371,7 @@ class Band(NamedTuple):
 
 
 class Step(NamedTuple):
-    """What happens to a section in one step."""
+    """Operations on a section in one step."""
 
     falls: tuple[float, float]
     half_v: float
@@ -437,34 +438,32 @@ def levels(section: Section, band: Band, ulp: float) -> tuple[float, float]:
     if band.kind == "thin":
         level = minimum + abs(first) * extent
         return level, level + abs(error)
-    if band.kind == "touching":
-        return (
-            (maximum + error, maximum + extent + 1.0)
-            if first < 0.0
-            else (minimum - extent - 1.0, minimum + error)
-        )
+    at_top = {
+        "touching": (maximum + error, maximum + extent + 1.0),
+        "rest": (minimum + 0.999 * extent, maximum + 1.0),
+    }
+    at_bottom = {
+        "touching": (minimum - extent - 1.0, minimum + error),
+        "rest": (minimum - 1.0, minimum + 0.001 * extent),
+    }
+    if band.kind in at_top:
+        return at_top[band.kind] if first < 0.0 else at_bottom[band.kind]
     if band.kind == "beyond":
         return maximum + abs(first) * extent, maximum + 2.0 * extent
-    if band.kind == "around":
-        return minimum - 1.0, maximum + 1.0
-    return (
-        (minimum + 0.999 * extent, maximum + 1.0)
-        if first < 0.0
-        else (minimum - 1.0, minimum + 0.001 * extent)
-    )
+    return minimum - 1.0, maximum + 1.0
 
 
-def tell(life: Life, step: Step) -> bool:
-    """Let one step happen; whether the section survives it."""
-    scale = float(life.max_v) / life.operations
-    life.turn(life.section.tau * step.falls[0])
-    life.spread(scale * step.half_v)
-    life.turn(life.section.tau * step.falls[1])
-    life.shift(scale * step.kick)
+def apply_step(tracked: TrackedSection, step: Step) -> bool:
+    """Apply one step; return whether the section is not empty after it."""
+    scale = float(tracked.max_v) / tracked.operations
+    tracked.turn(tracked.section.tau * step.falls[0])
+    tracked.spread(scale * step.half_v)
+    tracked.turn(tracked.section.tau * step.falls[1])
+    tracked.shift(scale * step.kick)
     if step.band is None:
         return True
-    lower, upper = levels(life.section, step.band, float(U * life.maximum))
-    return lower > upper or life.cut(lower, upper, step.band.of_miss)
+    lower, upper = levels(tracked.section, step.band, float(U * tracked.maximum))
+    return lower > upper or tracked.cut(lower, upper, step.band.of_miss)
 
 
 # Sequences of operations.
@@ -472,40 +471,40 @@ def tell(life: Life, step: Step) -> bool:
 
 @checked
 @given(starts(), st.lists(steps(st.one_of(st.none(), BANDS)), min_size=1, max_size=10))
-def test_a_life_is_the_exact_one_up_to_rounding(start: Start, story: list[Step]) -> None:
-    life = Life(*start)
-    for step in story:
-        if not tell(life, step):
+def test_section_equals_the_exact_polygon_up_to_rounding(
+    start: Start, sequence: list[Step]
+) -> None:
+    tracked = TrackedSection(*start)
+    for step in sequence:
+        if not apply_step(tracked, step):
             return
-        life.check_outline()
+        tracked.check_outline()
 
 
 @pytest.mark.parametrize("start", [(3.0, 3.0, -50.4220476397299), (2.0, 5.0, 7.1)])
 @pytest.mark.parametrize("tau", [0.44999999999955004, 1.0, 7.3, 1e4])
-def test_a_level_segment_keeps_its_ends_where_the_level_does_not_turn(
-    start: Level, tau: float
-) -> None:
+def test_level_segment_keeps_its_ends_if_the_level_does_not_turn(start: Level, tau: float) -> None:
     """All its heights are equal to within rounding: which of its ends is the higher must not be
     taken from that.
     """
     halves = (202.7652897567146, 0.0, 613.1018861295662, 1e-3)
     for kick in np.random.default_rng(1).uniform(-300.0, 300.0, 20):
-        life = Life(tau, start, start)
-        life.shift(float(kick))
+        tracked = TrackedSection(tau, start, start)
+        tracked.shift(float(kick))
         for half_v in halves:
             for _ in range(3):
-                life.turn(tau)
-            life.spread(half_v)
-            life.check_outline()
-        life.turn(0.9 * tau)
-        life.check_outline()
-        lowest, highest = life.section.heights()
+                tracked.turn(tau)
+            tracked.spread(half_v)
+            tracked.check_outline()
+        tracked.turn(0.9 * tau)
+        tracked.check_outline()
+        lowest, highest = tracked.section.heights()
         assert highest - lowest == pytest.approx(
             (start[1] - start[0] + 2.0 * sum(halves)) * 0.1 * tau, rel=1e-9
         )
 
 
-def test_a_step_of_a_square_by_hand() -> None:
+def test_one_step_of_a_square_gives_the_expected_vertices() -> None:
     section = Section(2.0, (-1.0, 1.0, -1.0), (-1.0, 1.0, 1.0))
     section.turn(1.0)
     np.testing.assert_array_equal(
@@ -535,8 +534,8 @@ def test_a_step_of_a_square_by_hand() -> None:
     st.integers(0, 3),
     st.lists(st.tuples(steps(st.none()), st.booleans(), UNIT.map(abs)), min_size=4, max_size=16),
 )
-def test_extremal_bands_never_lose_the_truth(
-    corner: int, story: list[tuple[Step, bool, float]]
+def test_section_contains_the_true_state_if_bands_end_at_it(
+    corner: int, sequence: list[tuple[Step, bool, float]]
 ) -> None:
     """The truth is a corner of the set, and each band ends at it, widened by the 16 ulp that a
     measurement has.
@@ -548,7 +547,7 @@ def test_extremal_bands_never_lose_the_truth(
     z = Fraction((bottom, top)[corner // 2][2])
     truth = (v, z + 300 * v)
     max_m = 400.0
-    for step, from_below, width in story:
+    for step, from_below, width in sequence:
         section.turn(section.tau * step.falls[0])
         section.spread(0.01 * step.half_v)
         section.turn(section.tau * step.falls[1])
@@ -576,9 +575,10 @@ def test_extremal_bands_never_lose_the_truth(
 
 
 @briefly
-@example(  # two vertices that rounding told apart hid that the one before them had become the highest
+@example(
+    # Two vertices that differed by rounding hid that the vertex before them had become the highest.
     start=Start(0.7, (0.0, 1e-9, 2.4500059225829315e-16), (1.8189894035458566e-21, 5e-10, 3.5e-10)),
-    story=[
+    sequence=[
         Step((1.0, 1.0), 0.0, 0.0, None),
         Step((1.0, 0.01), 2.0**-40, 0.0, None),
         Step((0.7, 0.01), 0.0, 0.0, Band("parts", (0.0, 0.5), 0, True)),
@@ -587,11 +587,13 @@ def test_extremal_bands_never_lose_the_truth(
     part=0.0,
 )
 @given(starts(), st.lists(steps(st.one_of(st.none(), BANDS)), max_size=6), UNIT.map(abs))
-def test_the_first_vertex_near_a_peak(start: Start, story: list[Step], part: float) -> None:
-    life = Life(*start)
-    if not all(tell(life, step) for step in story):
+def test_first_vertex_near_a_peak_has_a_miss_within_the_tolerance(
+    start: Start, sequence: list[Step], part: float
+) -> None:
+    tracked = TrackedSection(*start)
+    if not all(apply_step(tracked, step) for step in sequence):
         return
-    section = life.section
+    section = tracked.section
     for side, sign in ((RIGHT, 1.0), (LEFT, -1.0)):
         misses = [sign * m for _, m in section.local(side)]
         first = section.numbers(side)[0]
@@ -604,77 +606,77 @@ def test_the_first_vertex_near_a_peak(start: Start, story: list[Step], part: flo
 
 
 @pytest.mark.parametrize("part", [0.25, 0.5, 0.9])
-def test_a_level_segment_cut_by_its_miss_stays_a_segment(part: float) -> None:
+def test_level_segment_stays_a_segment_if_it_is_cut_by_its_miss(part: float) -> None:
     """Its heights are equal: neither its lowest vertex nor its highest says where it ends."""
-    life = Life(0.7, (100.0, 300.0, 29.5), (100.0, 300.0, 29.5))
+    tracked = TrackedSection(0.7, (100.0, 300.0, 29.5), (100.0, 300.0, 29.5))
     middle = 29.5 + 0.7 * 200.0
-    assert life.cut(middle - part * 70.0, middle + 0.5 * part * 70.0, of_miss=True)
-    life.check_outline()
+    assert tracked.cut(middle - part * 70.0, middle + 0.5 * part * 70.0, of_miss=True)
+    tracked.check_outline()
     for _ in range(3):
-        life.turn(0.7)
-        life.spread(10.0)
-        life.check_outline()
-    life.turn(0.5)
-    life.check_outline()
-    minimum, maximum = life.section.heights()
+        tracked.turn(0.7)
+        tracked.spread(10.0)
+        tracked.check_outline()
+    tracked.turn(0.5)
+    tracked.check_outline()
+    minimum, maximum = tracked.section.heights()
     assert maximum - minimum == pytest.approx((1.5 * part * 100.0 + 60.0) * 0.2)
 
 
 # Outward reduction and room.
 
 
-def crowded(tau: float, size_v: float, size_z: float, fall: float) -> Life:
+def crowded(tau: float, size_v: float, size_z: float, fall: float) -> TrackedSection:
     """A section that has grown until it may have no room for another step; its exact polygon is
     taken from there.
     """
-    life = Life(tau, (-size_v, 1.3 * size_v, -size_z), (-size_v, size_v, 1.3 * size_z))
-    section = life.section
+    tracked = TrackedSection(tau, (-size_v, 1.3 * size_v, -size_z), (-size_v, size_v, 1.3 * size_z))
+    section = tracked.section
     while not chains.is_crowded(section.view):
         before = section.count
         section.turn(section.tau * fall)
         section.spread(0.01 * size_v)
         section.turn(section.tau * fall)
         assert before < section.count <= before + chains.MAX_ADDED
-        life.operations += 2
-    life.narrow = life.wide = hull(section.chain(RIGHT) + section.chain(LEFT))
-    life.max_v = Fraction(section.reach)
-    life.max_m += life.first_tau * life.max_v
-    life.check()
-    return life
+        tracked.operations += 2
+    tracked.narrow = tracked.wide = hull(section.chain(RIGHT) + section.chain(LEFT))
+    tracked.max_v = Fraction(section.reach)
+    tracked.max_m += tracked.first_tau * tracked.max_v
+    tracked.check()
+    return tracked
 
 
 @pytest.mark.parametrize("fall", [pytest.param(0.999, marks=pytest.mark.thorough), 0.97])
 @pytest.mark.parametrize(
     ("tau", "size_v", "size_z"), [(1.0, 1.0, 1.0), (500.0, 1e-9, 30.0), (500.0, 2.0, 1e-6)]
 )
-def test_reduction_is_outward_and_life_goes_on(
+def test_reduced_section_contains_the_section_and_takes_further_steps(
     tau: float, size_v: float, size_z: float, fall: float
 ) -> None:
-    life = crowded(tau, size_v, size_z, fall)
-    section = life.section
+    tracked = crowded(tau, size_v, size_z, fall)
+    section = tracked.section
     section.reduce()
     assert section.count <= chains.REDUCED
     reduced = hull(section.chain(RIGHT) + section.chain(LEFT))
-    assert_contains(reduced, life.narrow, life.box)
+    assert_contains(reduced, tracked.narrow, tracked.box)
     # The edges that go are those that cost minimum: there is hardly more of the set in any
     # direction.
     for normal in AXES:
-        (minimum, maximum), (low, high) = reaches(life.narrow, normal), reaches(reduced, normal)
+        (minimum, maximum), (low, high) = reaches(tracked.narrow, normal), reaches(reduced, normal)
         assert high - low <= (maximum - minimum) * Fraction(11, 10)
-    life.wide = reduced
-    life.operations += 1
-    life.check()
+    tracked.wide = reduced
+    tracked.operations += 1
+    tracked.check()
     for k in range(6):
-        life.turn(section.tau * 0.9)
-        life.spread(0.02 * size_v)
-        life.turn(section.tau * 0.9)
+        tracked.turn(section.tau * 0.9)
+        tracked.spread(0.02 * size_v)
+        tracked.turn(section.tau * 0.9)
         bottom, top = section.heights()
         margin = 0.2 * (top - bottom)
-        life.cut(bottom + margin * (k % 2), top - margin * ((k + 1) % 2))
-    life.check_outline()
+        tracked.cut(bottom + margin * (k % 2), top - margin * ((k + 1) % 2))
+    tracked.check_outline()
 
 
-def test_reduction_of_a_round_chain_keeps_the_bound_on_v() -> None:
+def test_bound_of_v_holds_after_the_reduction_of_a_round_chain() -> None:
     """Dropping edges all around, it goes farther out than any vertex was."""
     section = Section(3.0, (-1.0, 1.0, 0.0), (-1.0, 1.0, 1.0))
     turns = np.linspace(-0.8, 0.8, 248)
@@ -689,7 +691,7 @@ def test_reduction_of_a_round_chain_keeps_the_bound_on_v() -> None:
     assert 1 < outermost <= section.reach
 
 
-def test_reduction_of_a_chain_as_thin_as_rounding_contains_it() -> None:
+def test_reduced_section_contains_a_chain_as_thin_as_rounding() -> None:
     """Where rounding has left edges no direction, three sides of a box around the chain are
     taken.
     """
@@ -715,22 +717,24 @@ def test_reduction_of_a_chain_as_thin_as_rounding_contains_it() -> None:
 @given(
     starts(), st.lists(steps(st.none()), min_size=1, max_size=6), st.lists(steps(BANDS), max_size=3)
 )
-def test_moving_to_wider_rings_keeps_everything(
+def test_section_does_not_change_if_its_rings_are_widened(
     start: Start, before: list[Step], after: list[Step]
 ) -> None:
-    life = Life(*start, room=32)
-    twin = Life(*start)
+    tracked = TrackedSection(*start, room=32)
+    twin = TrackedSection(*start)
     for step in before:
-        assert tell(life, step) == tell(twin, step)
-    rings = chain_storage.with_room(life.section.chains.rings, 4 * CAPACITY)
-    life.section.chains = life.section.chains._replace(rings=rings)
-    chain_storage.widen_rings(life.section.view, CAPACITY)
+        assert apply_step(tracked, step) == apply_step(twin, step)
+    rings = chain_storage.with_room(tracked.section.chains.rings, 4 * CAPACITY)
+    tracked.section.chains = tracked.section.chains._replace(rings=rings)
+    chain_storage.widen_rings(tracked.section.view, CAPACITY)
     assert rings[TAKEN] <= rings.size
     for i in range(len(after) + 1):
         for side in (RIGHT, LEFT):
-            assert life.section.local(side) == twin.section.local(side)
-            assert life.section.sides[side].tolist()[:-2] == twin.section.sides[side].tolist()[:-2]
-        if i < len(after) and not (tell(life, after[i]) & tell(twin, after[i])):
+            assert tracked.section.local(side) == twin.section.local(side)
+            assert (
+                tracked.section.sides[side].tolist()[:-2] == twin.section.sides[side].tolist()[:-2]
+            )
+        if i < len(after) and not (apply_step(tracked, after[i]) & apply_step(twin, after[i])):
             break
 
 
@@ -751,8 +755,8 @@ def assert_mirrored(section: Section, mirror: Section) -> None:
     starts(),
     st.lists(st.tuples(steps(st.none()), st.booleans(), UNIT.map(abs)), min_size=1, max_size=10),
 )
-def test_a_mirrored_life_is_mirrored_to_the_last_bit(
-    start: Start, story: list[tuple[Step, bool, float]]
+def test_mirrored_sequence_gives_the_mirrored_section_bit_by_bit(
+    start: Start, sequence: list[tuple[Step, bool, float]]
 ) -> None:
     """With one border a cut: two borders on one edge are worked in another order, see the next
     test.
@@ -766,7 +770,7 @@ def test_a_mirrored_life_is_mirrored_to_the_last_bit(
     section = Section(*start)
     mirror = Section(tau, (-high_top, -low_top, -z_top), (-high, -low, -z))
     size = max(map(abs, (low, high, low_top, high_top)))
-    for step, from_below, part in story:
+    for step, from_below, part in sequence:
         for one, sign in ((section, 1.0), (mirror, -1.0)):
             one.turn(one.tau * step.falls[0])
             one.spread(size * step.half_v)
@@ -785,14 +789,14 @@ def test_a_mirrored_life_is_mirrored_to_the_last_bit(
 # Wear.
 
 
-def test_ten_thousand_moves_do_not_wear_a_section() -> None:
+def test_section_is_exact_to_4_ulp_after_ten_thousand_moves() -> None:
     """Origins a thousand times as far out as the section is wide, and back: it is exact to 4 ulp,
     not to 10 000.
     """
     rng = np.random.default_rng(3)
-    life = Life(97.3, (-1.3, 0.7, -20.0), (-0.9, 1.1, 30.0))
-    section = life.section
-    exact = life.wide
+    tracked = TrackedSection(97.3, (-1.3, 0.7, -20.0), (-0.9, 1.1, 30.0))
+    section = tracked.section
+    exact = tracked.wide
     added = (Fraction(0), Fraction(0))
     place = (Fraction(0), Fraction(0))
     max_v = Fraction(0)
@@ -826,7 +830,7 @@ def test_ten_thousand_moves_do_not_wear_a_section() -> None:
     assert math.isclose(section.reach, 5e6, rel_tol=0.2)
 
 
-def test_vertices_that_repeat_one_another_do_not_stop_the_search_for_a_peak() -> None:
+def test_peak_is_found_if_vertices_coincide() -> None:
     """Both have the same miss, so that to look for a greater one next to the first is to look no
     further.
     """

@@ -1,5 +1,5 @@
-"""Sections against linear programs: with an error of its own for each impulse, and with one error
-of the speed.
+"""Sections compared with linear programs: with an error for each impulse, and with one error of the
+speed for all.
 """
 
 from __future__ import annotations
@@ -90,9 +90,10 @@ def program(angles: Floats, impulses: Floats, direction: Floats, shared: bool) -
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_section_is_the_set_of_impulses_with_errors_of_their_own_and_contains_that_of_one_speed(
+def test_section_equals_the_linear_program_with_an_error_for_each_impulse(
     seed: int,
 ) -> None:
+    """It contains the set with one error of the speed for all impulses."""
     angles, impulses = history(seed)
     model = SetModel(
         E_M_S, STEP_S, BOX, SENSOR, disturbance_m_s2=NU_M_S2, sections=5, model=Model.GUARANTEED

@@ -1,5 +1,5 @@
-"""Sections of a window of labels hold every motion whose label is in the window, and those of its
-labels.
+"""Sections of a window of labels contain every motion whose label is in the window, and the
+sections of its labels.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ import pytest
 from numpy.typing import NDArray
 
 from infoset import AngleSensor, InformationSet, InitialSet, Model, SetModel, StateBox
-from infoset.engine import chains, replays
-from infoset.engine.replays import LAST_REPLAY, Past, past_of
+from infoset.engine import chains, replays, workspace
 from infoset.engine.section_law import law_of
 from infoset.engine.section_life import NEVER_EMPTIED, time_to_go
+from infoset.engine.workspace import LAST_REPLAY, Past, past_of
 from infoset.kernels import JIT
 
 SPEED, STEP, STEPS = 58e3, 0.5, 190
@@ -26,18 +26,18 @@ def _extremes(label: float, near: float, far: float, past: Past) -> Any:
     """Return the extremes of the predicted miss in the section of a label in a window, displaced by
     (13).
 
-    If the replay of the window is thinned, it applies what has cut the sections of three of its
-    labels.
+    If the replay of the window is thinned, it applies the measurements that have cut the sections
+    of three of its labels.
     """
-    replays.select(past, 0)
+    workspace.select(past, 0)
     if past.thinned:
         for each in (near, 0.5 * (near + far), far):
-            replays.run(each, replays.with_window(past, np.inf, -np.inf))
+            replays.run(each, workspace.with_window(past, np.inf, -np.inf))
     window = Past(past.log, past.errors, past.laws, past.room, near, far, past.thinned)
-    emptied_at, _, _ = replays.run(label, window)
+    emptied_at = replays.run(label, window).emptied_at
     law = law_of(past.laws, 0)
-    middle = replays.middle_label(label, window)
-    section = replays.replayed_section(window, 0, LAST_REPLAY, middle)
+    middle = workspace.middle_label(label, window)
+    section = workspace.replayed_section(window, 0, LAST_REPLAY, middle)
     upper, lower = chains.max_and_min_miss(section, time_to_go(middle, past.log.elapsed, law))
     turn = past.room.drifts[0, 0] * (label - middle) / law.closing_speed
     return (
@@ -89,7 +89,7 @@ def flight(seed: int, rate_period: int) -> tuple[Past, float, float]:
 @pytest.mark.parametrize("thinned", [False, True])
 @pytest.mark.parametrize("rate_period", [1, 7, 60])
 @pytest.mark.parametrize("seed", range(6))
-def test_the_section_of_a_window_holds_the_motion_and_the_sections_of_its_labels(
+def test_section_of_a_window_contains_the_motion_and_the_sections_of_its_labels(
     seed: int, rate_period: int, thinned: bool
 ) -> None:
     past, label, miss = flight(seed, rate_period)
@@ -115,7 +115,7 @@ def test_the_section_of_a_window_holds_the_motion_and_the_sections_of_its_labels
 
 @pytest.mark.parametrize("thinned", [False, True])
 @pytest.mark.parametrize("seed", range(6))
-def test_the_extremes_of_a_window_are_concave_and_tend_to_those_of_its_labels(
+def test_extremes_in_a_window_are_concave_and_converge_to_the_extremes_of_its_labels(
     seed: int, thinned: bool
 ) -> None:
     past, label, _ = flight(seed, 1)
