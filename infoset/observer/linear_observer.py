@@ -1,6 +1,4 @@
-"""Observers of linear systems: the exact sets of states that agree with measurements, inputs and
-bounded errors.
-"""
+"""Observers of linear systems: sets of states that agree with measurements and bounded errors."""
 
 from __future__ import annotations
 
@@ -8,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,23 +23,24 @@ from infoset.observer.steps import Strips
 from infoset.observer.window import WINDOW, Windows, exact_hull
 
 MAX_POLYTOPE_STATES = 4
-"""Number of states up to which the sets are polytopes: of more, programs give tighter bounds than
-reduced polytopes.
+"""Number of states up to which the sets are polytopes. For more states, programs give tighter
+bounds than reduced polytopes.
 """
-Known = TypeVar("Known")
-
 MAX_RECORD = 20_000
 """Number of steps and measurements up to which they are kept, so that the memory of an observer is
-bounded.
+bounded; chosen.
 """
 _OUTLINE_SIDES = 32
 """Sides of a polygon around a projection: around an ellipse it has 0.3 % more area."""
 
+Known = TypeVar("Known")
+
 
 @dataclass(frozen=True, eq=False)
 class Inconsistency:
-    """Where the measurements contradict the model; arrays of the shape () for a single run, or
-    (B,).
+    """Where the measurements contradict the model.
+
+    The arrays have the shape () for a single run, or (B,).
 
     Parameters
     ----------
@@ -63,11 +62,10 @@ class Inconsistency:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Estimate:
-    """The sets of possible states of all runs at a step; with `single` there is one run, without an
-    axis of runs.
+    """The sets of possible states of all runs at a step.
 
     They result from the `initial` set and the first `count` of the `events`, steps and
-    measurements.
+    measurements. With `single` there is one run, without an axis of runs.
     """
 
     step: int
@@ -82,12 +80,12 @@ class Estimate:
         head = f"<estimate of {self.states} states at step {self.step}:"
         ends = np.stack(self._hull, axis=-1)
         if not self.single:
-            return (
-                f"{head} {len(ends)} runs, {int(self.is_empty.sum())} of them without a possible "
-                "state>"
-            )
+            empty = int(self.is_empty.sum())
+            return f"{head} {len(ends)} runs, {empty} of them without a possible state>"
+        if self.is_empty:
+            return f"{head} no state is possible>"
         bounds = ", ".join(f"{low:.6g} to {high:.6g}" for low, high in ends)
-        return f"{head} {'no state is possible' if self.is_empty else bounds}>"
+        return f"{head} {bounds}>"
 
     @property
     def is_empty(self) -> Flags:
@@ -96,16 +94,15 @@ class Estimate:
 
     @property
     def reduced(self) -> Flags:
-        """Whether the set is larger than the exact one: of a bounded number of facets, or of the
-        last steps only.
+        """Whether the set is larger than the exact one, shape () or (B,).
 
-        Shape () or (B,). Polygons of two states are exact up to 512 vertices, and not counted here.
+        It has a bounded number of facets, or uses the last steps only. Polygons of two states are
+        exact up to 512 vertices, and not counted here.
         """
         return np.asarray(self._runs(self.sets.reduced))
 
     def excess_widths(self) -> Floats:
-        """Return by how much the width of the set along each state exceeds the exact one, shape
-        (n,) or (B, n).
+        """Return the excess of the widths of the set over the exact ones, shape (n,) or (B, n).
 
         2 n linear programs over the whole record for each reduced run; the exact widths are at most
         1e-7 of a state smaller than those that they find. 0 for other runs, and NaN for the empty
@@ -118,19 +115,22 @@ class Estimate:
         """
         lower, upper = (np.atleast_2d(end) for end in self._hull)
         excess = np.where(np.isnan(lower), np.nan, 0.0)
-        for run in np.flatnonzero(np.atleast_1d(self.reduced) & ~np.atleast_1d(self.is_empty)):
-            if len(self.events) < self.count:
-                raise ValueError(
-                    f"exact widths are known for {MAX_RECORD} steps and measurements, not more"
-                )
-            hull = exact_hull(self.initial, self.events[: self.count], int(run), self.step)
-            excess[run] = np.maximum(upper[run] - lower[run] - (hull[1] - hull[0]), 0.0)
+        is_larger = np.atleast_1d(self.reduced) & ~np.atleast_1d(self.is_empty)
+        if is_larger.any() and len(self.events) < self.count:
+            raise ValueError(
+                f"exact widths are known for {MAX_RECORD} steps and measurements, not more"
+            )
+
+        for run in np.flatnonzero(is_larger):
+            least, most = exact_hull(self.initial, self.events[: self.count], int(run), self.step)
+            excess[run] = np.maximum(upper[run] - lower[run] - (most - least), 0.0)
         return self._runs(excess)
 
     @property
     def polygons(self) -> ConvexPolygons:
-        """The sets of two states; rows of `vertices` after the `counts` of a run, which only a
-        batch has, are NaN.
+        """The sets of two states as polygons.
+
+        In a batch, rows of `vertices` after the `counts` of a run are NaN.
 
         Raises
         ------
@@ -138,12 +138,11 @@ class Estimate:
             If the system has another number of states.
         """
         if not isinstance(self.sets, Polygons):
-            instead = (
-                ".polytopes"
-                if isinstance(self.sets, Polytopes)
-                else ".lower, .upper or .output_hull"
-            )
+            instead = ".lower, .upper or .output_hull"
+            if isinstance(self.sets, Polytopes):
+                instead = ".polytopes"
             raise ValueError(f"the set has {self.states} states, not two: use {instead}")
+
         counts = self.sets.counts
         used = np.arange(counts.max(initial=0)) < counts[:, None]
         vertices = np.where(used[..., None], self.sets.vertices[:, : used.shape[1]], np.nan)
@@ -166,10 +165,9 @@ class Estimate:
                 f"sets of {self.states} states have too many facets for a polytope, at most "
                 f"{MAX_POLYTOPE_STATES} states are possible: use .lower, .upper or .output_hull"
             )
-        pairs = zip(self.sets.vertices, self.sets.counts, strict=True)
         return tuple(
-            Polytope.from_vertices(points[:count]) if count else Polytope.empty(2)
-            for points, count in pairs
+            Polytope.from_vertices(points) if len(points) else Polytope.empty(2)
+            for points in self._vertices()
         )
 
     @property
@@ -183,8 +181,9 @@ class Estimate:
         return self._hull[1]
 
     def chebyshev_centre(self) -> Floats:
-        """Return the centre of a largest ball in the set, shape (n,) or (B, n); NaN for the empty
-        set.
+        """Return the centre of a largest ball in the set, shape (n,) or (B, n).
+
+        It is NaN for the empty set.
 
         Raises
         ------
@@ -194,8 +193,9 @@ class Estimate:
         return self._runs(self.sets.chebyshev_centres())
 
     def output_hull(self, matrix: ArrayLike) -> tuple[Floats, Floats]:
-        """Return the minimum and the maximum values of matrix x, each of shape (m,) or (B, m); NaN
-        for the empty set.
+        """Return the minimum and the maximum values of matrix x, each of shape (m,) or (B, m).
+
+        They are NaN for the empty set.
 
         Raises
         ------
@@ -203,12 +203,14 @@ class Estimate:
             If the matrix does not have the shape (m, n), m at least 1, or is not finite.
         """
         rows = finite_values("matrix", matrix, "m", self.states)
-        ends = [np.array([self.sets.support(sign * row) for row in rows]).T for sign in (-1.0, 1.0)]
-        lower, upper = (np.where(np.isinf(end), np.nan, end) for end in ends)
-        return self._runs(0.0 - lower), self._runs(upper)
+        below = np.array([self.sets.support(-row) for row in rows]).T
+        above = np.array([self.sets.support(row) for row in rows]).T
+        lower = 0.0 - np.where(np.isinf(below), np.nan, below)
+        upper = np.where(np.isinf(above), np.nan, above)
+        return self._runs(lower), self._runs(upper)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return step, bounds and, up to four states, the vertices, as Python numbers and lists.
+        """Return the step, bounds and, up to four states, vertices as Python numbers and lists.
 
         The keys are `step`, `is_empty`, `lower`, `upper` and `vertices`. The bounds of the empty
         set are None, and its vertices are an empty list. In a batch all values but the step are
@@ -228,11 +230,10 @@ class Estimate:
         return {"step": self.step, **columns}
 
     def plot(self, ax: Any = None, states: tuple[int, int] = (0, 1), **style: Any) -> list[Any]:
-        """Fill the projections of the sets on the plane of two states; return the artists, one for
-        each set.
+        """Fill the projections of the sets on the plane of two states; return the artists.
 
-        Of five and more states the picture is a polygon of 32 sides that contains the projection,
-        from a linear program each. Empty sets have no artist.
+        There is one artist for each set that is not empty. For five and more states the picture is
+        a polygon that contains the projection, of 32 sides, with a linear program for each.
 
         Parameters
         ----------
@@ -265,35 +266,42 @@ class Estimate:
 
     def _outlines(self, numbers: list[int]) -> list[Floats]:
         """Return the polygon of each run in the plane of two states, shape (m, 2)."""
-        if not isinstance(self.sets, Windows):
-            return [
-                ConvexPolygons.from_points(points[:, numbers]).polygon()
-                if len(points)
-                else np.zeros((0, 2))
-                for points in self._vertices()
-            ]
+        if isinstance(self.sets, Windows):
+            return self._outlines_by_programs(numbers)
+        outlines = []
+        for points in self._vertices():
+            outline = np.zeros((0, 2))
+            if len(points):
+                outline = ConvexPolygons.from_points(points[:, numbers]).polygon()
+            outlines.append(outline)
+        return outlines
+
+    def _outlines_by_programs(self, numbers: list[int]) -> list[Floats]:
+        """Return polygons around the projections, with sides at equal angles in a square plot."""
         lower, upper = (np.atleast_2d(end)[:, numbers] for end in self._hull)
         widths = np.nanmax(np.where(upper > lower, upper - lower, 0.0), axis=0)
+        units = np.where(widths > 0.0, widths, 1.0)
         angles = np.linspace(0.0, 2.0 * np.pi, _OUTLINE_SIDES, endpoint=False)
-        normals = np.column_stack([np.cos(angles), np.sin(angles)]) / np.where(
-            widths > 0.0, widths, 1.0
-        )
+        normals = np.column_stack([np.cos(angles), np.sin(angles)]) / units
+
         directions = np.zeros((len(normals), self.states))
         directions[:, numbers] = normals
         heights = np.array([self.sets.support(direction) for direction in directions]).T
         outlines = []
         for limits in heights:
-            if np.isinf(limits).any():
-                outlines.append(np.zeros((0, 2)))
-            else:
-                outlines.append(ConvexPolygons.from_constraints(normals, limits).polygon())
+            outline = np.zeros((0, 2))
+            if not np.isinf(limits).any():
+                outline = ConvexPolygons.from_constraints(normals, limits).polygon()
+            outlines.append(outline)
         return outlines
 
     @cached_property
     def _hull(self) -> tuple[Floats, Floats]:
+        """The minimum and the maximum of each state."""
         return self.output_hull(np.eye(self.states))
 
     def _runs(self, values: Floats | Flags) -> Floats:
+        """Return an array with an axis of runs without this axis for a single run."""
         return np.asarray(values[0] if self.single else values)
 
 
@@ -303,9 +311,8 @@ class LinearObserver:
     Two states: polygons, compiled, batched over runs. One, three and four states: polytopes, each
     run after the other. A polytope of more than `max_facets` facets is replaced by a larger one
     with fewer, so that the time of a step is bounded. Five and more states: a zonotope that
-    contains the set is carried, and the bounds of an estimate are those of linear programs over the
-    last `window` steps, solved when they are asked for. `Estimate.reduced` and `excess_widths` give
-    the effect.
+    contains the set is carried, and linear programs over the last `window` steps give the bounds of
+    an estimate, when they are read. `Estimate.reduced` and `excess_widths` give the effect.
 
     Parameters
     ----------
@@ -317,7 +324,7 @@ class LinearObserver:
         Set of the state at step 0, before its measurement; for two states also one polygon for each
         run, shape (B,).
     noise : array_like, shape (), (q,) or (K, q), or a set, or a sequence of sets
-        Half-widths of the box V, those of each step, V, or V of each step. A set is a
+        Half-widths of the box V, half-widths of each step, V, or V of each step. A set is a
         ConvexPolygons, a Polytope or a Zonotope.
     disturbance : array_like, shape (n,) or (K, n), or a set, or a sequence of sets
         W, W of each step, or half-widths of a box W; without it (optional) the point 0.
@@ -350,22 +357,26 @@ class LinearObserver:
 
     A bound of five and more states is a sum that is an upper bound for all multipliers of the
     measurements; the solver (HiGHS) only proposes the multipliers, so that its tolerances enlarge a
-    bound and never make it wrong. Where it fails, the bound is that of the carried zonotope. That
-    no state is possible is proved in the same way, by one program for each estimate that is asked
-    for it: a contradiction that the zonotope does not show is found if `inconsistency`, `is_empty`
-    or a bound is asked for within `window` steps.
+    bound and never make it wrong. Where it fails, the carried zonotope gives the bound. One program
+    proves in the same way that no state is possible: a contradiction that the zonotope does not
+    show is found if `inconsistency`, `is_empty` or a bound is read within `window` steps.
 
     Examples
     --------
-    >>> observer = LinearObserver([[1, 1], [0, 1]], [[1, 0]], Zonotope.box([0, -1], [0, 1]), noise=0.1,
-    ...                           disturbance=Zonotope([0, 0], [[0, 0.05]]))
+    >>> observer = LinearObserver(
+    ...     [[1, 1], [0, 1]],
+    ...     [[1, 0]],
+    ...     Zonotope.box([0, -1], [0, 1]),
+    ...     noise=0.1,
+    ...     disturbance=Zonotope([0, 0], [[0, 0.05]]),
+    ... )
     >>> observer.predict()
     >>> observer.update([0.5])
     >>> observer.estimate().lower.round(3), observer.estimate().upper.round(3)
     (array([0.4 , 0.35]), array([0.6 , 0.65]))
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - the parts of a linear system, by name
         self,
         state_matrix: ArrayLike,
         output_matrix: ArrayLike,
@@ -379,43 +390,48 @@ class LinearObserver:
         max_facets: int | None = 36,
         window: int | None = WINDOW,
     ) -> None:
-        self.states = n = (real_values("state_matrix", state_matrix).shape or (0,))[-1]
+        shape = real_values("state_matrix", state_matrix).shape
+        self.states = n = shape[-1] if shape else 0
         COUNT.need("the number of states", n)
         self._a = _by_step("state_matrix", state_matrix, n, n)
         self._c = _by_step("output_matrix", output_matrix, "q", n)
-        self._b = (
-            np.zeros((n, 0))
-            if input_matrix is None
-            else _by_step("input_matrix", input_matrix, n, "p")
-        )
-        self._offset = np.zeros(n) if offset is None else _by_step("offset", offset, n)
-        self.outputs, self.inputs = self._c.shape[-2], self._b.shape[-1]
+        self._b = np.zeros((n, 0))
+        if input_matrix is not None:
+            self._b = _by_step("input_matrix", input_matrix, n, "p")
+        self._offset = np.zeros(n)
+        if offset is not None:
+            self._offset = _by_step("offset", offset, n)
+        self.outputs = self._c.shape[-2]
+        self.inputs = self._b.shape[-1]
+
         if runs is not None:
             COUNT.need("runs", runs)
         if max_facets is not None and n <= MAX_POLYTOPE_STATES:
             Limits(minimum=2 * n, whole=True).need("max_facets", max_facets)
         if window is not None:
             COUNT.need("window", window)
+        self.max_facets = max_facets
+        self.window = window
         self._single = runs is None
         self._runs = runs or 1
         self._disturbance = _disturbances(disturbance, n)
         self._replaced = dict[int, Set]()
         _need_set("initial", initial, n, (self._runs,) if runs else ())
         self._noise = _noises(noise, self.outputs)
-        self.max_facets = max_facets
-        self.window = window
         self._initial = initial
+
+        self.step = 0
+        self._sets = self._first_sets()
         self._events = list[Motion | Strips]()
         self._count = 0
-        self._sets = self._first_sets()
-        self.step = 0
-        self._empty = (
+        self._empty = _Emptied(
             np.full(self._runs, -1),
             np.zeros(self._runs, dtype=np.int64),
             np.zeros(self._runs),
         )
 
     def _first_sets(self) -> Sets:
+        """Return the sets of step 0, before its measurement."""
         if self.states == 2:
             return Polygons.of(self._initial, self._runs)
         if self.states > MAX_POLYTOPE_STATES:
@@ -438,7 +454,7 @@ class LinearObserver:
         inputs : array_like, shape (p,) or (B, p), or a number for one input, optional
             u between this step and the next one; without it zero.
         disturbance : ConvexPolygons, Polytope or Zonotope, optional
-            W of this step, in place of that of the observer. `smooth` uses it too.
+            W of this step, in place of W of the observer. `smooth` uses it too.
 
         Raises
         ------
@@ -462,7 +478,7 @@ class LinearObserver:
         Parameters
         ----------
         measurement : array_like, shape (q,) or (B, q), or a number for one output
-            y; NaN or None is a missing measurement, and None in place of the array that all are
+            y; NaN or None is a missing measurement. None in place of the array means that all are
             missing.
 
         Raises
@@ -479,7 +495,7 @@ class LinearObserver:
     def cut(
         self, normals: ArrayLike, lower: ArrayLike = -np.inf, upper: ArrayLike = np.inf
     ) -> None:
-        """Cut the sets of this step by strips, from what else is known of the states.
+        """Cut the sets of this step by strips, other constraints on the states.
 
         Parameters
         ----------
@@ -500,30 +516,33 @@ class LinearObserver:
         rows = finite_values(
             "normals", np.atleast_2d(real_values("normals", normals)), "r", self.states
         )
-        shapes = ((), (len(rows),), (self._runs, len(rows)))
+        shapes: list[tuple[int, ...]] = [(), (len(rows),)]
+        if not self._single:
+            shapes.append((self._runs, len(rows)))
         ends = []
         for name, values in (("lower", lower), ("upper", upper)):
-            end = bound_values(name, values, *(shapes[:2] if self._single else shapes))
+            end = bound_values(name, values, *shapes)
             ends.append(np.array(np.broadcast_to(end, (self._runs, len(rows)))))
         sizes = [np.where(np.isinf(end), 0.0, np.abs(end)) for end in ends]
-        self._cut(
-            np.ones(self._runs, dtype=bool), Strips(rows, ends[0], ends[1], np.maximum(*sizes))
-        )
+        strips = Strips(rows, ends[0], ends[1], np.maximum(*sizes))
+        self._cut(np.ones(self._runs, dtype=bool), strips)
 
     def _cut(self, runs: Flags, strips: Strips) -> None:
+        """Cut the sets of some runs by strips, of which those with NaN ends do not exist."""
         exists = runs[:, None] & ~np.isnan(strips.lower)
         lower = np.where(exists, strips.lower, -np.inf)
         upper = np.where(exists, strips.upper, np.inf)
+        strips = Strips(strips.normals, lower, upper, np.where(exists, strips.terms, 0.0))
+
         excess = np.zeros((self._runs, len(strips.normals)))
         before = self._sets.is_known_empty
-        strips = Strips(strips.normals, lower, upper, np.where(exists, strips.terms, 0.0))
         self._sets = self._sets.cut(strips, excess)
         self._note(strips)
         lost = np.flatnonzero(self._sets.is_known_empty & ~before)
         if len(lost):
-            step, output, amount = self._empty
-            step[lost], output[lost] = self.step, excess[lost].argmax(axis=1)
-            amount[lost] = excess[lost].max(axis=1)
+            self._empty.step[lost] = self.step
+            self._empty.output[lost] = excess[lost].argmax(axis=1)
+            self._empty.excess[lost] = excess[lost].max(axis=1)
 
     def _note(self, event: Motion | Strips) -> None:
         """Keep a step or a measurement, of sets that may be reduced, for their exact widths."""
@@ -535,23 +554,31 @@ class LinearObserver:
 
     def estimate(self) -> Estimate:
         """Return the present sets."""
-        record = self._initial, self._events, self._count
-        return Estimate(self.step, self._sets, self._single, self.states, *record)
+        return Estimate(
+            self.step,
+            self._sets,
+            self._single,
+            self.states,
+            self._initial,
+            self._events,
+            self._count,
+        )
 
     @property
     def inconsistency(self) -> Inconsistency:
-        """Where the measurements contradict the model: of five and more states, by programs over
-        the last steps.
+        """Where the measurements contradict the model.
+
+        For five and more states, programs over the last steps are solved.
         """
+        empty = self._empty
         if isinstance(self._sets, Windows):
-            step, output, excess = self._empty
-            for run in np.flatnonzero(step == -1):
+            for run in np.flatnonzero(empty.step == -1):
                 where = self._sets.members[run].located()
                 if where is not None:
-                    step[run] = where.step
-                    output[run] = where.output
-                    excess[run] = where.excess
-        parts = [part[0] if self._single else part.copy() for part in self._empty]
+                    empty.step[run] = where.step
+                    empty.output[run] = where.output
+                    empty.excess[run] = where.excess
+        parts = [part[0] if self._single else part.copy() for part in empty]
         return Inconsistency(*(np.asarray(part) for part in parts))
 
     def run(
@@ -562,7 +589,7 @@ class LinearObserver:
         Parameters
         ----------
         measurements : array_like, shape (N, q) or (N, B, q)
-            y of this step and of the next ones; NaN and None as in `update`.
+            y of this step and of the next steps; NaN and None as in `update`.
         inputs : array_like, shape (N, p) or (N, B, p), optional
             u after each measurement; one row less is enough.
 
@@ -571,16 +598,17 @@ class LinearObserver:
         ValueError
             As `predict` and `update`, or if there are too few inputs.
         """
-        estimates = []
         rows: Sequence[Any] | Floats
         if isinstance(measurements, list | tuple) and any(row is None for row in measurements):
             rows = measurements
         else:
             rows = np.atleast_1d(real_values("measurements", _with_nan(measurements)))
         series = _series(inputs, len(rows) - 1)
+
+        estimates = []
         for k, measurement in enumerate(rows):
-            if k:
-                self.predict(None if series is None else series[k - 1])
+            if k > 0:
+                self.predict(series[k - 1])
             self.update(measurement)
             estimates.append(self.estimate())
         return estimates
@@ -591,7 +619,7 @@ class LinearObserver:
         """Return the sets of earlier states given also the later measurements.
 
         The exact backward pass: a state is possible if it is in its own estimate and leads, for
-        some disturbance, to a possible state of the next step. Of five and more states, the
+        some disturbance, to a possible state of the next step. For five and more states, the
         programs of a step also have the measurements of the next `window` steps.
 
         Parameters
@@ -612,24 +640,26 @@ class LinearObserver:
         rows = _series(inputs, len(smoothed) - 1)
         for i in range(len(smoothed) - 2, -1, -1):
             step = smoothed[i].step
-            motion = self._motion(step, None if rows is None else rows[i])
+            motion = self._motion(step, rows[i])
             sets = smoothed[i].sets.preimage_cut(smoothed[i + 1].sets, motion)
             smoothed[i] = replace(smoothed[-1], step=step, sets=sets)
         return smoothed
 
     def _motion(self, step: int, inputs: ArrayLike | None) -> Motion:
+        """Return the motion from a step to the next one."""
         matrix = self._at(self._a, "state_matrix", step)
         offset = self._at(self._offset, "offset", step, 1)[None]
-        w = (
-            self._replaced[step]
-            if step in self._replaced
-            else self._disturbance.at("disturbance", step)
-        )
+        w = self._replaced.get(step)
+        if w is None:
+            w = self._disturbance.at("disturbance", step)
         if inputs is None:
             return Motion(matrix, offset, np.abs(offset), w)
+
         u = self._rows("inputs", inputs, self.inputs)
         b = self._at(self._b, "input_matrix", step)
-        return Motion(matrix, u @ b.T + offset, np.abs(u) @ np.abs(b).T + np.abs(offset), w)
+        shifts = u @ b.T + offset
+        terms = np.abs(u) @ np.abs(b).T + np.abs(offset)
+        return Motion(matrix, shifts, terms, w)
 
     def _rows(self, name: str, values: ArrayLike, size: int, *, missing: bool = False) -> Floats:
         """Return measurements or inputs of all runs, shape (B, size)."""
@@ -642,9 +672,8 @@ class LinearObserver:
                 f"{name} must have the shape {' or '.join(map(str, shapes))}: got {rows.shape}"
             )
         if np.isinf(rows).any() or (not missing and np.isnan(rows).any()):
-            raise ValueError(
-                f"{name} must be finite{' or NaN' if missing else ''}: got {shown(values)}"
-            )
+            wanted = "finite or NaN" if missing else "finite"
+            raise ValueError(f"{name} must be {wanted}: got {shown(values)}")
         return np.broadcast_to(rows, (self._runs, size))
 
     def _at(self, values: Floats, name: str, step: int, rank: int = 2) -> Floats:
@@ -656,6 +685,14 @@ class LinearObserver:
         return np.asarray(values[step])
 
 
+class _Emptied(NamedTuple):
+    """The arrays of an `Inconsistency` with an axis of runs."""
+
+    step: Integers
+    output: Integers
+    excess: Floats
+
+
 @dataclass(frozen=True)
 class _Schedule(Generic[Known]):
     """A value for all steps, or a value for each step."""
@@ -664,6 +701,7 @@ class _Schedule(Generic[Known]):
     varies: bool
 
     def at(self, name: str, step: int) -> Known:
+        """Return the value of a step; `name` is its name in messages."""
         if not self.varies:
             return self.values[0]
         if step >= len(self.values):
@@ -673,55 +711,42 @@ class _Schedule(Generic[Known]):
 
 @dataclass(frozen=True, eq=False)
 class _Noise:
-    """The set V as lower <= rows v <= upper; `polytope` is V if it is not a box."""
+    """The set V: a polytope, or without one the box -half <= v <= half."""
 
-    rows: Floats
-    lower: Floats
-    upper: Floats
+    half: Floats
     polytope: Polytope | None = None
 
     @classmethod
     def of_set(cls, noise: Set, outputs: int) -> _Noise:
+        """Return the noise in a set."""
         _need_set("noise", noise, outputs)
-        polytope = polytope_of(noise)
-        rows, limits = polytope.constraints()
-        return cls(rows, np.full(len(rows), -np.inf), limits, polytope)
-
-    @classmethod
-    def of_box(cls, half: Floats) -> _Noise:
-        return cls(np.eye(len(half)), -half, half)
+        return cls(np.zeros(0), polytope_of(noise))
 
     def strips(self, matrix: Floats, y: Floats) -> list[tuple[Flags, Strips]]:
-        """Return the strips of C x = y - v for groups of runs in which the same outputs are
-        measured.
+        """Return the strips of C x = y - v for groups of runs.
+
+        The same outputs are measured in the runs of a group; others are NaN. A strip with NaN ends
+        does not exist.
         """
-        known = ~np.isnan(y)
         if self.polytope is None:
-            strips = Strips(matrix, y - self.upper, y - self.lower, np.abs(y) + self.upper)
+            strips = Strips(matrix, y - self.half, y + self.half, np.abs(y) + self.half)
             return [(np.ones(len(y), dtype=bool), strips)]
+
+        known = ~np.isnan(y)
         groups = []
         for pattern in np.unique(known, axis=0):
-            runs = (known == pattern).all(axis=1)
-            if pattern.all():
-                rows = self.rows
-                upper = self.upper
-            elif pattern.any():  # the errors of the measured outputs alone
-                rows, upper = self.polytope.project(np.flatnonzero(pattern).tolist()).constraints()
-            else:
+            if not pattern.any():
                 continue
+            # V of the measured outputs alone.
+            errors = self.polytope
+            if not pattern.all():
+                errors = errors.project(np.flatnonzero(pattern).tolist())
+            rows, upper = errors.constraints()
             heights = y[:, pattern] @ rows.T
             terms = np.abs(np.nan_to_num(y[:, pattern])) @ np.abs(rows).T + np.abs(upper)
-            groups.append(
-                (
-                    runs,
-                    Strips(
-                        rows @ matrix[pattern],
-                        heights - upper,
-                        np.full_like(heights, np.inf),
-                        terms,
-                    ),
-                )
-            )
+            no_end = np.full_like(heights, np.inf)
+            strips = Strips(rows @ matrix[pattern], heights - upper, no_end, terms)
+            groups.append(((known == pattern).all(axis=1), strips))
         return groups
 
 
@@ -729,9 +754,9 @@ def _noises(noise: ArrayLike | Set | Sequence[Set], outputs: int) -> _Schedule[_
     """Return V, or V of each step."""
     sets = _sets_of(noise)
     if sets is not None:
-        return _Schedule(
-            tuple(_Noise.of_set(each, outputs) for each in sets), isinstance(noise, Sequence)
-        )
+        noises = tuple(_Noise.of_set(each, outputs) for each in sets)
+        return _Schedule(noises, isinstance(noise, Sequence))
+
     values: Any = noise
     half = finite_values("noise", values, "...")
     is_possible = half.shape in ((), (outputs,)) or half.shape[1:] == (outputs,)
@@ -740,8 +765,9 @@ def _noises(noise: ArrayLike | Set | Sequence[Set], outputs: int) -> _Schedule[_
             f"noise must be half-widths of at least 0, a number or of shape ({outputs},) or (K, "
             f"{outputs}): got {shown(noise)}"
         )
-    rows = np.broadcast_to(half, (len(half) if half.ndim == 2 else 1, outputs))
-    return _Schedule(tuple(map(_Noise.of_box, rows)), half.ndim == 2)
+    steps = len(half) if half.ndim == 2 else 1
+    rows = np.broadcast_to(half, (steps, outputs))
+    return _Schedule(tuple(map(_Noise, rows)), half.ndim == 2)
 
 
 def _disturbances(
@@ -755,8 +781,10 @@ def _disturbances(
         for each in sets:
             _need_set("disturbance", each, states)
         return _Schedule(sets, isinstance(disturbance, Sequence))
+
     if not isinstance(disturbance, Sequence | np.ndarray):
-        _need_set("disturbance", disturbance, states)  # raises TypeError
+        # Raises a TypeError that names the classes of sets.
+        _need_set("disturbance", disturbance, states)
     values: Any = disturbance
     half = finite_values("disturbance", values, "...")
     is_possible = half.shape == (states,) or half.shape[1:] == (states,)
@@ -765,7 +793,8 @@ def _disturbances(
             f"disturbance must be a set, or half-widths of at least 0 of shape ({states},) or (K, "
             f"{states}): got {shown(disturbance)}"
         )
-    return _Schedule(tuple(Zonotope.box(-row, row) for row in np.atleast_2d(half)), half.ndim == 2)
+    boxes = tuple(Zonotope.box(-row, row) for row in np.atleast_2d(half))
+    return _Schedule(boxes, half.ndim == 2)
 
 
 def _sets_of(value: object) -> tuple[Set, ...] | None:
@@ -785,10 +814,16 @@ def _with_nan(values: Any) -> Any:
         return np.nan
     if isinstance(values, np.ndarray) and values.dtype == object:
         values = values.tolist()
-    return [_with_nan(each) for each in values] if isinstance(values, list | tuple) else values
+    if isinstance(values, list | tuple):
+        return [_with_nan(each) for each in values]
+    return values
 
 
 def _need_set(name: str, value: object, space: int, shape: tuple[int, ...] = ()) -> None:
+    """Refuse an argument that is not a bounded, nonempty set of R^n, n = `space`.
+
+    Batches of polygons may have a `shape`.
+    """
     if not isinstance(value, ConvexPolygons | Polytope | Zonotope):
         raise TypeError(
             f"{name} must be a ConvexPolygons, a Polytope or a Zonotope: got {type(value).__name__}"
@@ -809,10 +844,12 @@ def _need_set(name: str, value: object, space: int, shape: tuple[int, ...] = ())
         raise ValueError(f"{name} must be bounded: got {value!r}")
 
 
-def _series(inputs: ArrayLike | None, steps: int) -> Floats | None:
-    """Return inputs of at least a number of steps."""
-    rows = None if inputs is None else real_values("inputs", inputs)
-    if rows is not None and (not rows.ndim or len(rows) < steps):
+def _series(inputs: ArrayLike | None, steps: int) -> Sequence[ArrayLike | None] | Floats:
+    """Return the inputs of at least a number of steps, each None if there are no inputs."""
+    if inputs is None:
+        return [None] * steps
+    rows = real_values("inputs", inputs)
+    if not rows.ndim or len(rows) < steps:
         raise ValueError(
             f"inputs must have a row for each of {steps} steps: got the shape {rows.shape}"
         )
@@ -822,4 +859,6 @@ def _series(inputs: ArrayLike | None, steps: int) -> Floats | None:
 def _by_step(name: str, value: ArrayLike, *shape: str | int) -> Floats:
     """Return numbers of some shape, or of this shape for each step."""
     values = real_values(name, value)
-    return finite_values(name, values, *["K"] * (values.ndim > len(shape)), *shape)
+    if values.ndim > len(shape):
+        return finite_values(name, values, "K", *shape)
+    return finite_values(name, values, *shape)

@@ -1,5 +1,6 @@
-"""Bounds of a state over all motions that agree with a record: linear programs, and sums that prove
-their bounds.
+"""Bounds of a state over all motions that agree with a record.
+
+Linear programs propose the bounds, and sums prove them.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from infoset.geometry.zonotope import Zonotope
 from infoset.observer.sets import Motion, Set, polytope_of, sizes_of
 
 EPSILON = float(np.finfo(np.float64).eps)
-"""Relative rounding error of an operation, twice the half unit in the last place."""
+"""Twice the maximum relative rounding error of an operation."""
 BLOCK = 25
 """Stages after which the state is an unknown, so that long programs stay sparse: more than two
 windows of 10 steps. From 10 to 50, programs of 41 and 400 steps take the same time to 20 %."""
@@ -31,21 +32,21 @@ _OPTIONS = HIGHS | {"presolve": False}
 half the time.
 """
 _NO_ROW = 128.0 * UNSURE
-"""Length of a row of a strip, relative to its terms, below which it consists of rounding errors of
-its products.
+"""Length of a row of a strip, relative to its terms, below which it is the rounding errors of its
+products: 512 of them.
 """
 
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """A step of one run: what is known of its state, and the motion to the next step.
+    """A step of one run: the constraints of its state, and the motion to the next step.
 
     Parameters
     ----------
     step : int
         Number of the step.
     prior : ConvexPolygons, Polytope or Zonotope
-        Set that contains the state, from what is known before the strips.
+        Set that contains the state, before the strips.
     normals, lower, upper : ndarray, shapes (r, n), (r,), (r,)
         Strips lower <= normal . x <= upper of the measurements, enlarged by their rounding errors.
     outputs : ndarray of int, shape (r,)
@@ -65,15 +66,9 @@ class Stage:
     @classmethod
     def at_first(cls, step: int, prior: Set) -> Stage:
         """Return a stage without measurements."""
-        none = np.zeros(0)
-        return cls(
-            step,
-            prior,
-            np.zeros((0, len(sizes_of(prior)))),
-            none,
-            none,
-            np.zeros(0, dtype=np.int64),
-        )
+        no_normal = np.zeros((0, len(sizes_of(prior))))
+        no_end = np.zeros(0)
+        return cls(step, prior, no_normal, no_end, no_end, np.zeros(0, dtype=np.int64))
 
     @cached_property
     def sizes(self) -> Floats:
@@ -105,14 +100,14 @@ class Stage:
 
 
 class _Rows(NamedTuple):
-    """Strips of a stage in the program: their numbers, and what they were divided by."""
+    """Strips of a stage in the program: their numbers, and the lengths that divide their rows."""
 
     strips: Integers
     lengths: Floats
 
 
 class _State(NamedTuple):
-    """A state as offset + matrix u, with u the unknowns from a `first` one on."""
+    """A state as offset + matrix u, where u are the unknowns from number `first` on."""
 
     offset: Floats
     matrix: Floats
@@ -120,7 +115,7 @@ class _State(NamedTuple):
 
 
 class _Table:
-    """A sparse matrix that is written as dense blocks."""
+    """A sparse matrix that is written in dense blocks."""
 
     def __init__(self) -> None:
         self.rows = 0
@@ -140,23 +135,20 @@ class _Table:
 
     def matrix(self, columns: int) -> sp.csr_array:
         """Return the matrix."""
-        none = [np.zeros(0)]
-        values = np.concatenate([*none, *self._values])
-        where = [
-            np.concatenate([*none, *numbers]).astype(np.int64)
-            for numbers in (self._row, self._column)
-        ]
-        return sp.csr_array((values, (where[0], where[1])), shape=(self.rows, columns))
+        none = np.zeros(0)
+        values = np.concatenate([none, *self._values])
+        row = np.concatenate([none, *self._row]).astype(np.int64)
+        column = np.concatenate([none, *self._column]).astype(np.int64)
+        return sp.csr_array((values, (row, column)), shape=(self.rows, columns))
 
 
 class Program:
-    """The motions through successive stages: bounds of the state at one of them, and whether there
-    is a motion.
+    """The motions through successive stages: bounds of a state, and whether there is a motion.
 
     The unknowns are coefficients of the generators of the first prior and of the disturbances (of a
     polytope: of its vertices, with the sum 1), and the states of every `BLOCK`-th stage. The solver
-    only proposes multipliers of the strips: a sum that is an upper bound for all multipliers is
-    what is returned, so that no result depends on the tolerances of the solver.
+    only proposes multipliers of the strips. The result is a sum that is an upper bound for all
+    multipliers, so that no result depends on the tolerances of the solver.
 
     Parameters
     ----------
@@ -180,6 +172,7 @@ class Program:
         length = float(np.abs(cost).max(initial=0.0))
         if length == 0.0:
             return self._sum(direction, np.zeros(len(lines.levels)))
+
         optimum = linprog(
             goal / length, None, None, lines.rows, lines.levels, lines.limits, options=_OPTIONS
         )
@@ -188,13 +181,15 @@ class Program:
         return self._sum(direction, -length * optimum.eqlin.marginals)
 
     def is_infeasible(self) -> bool:
-        """Whether no motion agrees with the strips: proved by multipliers of the program of the
-        least enlargements.
+        """Whether no motion agrees with the strips, proved by multipliers.
+
+        They are the multipliers of the program of the least enlargements of the strips.
         """
         lines = self._lines
-        count = int(sum(len(numbers) for numbers, _ in lines.strips))
+        count = sum(len(rows.strips) for rows in lines.strips)
         if not count:
             return False
+
         # An enlargement of each strip to both sides; their sum is minimised.
         enlarged = sp.eye_array(len(lines.levels), count)
         rows = sp.hstack([lines.rows, enlarged, -enlarged]).tocsr()
@@ -206,12 +201,15 @@ class Program:
         return self._sum(np.zeros(self._states), -optimum.eqlin.marginals) < 0.0
 
     def _sum(self, direction: Floats, marginals: Floats) -> float:
-        """Return an upper bound of direction . x for any multipliers of the rows of the program, by
-        weak duality.
+        """Return an upper bound of direction . x for any multipliers, by weak duality.
 
-        From the last stage to the first one: p . x is at most (p - C' m) . x + m . ends for
-        multipliers m of strips C, and p . (A x + s + w) is at most (A' p) . x + p . s + the height
-        of W along p. At the stage of the state, its direction is added to p. All rounding errors
+        `marginals` are multipliers of the rows of the program. The sum goes from the last stage to
+        the first one:
+
+        - p . x is at most (p - C' m) . x + m . ends for multipliers m of strips C,
+        - p . (A x + s + w) is at most (A' p) . x + p . s + the height of W along p.
+
+        At the stage of the state, its direction is added to p, the `costate`. All rounding errors
         are relative to terms of bounded states, and are added.
         """
         multipliers = self._multipliers(marginals)
@@ -221,34 +219,44 @@ class Program:
             stage = self._stages[k]
             motion = stage.motion if k < len(self._stages) - 1 else None
             if motion is not None:
-                terms = motion.sums_of_terms(stage.sizes)
-                rounding = SUM_SLACK + (self._states + _count(motion.disturbance)) * EPSILON
-                parts.append(float(costate @ motion.shifts[0]))
-                parts.append(height_of(motion.disturbance, costate))
-                parts.append(rounding * float(np.abs(costate) @ terms))
+                parts += self._parts_of_motion(motion, stage.sizes, costate)
                 costate = costate @ motion.matrix
             if k == self._at:
                 costate = costate + direction
                 parts.append(2.0 * EPSILON * float(np.abs(direction) @ stage.sizes))
 
-            m = multipliers[k]
-            used = m != 0.0
-            ends = np.where(m > 0.0, stage.upper, stage.lower)[used]
-            m = m[used]
+            used = multipliers[k] != 0.0
+            m = multipliers[k][used]
+            ends = np.where(m > 0.0, stage.upper[used], stage.lower[used])
             normals = stage.normals[used]
             costate = costate - m @ normals
             parts.append(float(m @ ends))
             terms = np.abs(normals) @ stage.sizes + np.abs(ends)
             parts.append((len(m) + 4) * EPSILON * float(np.abs(m) @ terms))
+
         first = self._stages[0]
         rounding = SUM_SLACK + (self._states + _count(first.prior)) * EPSILON
         parts.append(height_of(first.prior, costate))
         parts.append(rounding * float(np.abs(costate) @ first.sizes))
         return math.fsum(parts)
 
+    def _parts_of_motion(self, motion: Motion, sizes: Floats, costate: Floats) -> list[float]:
+        """Return p . s, the height of W along p, and their rounding, for the costate p.
+
+        `sizes` are the maximum coordinates of the state before the motion.
+        """
+        terms = motion.sums_of_terms(sizes)
+        rounding = SUM_SLACK + (self._states + _count(motion.disturbance)) * EPSILON
+        return [
+            float(costate @ motion.shifts[0]),
+            height_of(motion.disturbance, costate),
+            rounding * float(np.abs(costate) @ terms),
+        ]
+
     def _multipliers(self, marginals: Floats) -> list[Floats]:
-        """Return the multipliers of the strips of each stage, shape (r,), from those of the rows of
-        the program.
+        """Return the multipliers of the strips of each stage, shape (r,), from the marginals.
+
+        The marginals are multipliers of the rows of the program.
         """
         multipliers = []
         start = 0
@@ -268,7 +276,7 @@ class Program:
 class _Lines(NamedTuple):
     """A linear program: rows u = levels, with limits of each unknown u.
 
-    The first rows are those of the `strips` of each stage; `state` is the one that is bounded.
+    The first rows are the `strips` of each stage; `state` is the state that is bounded.
     """
 
     rows: sp.csr_array
@@ -325,18 +333,17 @@ class _Builder:
         rows = _Rows(used, lengths[used])
         self._numbers.append(rows)
         self._strips.add(matrix[used] / rows.lengths[:, None], state.first)
-        ends = np.column_stack([stage.lower, stage.upper]) - (stage.normals @ state.offset)[:, None]
+
+        heights = stage.normals @ state.offset
+        ends = np.column_stack([stage.lower, stage.upper]) - heights[:, None]
         self._ends.append(ends[used] / rows.lengths[:, None])
 
     def lines(self, state: _State) -> _Lines:
         """Return the program: normal . x of a strip is an unknown within its ends."""
         count = self._strips.rows
-        rows = sp.block_array(
-            [
-                [self._strips.matrix(self.unknowns), -sp.eye_array(count)],
-                [self._equations.matrix(self.unknowns), None],
-            ]
-        )
+        strips = [self._strips.matrix(self.unknowns), -sp.eye_array(count)]
+        equations = [self._equations.matrix(self.unknowns), None]
+        rows = sp.block_array([strips, equations])
         levels = np.concatenate([np.zeros(count), *self._levels])
         limits = np.vstack([*self._limits, *self._ends])
         return _Lines(rows.tocsr(), levels, limits, self._numbers, state)
@@ -366,13 +373,13 @@ def _lines_of(stages: Sequence[Stage], at: int) -> _Lines:
 
 
 class _Generators(NamedTuple):
-    """Generators of a set, shape (g, n), the centre, and whether the coefficients are >= 0 with the
-    sum 1.
-    """
+    """A set as the sums of a centre and of generators times coefficients."""
 
     generators: Floats
+    """Shape (g, n)."""
     centre: Floats
     is_convex: bool
+    """Whether the coefficients are at least 0, with the sum 1; if not, they are from -1 to 1."""
 
 
 def _generators(shape: Set) -> _Generators:
@@ -383,7 +390,7 @@ def _generators(shape: Set) -> _Generators:
 
 
 def _count(shape: Set) -> int:
-    """Return the number of generators, which a height adds; 0 for a set of vertices."""
+    """Return the number of generators in the sum of `height_of`; 0 for a set of vertices."""
     return len(shape.generators) if isinstance(shape, Zonotope) else 0
 
 

@@ -1,6 +1,4 @@
-"""The sets of a `LinearObserver`: batches of polygons for two states, polytopes for other numbers
-of states.
-"""
+"""The sets of a `LinearObserver` with up to four states: polygons for two, polytopes for others."""
 
 from __future__ import annotations
 
@@ -33,17 +31,22 @@ POLYTOPE_SLACK = SNAP
 of a prediction: the distance from a facet within which points are its vertices, so that the tip of
 a sharp corner may be missing."""
 MAX_POLYTOPE_VERTICES = 5000
-"""A polytope with more vertices takes minutes a step."""
+"""Maximum number of vertices of an exact polytope: a step with more takes minutes."""
 _MAX_VERTICES = 700
-"""The same for sets that are reduced: those of four states have many more vertices than facets."""
+"""Maximum number of vertices of a polytope that is reduced. With 36 facets, the default, a set of
+four states has at most 36 * 33 / 2 = 594 (upper bound theorem).
+"""
 _TINY = float(np.finfo(np.float64).tiny)
+"""Minimum distance of a strip from a set that it leaves empty, so that the strip is found."""
+_MIN_TERM = 1e-50
+"""Minimum terms in whose unit a row is written: squares of normals up to 1e60 do not overflow."""
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
     """A step x+ = matrix x + shift + w, with w in the `disturbance`.
 
-    `shifts`, shape (B, n) or (1, n), are B u + c, and `terms` of the same shape the sums of the
+    `shifts`, shape (B, n) or (1, n), are B u + c. `terms`, of the same shape, are the sums of the
     sizes of their terms, which determine rounding errors.
     """
 
@@ -59,10 +62,9 @@ class Motion:
         return replace(self, shifts=self.shifts[run : run + 1], terms=self.terms[run : run + 1])
 
     def sums_of_terms(self, sizes: Floats) -> Floats:
-        """Return the sums of the sizes of the terms of a state after the step of one run, shape
-        (n,).
+        """Return the sums of the sizes of the terms of a state after the step, shape (n,).
 
-        `sizes`, shape (n,), bound the state before it.
+        The motion is the motion of one run. `sizes`, shape (n,), bound the state before it.
         """
         return np.asarray(np.abs(self.matrix) @ sizes + self.terms[0] + sizes_of(self.disturbance))
 
@@ -82,7 +84,7 @@ class Sets(Protocol):
 
     @property
     def is_known_empty(self) -> Flags:
-        """The same as far as it is known without linear programs."""
+        """Whether each set is known to be empty without linear programs, shape (B,)."""
 
     @property
     def reduced(self) -> Flags:
@@ -92,8 +94,9 @@ class Sets(Protocol):
         """Return the sets after a step; raise ArithmeticError if one has too many vertices."""
 
     def cut(self, strips: Strips, excess: Floats) -> Sets:
-        """Return the sets within the strips; `excess`, shape (B, r), receives the distance of a
-        strip from the set.
+        """Return the sets within the strips.
+
+        `excess`, shape (B, r), receives the distance of a strip from the set that it leaves empty.
         """
 
     def preimage_cut(self, later: Sets, motion: Motion) -> Sets:
@@ -114,10 +117,10 @@ class Polygons(Batch):
         """Return the same set for all runs, or the members of a batch of `runs` polygons."""
         polygons = polygon_of(start)
         room = polygons.vertices.shape[-2]
-        vertices = np.array(
-            np.broadcast_to(polygons.vertices, (runs, room, 2))
-        )  # writable, as all sets: one kernel
-        exact = cls(vertices, np.array(np.broadcast_to(polygons.counts, (runs,))))
+        # Copies are writable, as the arrays of all sets, so that kernels are compiled once.
+        vertices = np.array(np.broadcast_to(polygons.vertices, (runs, room, 2)))
+        counts = np.array(np.broadcast_to(polygons.counts, (runs,)))
+        exact = cls(vertices, counts)
         still = np.zeros((1, 2))
         # Sums of generators are rounded, as a true state on the boundary is.
         return exact.predicted(Motion(np.eye(2), still, still, Zonotope(np.zeros(2), [])))
@@ -129,43 +132,44 @@ class Polygons(Batch):
 
     @property
     def is_known_empty(self) -> Flags:
-        """The same."""
+        """Whether each set is empty, shape (B,)."""
         return self.is_empty
 
     @property
     def reduced(self) -> Flags:
-        """Not known: the kernels reduce only polygons of more than 512 vertices."""
+        """False: kernels reduce polygons of more than 512 vertices, which is not recorded."""
         return np.zeros(len(self.counts), bool)
 
     def predicted(self, motion: Motion) -> Polygons:
         """Return the sets after a step."""
         w = motion.disturbance
-        none = np.zeros((0, 2))
+        generators = np.zeros((0, 2))
+        other = np.zeros((0, 2))
+        centre = np.zeros(2)
         if isinstance(w, Zonotope):
             generators = w.generators
-            other = none
             centre = w.centre
         else:
-            generators = none
             other = polygon_of(w).polygon()
-            centre = np.zeros(2)
-        arrays = (
-            motion.matrix,
-            motion.shifts + centre,
-            motion.terms + np.abs(centre),
-            generators,
-            other,
+
+        # Kernels are compiled once, for contiguous arrays.
+        move = Move(
+            np.ascontiguousarray(motion.matrix),
+            np.ascontiguousarray(motion.shifts + centre),
+            np.ascontiguousarray(motion.terms + np.abs(centre)),
+            np.ascontiguousarray(generators),
+            np.ascontiguousarray(other),
         )
-        move = Move(*map(np.ascontiguousarray, arrays))  # kernels are compiled once
-        return self._apply(predict_all, 2 * len(generators) + len(other) + 4, move)
+        more = 2 * len(generators) + len(other) + 4
+        return self._apply(predict_all, more, move)
 
     def cut(self, strips: Strips, excess: Floats) -> Polygons:
-        """Return the sets within the strips; `excess`, shape (B, r), receives the distance of a
-        strip from the set.
+        """Return the sets within the strips.
+
+        `excess`, shape (B, r), receives the distance of a strip from the set that it leaves empty.
         """
-        return self._apply(
-            update_all, 2 * len(strips.normals), Strips(*map(np.ascontiguousarray, strips)), excess
-        )
+        contiguous = Strips(*map(np.ascontiguousarray, strips))
+        return self._apply(update_all, 2 * len(strips.normals), contiguous, excess)
 
     def preimage_cut(self, later: Sets, motion: Motion) -> Polygons:
         """Return the states that lead to a state of the later set for some disturbance."""
@@ -220,31 +224,32 @@ class RunPolytope:
         return replace(self, polytope=one.enlarged(REDUCED * np.where(sizes > 0.0, sizes, 1.0)))
 
     def limited(self) -> RunPolytope:
-        """Return a set that contains this one, with at most as many facets and vertices as allowed.
+        """Return a set that contains this one, with the allowed numbers of facets and vertices.
 
         Raises
         ------
         ArithmeticError
             If there is no limit and the set has too many vertices.
         """
-        vertices = len(self.polytope.vertices)
         if self.max_facets is None:
+            vertices = len(self.polytope.vertices)
             if vertices > MAX_POLYTOPE_VERTICES:
                 raise ArithmeticError(
                     f"the exact set has {vertices} vertices, and at most {MAX_POLYTOPE_VERTICES} "
                     "are possible; give max_facets for a larger set with fewer facets"
                 )
             return self
+
         smaller = self.polytope.reduce_outward(self.max_facets, _MAX_VERTICES)
         return self if smaller is self.polytope else replace(self, polytope=smaller, reduced=True)
 
     def predicted(
         self, matrix: Floats, shift: Floats, terms: Floats, disturbance: Set
     ) -> RunPolytope:
-        """Return the set of matrix x + shift + w; `terms` are the sums of the sizes of the terms of
-        shift + w.
+        """Return the set of matrix x + shift + w, for one run.
 
-        It is not reduced after the last sum: most of its facets go with the next measurement.
+        `terms`, shape (n,), are the sums of the sizes of the terms of shift + w. The set is not
+        reduced after the last sum: most of its facets go with the next measurement.
         """
         terms = np.abs(matrix) @ self.sizes + terms
         start = self.limited()
@@ -267,25 +272,24 @@ class RunPolytope:
         return replace(moved, polytope=moved.polytope.enlarged(SUM_SLACK * terms + slack * widths))
 
     def cut(self, strips: Strips, run: int = 0) -> tuple[RunPolytope, Floats]:
-        """Return the part within strips, and the distances of strips from the set, shape (r,), if
-        the part is empty.
+        """Return the part within strips, and their distances from the set if the part is empty.
+
+        The distances have the shape (r,).
         """
         terms = np.abs(strips.normals) @ self.sizes + strips.terms[run]
-        # A row that is short in the units of the states counts like others; normals may have at
-        # most 1e60.
-        unit = np.ldexp(1.0, -np.frexp(np.maximum(terms, 1e-50))[1])
+        # A row that is short in the units of the states counts like others.
+        unit = np.ldexp(1.0, -np.frexp(np.maximum(terms, _MIN_TERM))[1])
         normals = strips.normals * unit[:, None]
-        excess = np.zeros(len(terms))
-        for slack in (
-            POLYTOPE_SLACK,
-            REDUCED,
-        ):  # a layer that is thicker than rounding, where a flat set is left
+
+        # Where strips leave a flat set, a layer that is thicker than rounding.
+        for slack in (POLYTOPE_SLACK, REDUCED):
             lower = (strips.lower[run] - slack * terms) * unit
             upper = (strips.upper[run] + slack * terms) * unit
             part = self.polytope.cut(normals, lower, upper)
             if part.is_empty or part.dimension == part.space:
                 break
 
+        excess = np.zeros(len(terms))
         if part.is_empty and not self.polytope.is_empty:
             excess = self._excess(normals, lower, upper) / unit
         found = replace(self, polytope=part)
@@ -296,8 +300,9 @@ class RunPolytope:
         return found.limited(), excess
 
     def _excess(self, normals: Floats, lower: Floats, upper: Floats) -> Floats:
-        """Return the distance, shape (r,), of the first strip that leaves nothing from what others
-        leave; else 0.
+        """Return the distance of the first strip that leaves no state from the set before it.
+
+        The result has the shape (r,), with 0 for the other strips.
         """
         excess = np.zeros(len(normals))
         part = self.polytope
@@ -318,16 +323,10 @@ class Polytopes:
 
     @classmethod
     def of(cls, start: Set, runs: int, max_facets: int | None, sizes: Floats) -> Polytopes:
-        """Return the same set for all runs; `sizes`, shape (n,), are those of disturbances."""
-        member = RunPolytope(polytope_of(start), max_facets).solid(sizes)
-        return cls(
-            (
-                replace(
-                    member, polytope=member.polytope.enlarged(SUM_SLACK * member.sizes)
-                ).limited(),
-            )
-            * runs
-        )
+        """Return the same set for all runs; `sizes`, shape (n,), are the sizes of disturbances."""
+        solid = RunPolytope(polytope_of(start), max_facets).solid(sizes)
+        outer = replace(solid, polytope=solid.polytope.enlarged(SUM_SLACK * solid.sizes))
+        return cls((outer.limited(),) * runs)
 
     @property
     def is_empty(self) -> Flags:
@@ -336,7 +335,7 @@ class Polytopes:
 
     @property
     def is_known_empty(self) -> Flags:
-        """The same."""
+        """Whether each set is empty, shape (B,)."""
         return self.is_empty
 
     @property
@@ -351,35 +350,33 @@ class Polytopes:
         centre = w.centre if isinstance(w, Zonotope) else np.zeros(shape[1])
         shifts = np.broadcast_to(motion.shifts + centre, shape)
         terms = np.broadcast_to(motion.terms + sizes_of(w), shape)
-        pairs = zip(self.members, shifts, terms, strict=True)
-        return Polytopes(
-            tuple(member.predicted(motion.matrix, shift, term, w) for member, shift, term in pairs)
-        )
+        runs = zip(self.members, shifts, terms, strict=True)
+        members = [member.predicted(motion.matrix, shift, term, w) for member, shift, term in runs]
+        return Polytopes(tuple(members))
 
     def cut(self, strips: Strips, excess: Floats) -> Polytopes:
-        """Return the sets within the strips; `excess`, shape (B, r), receives the distance of a
-        strip from the set.
+        """Return the sets within the strips.
+
+        `excess`, shape (B, r), receives the distance of a strip from the set that it leaves empty.
         """
-        members, distances = zip(
-            *(member.cut(strips, b) for b, member in enumerate(self.members)), strict=True
-        )
-        excess[:] = distances
-        return Polytopes(members)
+        members = []
+        for run, member in enumerate(self.members):
+            part, excess[run] = member.cut(strips, run)
+            members.append(part)
+        return Polytopes(tuple(members))
 
     def preimage_cut(self, later: Sets, motion: Motion) -> Polytopes:
         """Return the states that lead to a state of the later set for some disturbance."""
         assert isinstance(later, Polytopes)
+        backward = later.predicted(motion.reversed_sum)
         results = []
-        for start, target in zip(
-            self.members, later.predicted(motion.reversed_sum).members, strict=True
-        ):
+        for start, target in zip(self.members, backward.members, strict=True):
             rows, limits = target.polytope.constraints()
             # rows @ matrix is rounded, relative to these terms.
             terms = np.abs(rows) @ (np.abs(motion.matrix) @ start.sizes + target.sizes)
             open_ends = np.full((1, len(rows)), -np.inf)
-            member, _ = start.cut(
-                Strips(rows @ motion.matrix, open_ends, limits[None], terms[None])
-            )
+            strips = Strips(rows @ motion.matrix, open_ends, limits[None], terms[None])
+            member, _ = start.cut(strips)
             results.append(replace(member, reduced=member.reduced or target.reduced))
         return Polytopes(tuple(results))
 
@@ -388,13 +385,17 @@ class Polytopes:
         return np.array([member.polytope.support_function(direction) for member in self.members])
 
     def chebyshev_centres(self) -> Floats:
-        """Return the centres of largest balls, shape (B, n), by a linear program each; NaN for the
-        empty set.
+        """Return the centres of largest balls, shape (B, n), by a linear program each.
+
+        They are NaN for the empty set.
         """
-        polytopes = [member.polytope for member in self.members]
-        return np.array(
-            [np.full(p.space, np.nan) if p.is_empty else p.chebyshev_centre()[0] for p in polytopes]
-        )
+        centres = []
+        for member in self.members:
+            centre = np.full(member.polytope.space, np.nan)
+            if not member.polytope.is_empty:
+                centre, _ = member.polytope.chebyshev_centre()
+            centres.append(centre)
+        return np.array(centres)
 
 
 def polygon_of(shape: Set) -> ConvexPolygons:

@@ -1,5 +1,4 @@
-"""Compiled steps of a `LinearObserver` with two states: prediction and measurement of a batch of
-polygons.
+"""Compiled steps of a `LinearObserver` with two states, for a batch of polygons.
 
 Every step is outward by a few ulp: the computed set contains the exact one, and a true state that
 is computed with floating-point numbers from errors at their bounds.
@@ -20,13 +19,17 @@ from infoset.geometry import polygon, polygon_exact, polygon_reduction, polygon_
 from infoset.geometry.polygon import Points
 
 MAX_VERTICES = 512
-"""Polygons with more vertices are reduced outward."""
+"""Polygons with more vertices are reduced outward, so that the time of a step is bounded: twice the
+limit of a section of an engagement.
+"""
 _SHARP = 2.0
 """Slope of both edges at an extreme vertex, relative to its axis, above which the vertex is
-divided.
+divided: it would move by more than 1 + 2 * 2 = 5 boxes.
 """
 _SHARP_CORNER = 0.5
-"""The same for a vertex that is extreme along two axes."""
+"""The same slope at a vertex that is extreme along two axes: it would move by more than
+1.5 / 0.5 = 3 boxes along each.
+"""
 
 
 class Batch(NamedTuple):
@@ -77,33 +80,27 @@ def reach(points: Points, count: int) -> tuple[float, float]:
 
 @compiled
 def predict_all(sets: Batch, move: Move, out: Batch) -> None:
-    """Write each polygon after a step, with a box of `SUM_SLACK` times the terms of a coordinate as
-    its half-widths.
+    """Write each polygon after a step, enlarged by the rounding of the step.
 
-    A result has at most 2 g + m + 4 vertices more.
+    The half-widths of this enlargement are `SUM_SLACK` times the terms of a coordinate. A result
+    has at most 2 g + m + 4 vertices more.
     """
     matrix = move.matrix
-    other = move.other
-    generators = move.generators
-    scratch = np.empty_like(out.vertices[0])
-    second = np.empty_like(out.vertices[0])
     xx = matrix[0, 0]
     xy = matrix[0, 1]
     yx = matrix[1, 0]
     yy = matrix[1, 1]
     determinant = polygon.scaled_determinant(xx, xy, yx, yy)
-    added_x = added_y = 0.0
-    for g in range(len(generators)):
-        added_x += abs(generators[g, 0])
-        added_y += abs(generators[g, 1])
-    other_x, other_y = reach(other, len(other))
-    added_x += other_x
-    added_y += other_y
+    added_x, added_y = reach_of_sum(move.generators, move.other)
+
+    scratch = np.empty_like(out.vertices[0])
+    second = np.empty_like(out.vertices[0])
     for b in range(sets.counts.size):
         count = sets.counts[b]
         out.counts[b] = 0
         if count == 0:
             continue
+
         points = sets.vertices[b]
         row = b if len(move.shifts) > 1 else 0
         shift_x = move.shifts[row, 0]
@@ -111,27 +108,57 @@ def predict_all(sets: Batch, move: Move, out: Batch) -> None:
         x, y = reach(points, count)
         slack_x = SUM_SLACK * (abs(xx) * x + abs(xy) * y + move.terms[row, 0] + added_x)
         slack_y = SUM_SLACK * (abs(yx) * x + abs(yy) * y + move.terms[row, 1] + added_y)
+
         if determinant > 0.0:
-            for i in range(count):
-                x = points[i, 0]
-                y = points[i, 1]
-                scratch[i, 0], scratch[i, 1] = xx * x + xy * y, yx * x + yy * y
+            map_vertices(points, count, matrix, scratch)
         else:
+            # The order of the vertices changes, or the image is a segment.
             count = polygon.map_linearly(points, count, xx, xy, yx, yy, scratch)
-        if len(other) > 0:
-            polygon.copy(scratch, count, second)
-            count = polygon_sum.add_polygon(second, count, other, len(other), scratch)
-        for g in range(len(generators)):
-            count = polygon_sum.add_segment(scratch, count, generators[g, 0], generators[g, 1])
+        count = add_disturbance(scratch, count, move.generators, move.other, second)
         if count > MAX_VERTICES:
             count = polygon_reduction.reduce_outward(scratch, count, MAX_VERTICES)
         out.counts[b] = enlarge(scratch, count, shift_x, shift_y, slack_x, slack_y, out.vertices[b])
 
 
 @inlined
+def reach_of_sum(generators: Floats, other: Floats) -> tuple[float, float]:
+    """Maximum sizes of both coordinates of the sum of segments and a polygon."""
+    x = y = 0.0
+    for g in range(len(generators)):
+        x += abs(generators[g, 0])
+        y += abs(generators[g, 1])
+    other_x, other_y = reach(other, len(other))
+    return x + other_x, y + other_y
+
+
+@inlined
+def map_vertices(points: Points, count: int, matrix: Floats, out: Points) -> None:
+    """Write the images of the vertices under a matrix with a positive determinant."""
+    for i in range(count):
+        x = points[i, 0]
+        y = points[i, 1]
+        out[i, 0] = matrix[0, 0] * x + matrix[0, 1] * y
+        out[i, 1] = matrix[1, 0] * x + matrix[1, 1] * y
+
+
+@inlined
+def add_disturbance(
+    points: Points, count: int, generators: Floats, other: Floats, scratch: Points
+) -> int:
+    """Add segments and a polygon to a polygon, in place; return the number of vertices."""
+    if len(other) > 0:
+        polygon.copy(points, count, scratch)
+        count = polygon_sum.add_polygon(scratch, count, other, len(other), points)
+    for g in range(len(generators)):
+        count = polygon_sum.add_segment(points, count, generators[g, 0], generators[g, 1])
+    return count
+
+
+@inlined
 def corner(part: int) -> tuple[float, float]:
-    """Signs of the corner of a box that belongs to a part of the boundary: 0 is before the lowest
-    vertex.
+    """Signs of the corner of a box that belongs to a part of the boundary.
+
+    Part 0 is before the lowest vertex, and parts follow counter-clockwise.
     """
     k = part & 3
     return (1.0 if 0 < k < 3 else -1.0), (1.0 if k >= 2 else -1.0)
@@ -147,29 +174,23 @@ def enlarge(
     half_y: float,
     out: Points,
 ) -> int:
-    """Write a polygon, not empty, that is moved by (shift_x, shift_y) and contains the sum with a
-    small box.
+    """Write a polygon, not empty, that is moved by a shift and contains the sum with a small box.
 
     Half the widths of the box are (half_x, half_y). Return the number of vertices: the result has
-    `count` vertices for most sets, at most count + 4. O(count). The lowest, rightmost, highest and
-    leftmost vertices divide the boundary into four parts, and each part moves by one corner of the
-    box. A dividing vertex moves so that both of its edges move far enough, by at most five boxes;
-    at a sharp tip it becomes two vertices. The division at extremes is correct for edges of a few
-    ulp with a wrong direction.
+    `count` vertices for most sets, at most count + 4. O(count).
+
+    The lowest, rightmost, highest and leftmost vertices divide the boundary into four parts, and
+    each part moves by one corner of the box. A dividing vertex moves so that both of its edges move
+    far enough, by at most five boxes; at a sharp tip it becomes two vertices. The division at
+    extremes is correct for edges of a few ulp with a wrong direction.
     """
-    low = right = high = left = 0
-    for i in range(1, count):
-        x = points[i, 0]
-        y = points[i, 1]
-        low = i if y < points[low, 1] else low
-        right = i if x > points[right, 0] else right
-        high = i if y > points[high, 1] else high
-        left = i if x < points[left, 0] else left
-    ends = (low, right, high, left)
+    ends = extremes(points, count)
+    low = ends[0]
     part = 0
     while part > -3 and ends[(part - 1) & 3] == low:
         part -= 1
     last_part = part + 4
+
     made = 0
     i = low
     for _ in range(count):
@@ -178,77 +199,105 @@ def enlarge(
         after = part
         while after < last_part and ends[after & 3] == i:
             after += 1
-        if after == part:
-            along_x, along_y = corner(part)
-            polygon.put(out, made, x + along_x * half_x, y + along_y * half_y)
+
+        move_x, move_y = corner(part)
+        if after > part:
+            move_x, move_y = tip_move(points, count, i, part, after, half_x, half_y)
+        if move_x != 0.0 or move_y != 0.0:
+            polygon.put(out, made, x + move_x * half_x, y + move_y * half_y)
             made += 1
         else:
-            move_x, move_y = tip_move(points, count, i, part, after, half_x, half_y)
-            if move_x != 0.0 or move_y != 0.0:
-                polygon.put(out, made, x + move_x * half_x, y + move_y * half_y)
+            for k in range(part, min(after, part + 3) + 1):
+                along_x, along_y = corner(k)
+                polygon.put(out, made, x + along_x * half_x, y + along_y * half_y)
                 made += 1
-            else:
-                for k in range(part, min(after, part + 3) + 1):
-                    along_x, along_y = corner(k)
-                    polygon.put(out, made, x + along_x * half_x, y + along_y * half_y)
-                    made += 1
-            part = after
+        part = after
         i = i + 1 if i + 1 < count else 0
+
+    # The extremes are not in counter-clockwise order.
     if part != last_part:
         return enlarge_carefully(points, count, shift_x, shift_y, half_x, half_y, out)
     return polygon.close(out, made)
 
 
 @inlined
+def extremes(points: Points, count: int) -> tuple[int, int, int, int]:
+    """Numbers of the lowest, rightmost, highest and leftmost vertices."""
+    low = right = high = left = 0
+    for i in range(1, count):
+        x = points[i, 0]
+        y = points[i, 1]
+        low = i if y < points[low, 1] else low
+        right = i if x > points[right, 0] else right
+        high = i if y > points[high, 1] else high
+        left = i if x < points[left, 0] else left
+    return low, right, high, left
+
+
+@inlined
 def tip_move(
     points: Points, count: int, i: int, part: int, after: int, half_x: float, half_y: float
 ) -> tuple[float, float]:
-    """Move of an extreme vertex between two parts of the boundary, in boxes; zero if the vertex
-    must be divided.
+    """Move of an extreme vertex between two parts of the boundary, in boxes.
+
+    It is zero if the vertex must be divided.
     """
     if after - part > 2:
         return 0.0, 0.0
+
+    # Outward normals of the edges to the vertex and from it, in units of the box.
     before = i - 1 if i > 0 else count - 1
     behind = i + 1 if i + 1 < count else 0
     in_x = (points[i, 1] - points[before, 1]) * half_x
     in_y = (points[before, 0] - points[i, 0]) * half_y
     out_x = (points[behind, 1] - points[i, 1]) * half_x
     out_y = (points[i, 0] - points[behind, 0]) * half_y
-    # The axis of the first division, and the next axis counter-clockwise.
+
+    # The axis u of the first division, and the next axis v counter-clockwise.
     first_x, first_y = corner(part)
     next_x, next_y = corner(part + 1)
     u_x = 0.5 * (first_x + next_x)
     u_y = 0.5 * (first_y + next_y)
     v_x = -u_y
     v_y = u_x
-    a = in_x * u_x + in_y * u_y
-    b = -(in_x * v_x + in_y * v_y)
-    c = out_x * u_x + out_y * u_y
-    d = out_x * v_x + out_y * v_y
+    in_u = in_x * u_x + in_y * u_y
+    in_v = in_x * v_x + in_y * v_y
+    out_u = out_x * u_x + out_y * u_y
+    out_v = out_x * v_x + out_y * v_y
+
     if after - part == 1:
-        if min(a, b) < 0.0 or min(c, d) < 0.0:
-            return 0.0, 0.0
-        if d * a <= b * c and d <= _SHARP * c and c > 0.0:
-            far = 1.0 + 2.0 * (d / c)
-            side = -1.0
-        elif b <= _SHARP * a and a > 0.0:
-            far = 1.0 + 2.0 * (b / a)
-            side = 1.0
-        else:
-            return 0.0, 0.0
+        far, side = move_along_axis(in_u, -in_v, out_u, out_v)
         return far * u_x + side * v_x, far * u_y + side * v_y
-    c, d = d, -c
-    if (
-        min(a, b) < 0.0
-        or min(c, d) < 0.0
-        or b > _SHARP_CORNER * a
-        or d > _SHARP_CORNER * c
-        or a == 0.0
-        or c == 0.0
-    ):
-        return 0.0, 0.0
-    far = max((a + b) / (a - b), (c + d) / (c - d))
+    far = move_along_corner(in_u, -in_v, out_v, -out_u)
     return far * (u_x + v_x), far * (u_y + v_y)
+
+
+@inlined
+def move_along_axis(a: float, b: float, c: float, d: float) -> tuple[float, float]:
+    """Move of a vertex that is extreme along an axis u, along u and along v; zero if it is sharp.
+
+    The edge to the vertex has the normal a u - b v, the edge from it the normal c u + d v.
+    """
+    if min(a, b) < 0.0 or min(c, d) < 0.0:
+        return 0.0, 0.0
+    if d * a <= b * c and d <= _SHARP * c and c > 0.0:
+        return 1.0 + 2.0 * (d / c), -1.0
+    if b <= _SHARP * a and a > 0.0:
+        return 1.0 + 2.0 * (b / a), 1.0
+    return 0.0, 0.0
+
+
+@inlined
+def move_along_corner(a: float, b: float, c: float, d: float) -> float:
+    """Move of a vertex that is extreme along two axes u and v, along both; zero if it is sharp.
+
+    The edge to the vertex has the normal a u - b v, the edge from it the normal c v - d u.
+    """
+    if min(a, b) < 0.0 or min(c, d) < 0.0:
+        return 0.0
+    if b > _SHARP_CORNER * a or d > _SHARP_CORNER * c or a == 0.0 or c == 0.0:
+        return 0.0
+    return max((a + b) / (a - b), (c + d) / (c - d))
 
 
 @compiled
@@ -261,8 +310,9 @@ def enlarge_carefully(
     half_y: float,
     out: Points,
 ) -> int:
-    """Write the same as `enlarge` for a set as thin as rounding, whose vertices may be in a wrong
-    order: by a hull.
+    """Write the result of `enlarge` for a set as thin as rounding: the hull of all corners.
+
+    The vertices of such a set may be in a wrong order.
     """
     corners = np.empty((4 * count, 2))
     for i in range(count):
@@ -270,6 +320,7 @@ def enlarge_carefully(
             along_x, along_y = corner(k)
             corners[4 * i + k, 0] = points[i, 0] + shift_x + along_x * half_x
             corners[4 * i + k, 1] = points[i, 1] + shift_y + along_y * half_y
+
     hull = np.empty((4 * count, 2))
     made = polygon_exact.hull(corners, 4 * count, hull)
     if made > count + 4:
@@ -282,7 +333,7 @@ def enlarge_carefully(
 def update_all(sets: Batch, strips: Strips, excess: Floats, out: Batch) -> None:
     """Write the part of each polygon that is within strips: at most 2 r vertices more.
 
-    The bounds are enlarged by `CUT_SLACK` times their terms and those of normal . x. `excess`,
+    The bounds are enlarged by `CUT_SLACK` times their terms and the terms of normal . x. `excess`,
     shape (B, r), receives the distance between set and strip, in the unit of the bounds, where the
     set becomes empty.
     """
@@ -293,21 +344,20 @@ def update_all(sets: Batch, strips: Strips, excess: Floats, out: Batch) -> None:
         polygon.copy(sets.vertices[b], count, points)
         x, y = reach(points, count)
         for r in range(len(normals)):
-            minimum = strips.lower[b, r]
-            maximum = strips.upper[b, r]
             if count == 0:
                 break
-            more = CUT_SLACK * (
-                abs(normals[r, 0]) * x + abs(normals[r, 1]) * y + strips.terms[b, r]
-            )
-            minimum = minimum - more
-            maximum = maximum + more
-            if normals[r, 0] == 0.0 and normals[r, 1] == 0.0:
+            normal_x = normals[r, 0]
+            normal_y = normals[r, 1]
+            more = CUT_SLACK * (abs(normal_x) * x + abs(normal_y) * y + strips.terms[b, r])
+            minimum = strips.lower[b, r] - more
+            maximum = strips.upper[b, r] + more
+
+            if normal_x == 0.0 and normal_y == 0.0:
                 overlap = min(maximum, -minimum)
                 count = count if overlap >= 0.0 else 0
             else:
                 count, overlap = polygon.clip_to_band(
-                    points, count, normals[r, 0], normals[r, 1], minimum, maximum
+                    points, count, normal_x, normal_y, minimum, maximum
                 )
             if count == 0:
                 excess[b, r] = -overlap
@@ -321,7 +371,7 @@ def cut_to_preimage(sets: Batch, later: Batch, matrix: Floats, out: Batch) -> No
     The result has at most four vertices more than both. The half-planes of the later polygon are
     enlarged by `CUT_SLACK` times the terms of a height. The level of each one is the maximum height
     of all vertices, so that the half-plane of an edge of a few ulp with a wrong direction contains
-    the set. Half-planes along the axes bound what such edges leave open at sharp tips.
+    the set. Half-planes along the axes bound the set at sharp tips, which such edges leave open.
     """
     for b in range(sets.counts.size):
         out.counts[b] = 0
@@ -329,6 +379,7 @@ def cut_to_preimage(sets: Batch, later: Batch, matrix: Floats, out: Batch) -> No
         sides = later.counts[b]
         if count == 0 or sides == 0:
             continue
+
         points = out.vertices[b]
         other = later.vertices[b]
         polygon.copy(sets.vertices[b], count, points)
@@ -337,18 +388,13 @@ def cut_to_preimage(sets: Batch, later: Batch, matrix: Floats, out: Batch) -> No
         terms_x = max(other_x, abs(matrix[0, 0]) * x + abs(matrix[0, 1]) * y)
         terms_y = max(other_y, abs(matrix[1, 0]) * x + abs(matrix[1, 1]) * y)
         for i in range(-4, sides):
-            if i < 0:
-                normal_x = (1.0 if i == -1 else -1.0) if i >= -2 else 0.0
-                normal_y = (1.0 if i == -3 else -1.0) if i < -2 else 0.0
-            else:
-                j = i + 1 if i + 1 < sides else 0
-                normal_x = other[j, 1] - other[i, 1]
-                normal_y = other[i, 0] - other[j, 0]
-            mapped_x = matrix[0, 0] * normal_x + matrix[1, 0] * normal_y
-            mapped_y = matrix[0, 1] * normal_x + matrix[1, 1] * normal_y
+            normal_x, normal_y = normal_of_side(other, sides, i)
             top = polygon.support_index(other, sides, normal_x, normal_y)
             level = polygon.height(other, top, normal_x, normal_y)
             level += CUT_SLACK * (abs(normal_x) * terms_x + abs(normal_y) * terms_y)
+
+            mapped_x = matrix[0, 0] * normal_x + matrix[1, 0] * normal_y
+            mapped_y = matrix[0, 1] * normal_x + matrix[1, 1] * normal_y
             if mapped_x == 0.0 and mapped_y == 0.0:
                 count = count if level >= 0.0 else 0
             else:
@@ -356,6 +402,21 @@ def cut_to_preimage(sets: Batch, later: Batch, matrix: Floats, out: Batch) -> No
             if count == 0:
                 break
         out.counts[b] = count
+
+
+@inlined
+def normal_of_side(points: Points, count: int, i: int) -> tuple[float, float]:
+    """Outward normal of side i of a polygon; for i from -4 to -1, a direction along an axis."""
+    if i == -4:
+        return 0.0, -1.0
+    if i == -3:
+        return 0.0, 1.0
+    if i == -2:
+        return -1.0, 0.0
+    if i == -1:
+        return 1.0, 0.0
+    j = i + 1 if i + 1 < count else 0
+    return points[j, 1] - points[i, 1], points[i, 0] - points[j, 0]
 
 
 @compiled

@@ -1,6 +1,4 @@
-"""Sets of five and more states: a zonotope that is carried, and linear programs over the last steps
-on demand.
-"""
+"""Sets of five and more states: a carried zonotope, and linear programs over the last steps."""
 
 from __future__ import annotations
 
@@ -25,25 +23,26 @@ ORDER = 5
 gave wider sets.
 """
 WINDOW = 10
-"""Steps of a program. For up to 20 states the widths are then within 6 % of those of the whole
+"""Steps of a program. For up to 20 states the widths are then within 6 % of the widths of the whole
 record in random systems and chains of masses, and within 12 % in undamped masses between springs
 (benchmarks/window_numbers.py)."""
 
 
 class Contradiction(NamedTuple):
-    """Step and strip that leave no state possible, and the minimum enlargement of the strip for
-    which one exists.
-    """
+    """The first strip that leaves no possible state."""
 
     step: int
     output: int
+    """Number of the strip in its step."""
     excess: float
+    """Minimum enlargement of the strip with which a state is possible."""
 
 
 @dataclass(frozen=True, eq=False)
 class Window:
-    """The set of one run at a step: the states that agree with the last steps, and with later ones
-    if it is smoothed.
+    """The set of one run at a step: the states that agree with the last steps.
+
+    A smoothed set also agrees with later steps.
 
     Parameters
     ----------
@@ -87,7 +86,7 @@ class Window:
 
     @property
     def is_known_empty(self) -> bool:
-        """The same if it is known without a program."""
+        """Whether it is known that no state is possible, without a new program."""
         return self.contradiction is not None or bool(vars(self).get("is_empty", False))
 
     @cached_property
@@ -95,8 +94,9 @@ class Window:
         return {}
 
     def support(self, direction: Floats) -> float:
-        """Return an upper bound of direction . x, by a linear program the first time; -inf for the
-        empty set.
+        """Return an upper bound of direction . x; -inf for the empty set.
+
+        A linear program is solved the first time.
         """
         if self.is_empty:
             return -np.inf
@@ -107,11 +107,10 @@ class Window:
         return self._heights[key]
 
     def predicted(self, motion: Motion) -> Window:
-        """Return the window at the next step; the first stage goes if there are more than
-        allowed.
-        """
+        """Return the window at the next step, without its first stage if it is too long."""
         if self.is_known_empty:
             return self
+
         image = moved(self.carried, motion)
         last = replace(self.stages[-1], motion=motion)
         stages = (*self.stages[:-1], last, Stage.at_first(last.step + 1, image))
@@ -125,6 +124,7 @@ class Window:
         exists = np.isfinite(strips.lower[run]) | np.isfinite(strips.upper[run])
         if self.is_known_empty or not exists.any():
             return self
+
         outputs = np.flatnonzero(exists)
         normals = strips.normals[outputs]
         sizes = sizes_of(self.carried)
@@ -148,28 +148,31 @@ class Window:
         return replace(self, stages=(*self.stages[:-1], cut), carried=carried)
 
     def before(self, later: Window, motion: Motion) -> Window:
-        """Return this set given also the measurements of a later one, of the next step."""
+        """Return this set given also the measurements of a later set, of the next step."""
         if self.is_empty:
             return self
-        # A program of each smoothed set would find the same: those of the estimates are enough.
+        # The programs of the estimates are enough: a program of a smoothed set finds the same.
         is_estimate = later.at == len(later.stages) - 1
-        if later.is_empty if is_estimate else later.is_known_empty:
+        later_is_empty = later.is_empty if is_estimate else later.is_known_empty
+        if later_is_empty:
             return replace(self, contradiction=later.located())
+
         after = later.stages[later.at :]
         left_out = self.length is not None and len(after) > self.length
         if left_out:
             after = after[: self.length]
         stages = (*self.stages[:-1], replace(self.stages[-1], motion=motion), *after)
-        return replace(
-            self, stages=stages, is_whole=self.is_whole and later.is_whole and not left_out
-        )
+        is_whole = self.is_whole and later.is_whole and not left_out
+        return replace(self, stages=stages, is_whole=is_whole)
 
     def located(self) -> Contradiction | None:
-        """Return the first strip after which no state is possible, by linear programs; None if the
-        set is not empty.
+        """Return the first strip after which no state is possible; None if the set is not empty.
+
+        It is found by bisection, with a linear program for each step.
         """
         if self.contradiction is not None or not self.is_empty:
             return self.contradiction
+
         strips = [
             (k, row) for k, stage in enumerate(self.stages) for row in range(len(stage.normals))
         ]
@@ -182,15 +185,15 @@ class Window:
                 impossible = middle
             else:
                 possible = middle
+
         last, row = strips[impossible - 1]
         stage = self.stages[last]
         normal = stage.normals[row]
         program = self._up_to(last, row - 1)
         below = stage.lower[row] - program.bound(normal)
         above = -program.bound(-normal) - stage.upper[row]
-        return Contradiction(
-            stage.step, int(stage.outputs[row]), max(float(below), float(above), 0.0)
-        )
+        excess = max(float(below), float(above), 0.0)
+        return Contradiction(stage.step, int(stage.outputs[row]), excess)
 
     def _up_to(self, last: int, row: int) -> Program:
         """Return the program of the strips up to a row of a stage."""
@@ -199,26 +202,25 @@ class Window:
 
 
 def exact_hull(initial: Set, record: Sequence[Motion | Strips], run: int, step: int) -> Floats:
-    """Return the minimum and the maximum of each state of a `run` at a `step`, shape (2, n); NaN if
-    none is possible.
+    """Return the minimum and the maximum of each state of a `run` at a `step`, shape (2, n).
 
-    Linear programs over the whole record. Bounds that the solver does not find are NaN.
+    Linear programs over the whole record. All bounds are NaN if no state is possible, and so are
+    bounds that the solver does not find.
     """
     window = Window.of(initial, None)
     for event in record:
-        window = (
-            window.predicted(event.of_run(run))
-            if isinstance(event, Motion)
-            else window.cut(event, run)
-        )
+        if isinstance(event, Motion):
+            window = window.predicted(event.of_run(run))
+        else:
+            window = window.cut(event, run)
     n = len(window.carried.centre)
     if window.is_known_empty:
         return np.full((2, n), np.nan)
+
     program = Program(window.stages, step)
-    hull = [
-        [-program.bound(-unit) for unit in np.eye(n)],
-        [program.bound(unit) for unit in np.eye(n)],
-    ]
+    lower = [-program.bound(-unit) for unit in np.eye(n)]
+    upper = [program.bound(unit) for unit in np.eye(n)]
+    hull = np.array([lower, upper])
     return np.where(np.isinf(hull), np.nan, hull)
 
 
@@ -240,40 +242,40 @@ class Windows:
 
     @property
     def is_known_empty(self) -> Flags:
-        """The same without programs: whether it is known so far."""
+        """Whether each set is known to be empty without new programs, shape (B,)."""
         return np.array([member.is_known_empty for member in self.members])
 
     @property
     def reduced(self) -> Flags:
-        """Whether each set is that of a part of the record, shape (B,)."""
+        """Whether each set uses only a part of the record, shape (B,)."""
         return np.array([not member.is_whole for member in self.members])
 
     def predicted(self, motion: Motion) -> Windows:
         """Return the sets after a step."""
-        return Windows(
-            tuple(member.predicted(motion.of_run(run)) for run, member in enumerate(self.members))
-        )
+        members = [member.predicted(motion.of_run(run)) for run, member in enumerate(self.members)]
+        return Windows(tuple(members))
 
     def cut(self, strips: Strips, excess: Floats) -> Windows:
-        """Return the sets within the strips; `excess`, shape (B, r), receives the distance of a
-        strip from the set.
+        """Return the sets within the strips.
+
+        `excess`, shape (B, r), receives the distance of a strip from the set that it leaves empty.
         """
-        members = tuple(member.cut(strips, run) for run, member in enumerate(self.members))
-        for run, (before, member) in enumerate(zip(self.members, members, strict=True)):
-            if member.contradiction is not None and before.contradiction is None:
-                excess[run, member.contradiction.output] = member.contradiction.excess
-        return Windows(members)
+        members = []
+        for run, before in enumerate(self.members):
+            member = before.cut(strips, run)
+            found = member.contradiction
+            if found is not None and before.contradiction is None:
+                excess[run, found.output] = found.excess
+            members.append(member)
+        return Windows(tuple(members))
 
     def preimage_cut(self, later: Sets, motion: Motion) -> Windows:
         """Return the states that lead to a state of the later set for some disturbance."""
         assert isinstance(later, Windows)
-        pairs = zip(self.members, later.members, strict=True)
-        return Windows(
-            tuple(
-                member.before(after, motion.of_run(run))
-                for run, (member, after) in enumerate(pairs)
-            )
-        )
+        members = []
+        for run, (member, after) in enumerate(zip(self.members, later.members, strict=True)):
+            members.append(member.before(after, motion.of_run(run)))
+        return Windows(tuple(members))
 
     def support(self, direction: Floats) -> Floats:
         """Return max direction . x of each set, shape (B,); -inf for the empty set."""
@@ -288,8 +290,9 @@ class Windows:
 
 
 def moved(one: Zonotope, motion: Motion) -> Zonotope:
-    """Return a zonotope that contains matrix x + shift + w for all x of a zonotope, of at most
-    `ORDER` n generators.
+    """Return a zonotope that contains matrix x + shift + w for all x of a zonotope.
+
+    It has at most `ORDER` n generators.
     """
     matrix = motion.matrix
     w = _zonotope_of(motion.disturbance)
@@ -302,8 +305,9 @@ def moved(one: Zonotope, motion: Motion) -> Zonotope:
 
 
 def extent(one: Zonotope, normals: Floats, sizes: Floats) -> tuple[Floats, Floats]:
-    """Return the maximum and the minimum of each normal . x, rounded outward; `sizes` are those of
-    the zonotope.
+    """Return the maximum and the minimum of each normal . x, rounded outward.
+
+    `sizes`, shape (n,), bound the coordinates of the zonotope.
     """
     half = np.abs(normals @ one.generators.T).sum(axis=1)
     middle = normals @ one.centre

@@ -19,8 +19,8 @@ def simplices_of(sides: Flags, dimension: int) -> Integers:
     """Return the vertices of simplices that divide a polytope, shape (k, d + 1).
 
     `sides[i, j]`, shape (f, v), is whether vertex j is on facet i. A face is the union of the
-    pyramids over those of its own facets that do not contain its first vertex, which are
-    intersections of it with others.
+    pyramids from its first vertex over its own facets that do not contain this vertex. Faces are
+    integers here: bit j is set if vertex j is on the face.
 
     References
     ----------
@@ -29,18 +29,21 @@ def simplices_of(sides: Flags, dimension: int) -> Integers:
     known: dict[int, list[tuple[int, ...]]] = {}
 
     def divide(face: int, facets: list[int], size: int) -> list[tuple[int, ...]]:
-        if face not in known:
-            first = (face & -face).bit_length() - 1
-            if face.bit_count() <= size + 1:
-                known[face] = [tuple(i for i in range(face.bit_length()) if face >> i & 1)]
-            else:
-                known[face] = [
-                    (first, *rest)
-                    for facet in facets
-                    if not facet >> first & 1
-                    for rest in divide(facet, _facets_of(facet, facets, size - 1), size - 1)
-                ]
-        return known[face]
+        if face in known:
+            return known[face]
+        if face.bit_count() <= size + 1:
+            known[face] = [tuple(i for i in range(face.bit_length()) if face >> i & 1)]
+            return known[face]
+
+        first = (face & -face).bit_length() - 1
+        simplices: list[tuple[int, ...]] = []
+        for facet in facets:
+            if facet >> first & 1:
+                continue
+            own_facets = _facets_of(facet, facets, size - 1)
+            simplices += [(first, *rest) for rest in divide(facet, own_facets, size - 1)]
+        known[face] = simplices
+        return simplices
 
     sets = [
         int.from_bytes(bits.tobytes(), "little")
@@ -65,13 +68,18 @@ def _facets_of(face: int, others: list[int], size: int) -> list[int]:
 def largest_ball(rows: Floats, limits: Floats) -> tuple[Floats, float]:
     """Return the centre, shape (d,), and radius of a largest ball in {z: rows z <= limits}.
 
-    The distance of a facet is measured for rows as if of unit length. The radius is negative if the
-    set is empty; its absolute value is the minimum relaxation of the rows that has a point. An
-    SolverError is raised if the linear program (HiGHS) was not solved, for example because the set
-    has balls of any size.
+    The distance from a facet is limit - row . z, as for rows of unit length. The radius is negative
+    if the set is empty; its absolute value is the minimum relaxation of the rows that has a point.
+
+    Raises
+    ------
+    SolverError
+        If the linear program (HiGHS) was not solved, for example because the set has balls of any
+        size.
     """
+    # The program has rows of size one; the radius is in units of the shortest one.
     units = np.abs(rows).max(axis=1, initial=1e-300)
-    minimum = float(units.min(initial=1.0))  # the unit of the radius
+    minimum = float(units.min(initial=1.0))
     matrix = np.column_stack([rows / units[:, None], minimum / units])
     cost = np.zeros(matrix.shape[1])
     cost[-1] = -1.0
@@ -86,8 +94,9 @@ def largest_ball(rows: Floats, limits: Floats) -> tuple[Floats, float]:
 
 
 def triangle_of(columns: Floats) -> tuple[Floats, Integers]:
-    """Return the triangle and the order of columns of a QR factorization; the sizes of the rows may
-    differ much.
+    """Return the triangle and the order of the columns of a QR factorization.
+
+    The sizes of the rows may differ much.
     """
     order = np.argsort(-np.abs(columns).max(axis=1))
     triangle, pivots = qr(columns[order], mode="r", pivoting=True)
@@ -95,17 +104,17 @@ def triangle_of(columns: Floats) -> tuple[Floats, Integers]:
 
 
 def orthonormal(columns: Floats, rows: Floats) -> tuple[Floats, Floats]:
-    """Return an orthonormal basis of the span of columns, shape (n, d), and linear functions for
-    its coefficients.
+    """Return an orthonormal basis of the span of columns, shape (n, d), and functions in it.
 
-    `rows`, shape (k, d), are such functions for the coefficients of the columns. Each row of the
-    basis is exact to rounding of itself: the sizes of the rows may differ much.
+    `rows`, shape (k, d), are linear functions of the coefficients of the columns; the result has
+    functions of the coefficients of the basis. Each row of the basis is exact to rounding of
+    itself: the sizes of the rows may differ much.
     """
-    if columns.shape[1]:
-        for _ in range(2):  # the second pass corrects angles
-            triangle, pivots = triangle_of(columns)
-            columns, rows = (
-                solve_triangular(triangle.T, part[:, pivots].T, lower=True).T
-                for part in (columns, rows)
-            )
+    if not columns.shape[1]:
+        return columns, rows
+    # The second pass corrects angles.
+    for _ in range(2):
+        triangle, pivots = triangle_of(columns)
+        columns = solve_triangular(triangle.T, columns[:, pivots].T, lower=True).T
+        rows = solve_triangular(triangle.T, rows[:, pivots].T, lower=True).T
     return columns, rows

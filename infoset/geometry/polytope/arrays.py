@@ -1,6 +1,4 @@
-"""The arrays of a polytope: vertices, facets and their incidence, in scaled coordinates, and what
-follows from them.
-"""
+"""The arrays of a polytope: vertices, facets and their incidence, in scaled coordinates."""
 
 from __future__ import annotations
 
@@ -21,9 +19,7 @@ from infoset.geometry.tolerances import UNSURE
 
 @dataclass(frozen=True, eq=False)
 class PolytopeArrays:
-    """The arrays of a polytope; see `Polytope`. Functions of the module `construction` compute
-    them.
-    """
+    """The arrays of a polytope; see `Polytope`. The module `construction` computes them."""
 
     points: Floats
     facets: Floats
@@ -32,8 +28,8 @@ class PolytopeArrays:
     centre: Floats
     scale: Floats
     exact: Polyhedron | None = None
-    """The set in exact integers if it is unbounded; its other arrays are this one, rounded, with
-    `scale` one.
+    """The set in exact integers if it is unbounded; the other arrays are its rounded numbers, with
+    a `scale` of one.
     """
 
     @property
@@ -58,18 +54,16 @@ class PolytopeArrays:
 
     @cached_property
     def directions(self) -> Floats:
-        """Directions of unit length in which the set is unbounded, shape (r, n): those of its
-        recession cone.
+        """Directions of unit length in which the set is unbounded, shape (r, n).
 
-        A set that contains lines has `lines` too, and one direction for each ray between them.
+        They are the rays of its recession cone. A set that contains lines has `lines` too, and one
+        direction for each ray between them.
         """
         return rounded_directions(self.exact.directions if self.exact else (), self.space)
 
     @cached_property
     def lines(self) -> Floats:
-        """Directions of unit length of lines that the set contains, shape (l, n), linearly
-        independent.
-        """
+        """Independent directions of lines that the set contains, shape (l, n), of unit length."""
         return rounded_directions(self.exact.lines if self.exact else (), self.space)
 
     @cached_property
@@ -79,9 +73,7 @@ class PolytopeArrays:
 
     @cached_property
     def normals(self) -> Floats:
-        """Normals of the facets, shape (f, n), of unit length, in the directions of the affine
-        hull.
-        """
+        """Normals of the facets, shape (f, n), of unit length, along the affine hull."""
         if self.is_empty:
             return np.zeros((1, self.space))
         rows = self.facets[:, :-1] / self.scale
@@ -97,30 +89,35 @@ class PolytopeArrays:
             return -np.ones(1)
         if len(self.equations):
             return supports(self.vertices, self.normals)
+
         rows, limits = half_spaces(self)
         lengths = np.linalg.norm(rows, axis=1)
-        rounding = UNSURE * np.abs(self.vertices).max(axis=0)
-        rounded = (np.frexp(lengths)[0] != 0.5) | (self.centre.any() & (rows != 0.0)).any(axis=1)
-        return np.asarray(limits / lengths + rounded * (np.abs(self.normals) @ rounding))
+        rounding = np.abs(self.normals) @ (UNSURE * np.abs(self.vertices).max(axis=0))
+        # A division by a power of two is exact, and so is a row without a centre.
+        mantissas, _ = np.frexp(lengths)
+        is_moved = self.centre.any() & (rows != 0.0)
+        is_rounded = (mantissas != 0.5) | is_moved.any(axis=1)
+        return np.asarray(limits / lengths + is_rounded * rounding)
 
     @cached_property
     def across(self) -> Floats:
         """Orthonormal normals of the affine hull, shape (n - dimension, n)."""
-        return orthonormal(
-            (self.equations[:, :-1] / self.scale).T, np.zeros((0, len(self.equations)))
-        )[0].T
+        columns = (self.equations[:, :-1] / self.scale).T
+        basis, _ = orthonormal(columns, np.zeros((0, len(self.equations))))
+        return basis.T
 
     @cached_property
     def levels(self) -> Floats:
         """Levels of the affine hull, shape (n - dimension,): across x = levels."""
-        return 0.5 * supports(self.vertices, self.across) - 0.5 * supports(
-            self.vertices, -self.across
-        )
+        upper = supports(self.vertices, self.across)
+        lower = -supports(self.vertices, -self.across)
+        return 0.5 * upper + 0.5 * lower
 
     @cached_property
     def _steps(self) -> Floats:
-        """A basis of the directions of the affine hull, shape (n, d): changes of d coordinates by
-        their scales.
+        """A basis of the directions of the affine hull, shape (n, d): steps of d coordinates.
+
+        Each step changes one of the own coordinates by its scale.
         """
         own, others = own_and_others(self.equations)
         steps = np.zeros((self.space, self.dimension))
@@ -129,10 +126,10 @@ class PolytopeArrays:
         return self.scale[:, None] * steps
 
     def constraints(self) -> tuple[Floats, Floats]:
-        """Return normals, shape (k, n), of unit length, and offsets, shape (k,): the set is normals
-        x <= offsets.
+        """Return normals, shape (k, n), of unit length, and offsets, shape (k,), of half-spaces.
 
-        An equation of a flat set gives two rows; an empty set is 0 x <= -1.
+        The set is {x: normals x <= offsets}. An equation of a flat set gives two rows; an empty set
+        is 0 x <= -1.
         """
         rows = np.vstack([self.normals, self.across, -self.across])
         return rows, np.concatenate([self.offsets, self.levels, -self.levels])
@@ -162,10 +159,9 @@ class PolytopeArrays:
         return self
 
     def bounding_box(self) -> tuple[Floats, Floats]:
-        """Return the minimum and the maximum coordinates, each of shape (n,), infinite where the
-        set is unbounded.
+        """Return the minimum and the maximum coordinates, each of shape (n,). O(v n), exact.
 
-        O(v n), exact.
+        They are infinite where the set is unbounded.
         """
         lower = self.needed().vertices.min(axis=0)
         upper = self.vertices.max(axis=0)
@@ -183,20 +179,21 @@ class PolytopeArrays:
 
 
 def half_spaces(one: PolytopeArrays, origin: Floats | float = 0.0) -> tuple[Floats, Floats]:
-    """Return half-spaces rows (x - origin) <= limits: the facets, and two of each equation."""
+    """Return half-spaces rows (x - origin) <= limits: the facets, and two for each equation."""
     sides = np.vstack([one.facets, one.equations, -one.equations])
     rows = sides[:, :-1] / one.scale
     return rows, moved_limits(rows, sides[:, -1], origin - one.centre)
 
 
 def own_and_others(equations: Floats) -> tuple[Integers, Integers]:
-    """Return d coordinates of which the others are functions, and the others, in the order of their
-    equations.
+    """Return the numbers of d own coordinates of a flat set, and of the others.
 
-    `equations` has the shape (n - d, n + 1); its columns of the others are those of the identity.
+    The others, in the order of their equations, are functions of the own coordinates: in
+    `equations`, shape (n - d, n + 1), their columns are the columns of the identity.
     """
     bound = equations[:, :-1]
     others = np.array(
         [(unit == bound.T).all(axis=1).argmax() for unit in np.eye(len(bound))], np.int64
     )
-    return np.delete(np.arange(bound.shape[1]), others), others
+    own = np.delete(np.arange(bound.shape[1]), others)
+    return own, others

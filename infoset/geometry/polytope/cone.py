@@ -2,9 +2,9 @@
 
 A set {x: a . x <= b} is the cone {(x, t): b t - a . x >= 0, t >= 0}, where rows (a, b) are floats
 times powers of two. Its extreme rays with t > 0 are the vertices, those with t = 0 directions; the
-lines that it contains are apart. Empty, flat and unbounded sets are results like others. It takes
-ten to fifty times as long as `double_description`, which rounds: this judges where the rounded
-answer is that a set is empty, flat or unbounded, and finds its box.
+lines that it contains are separate. Empty, flat and unbounded sets are results like others. It
+takes ten to fifty times as long as `double_description`, which rounds: integers decide whether a
+set is empty, flat or unbounded, and find its box.
 
 References
 ----------
@@ -34,25 +34,25 @@ _kernels = Kernels()
 
 
 class Cone(NamedTuple):
-    """Extreme rays of a cone {z: rows z >= 0} modulo its lines, which ray is on which row, and a
-    basis of the lines.
-    """
+    """Extreme rays of a cone {z: rows z >= 0} modulo its lines."""
 
     rays: list[Row]
     on: Flags
+    """Whether a ray is on a row, shape (rays, rows)."""
     lines: list[Row]
+    """A basis of the lines."""
 
 
 class Vertices(NamedTuple):
-    """Vertices of a set of half-spaces, and directions and lines along which it is unbounded, as
-    lists of n numbers.
+    """Vertices of a set of half-spaces, and directions and lines along which it is unbounded.
 
-    `on[i, j]` is whether vertex i is on the boundary of half-space j. Without vertices the set is
-    empty, whatever the directions and lines are.
+    All are lists of n numbers. Without vertices the set is empty, whatever the directions and lines
+    are.
     """
 
     points: list[Rationals]
     on: Flags
+    """Whether a vertex is on the boundary of a half-space, shape (vertices, half-spaces)."""
     directions: list[Row]
     lines: list[Row]
 
@@ -69,31 +69,31 @@ class Vertices(NamedTuple):
 
 def vertices_of(rows: list[Rationals], limits: Rationals) -> Vertices:
     """Return the vertices, directions and lines of {x: rows x <= limits}, with at least one row."""
-    table = [[0] * len(rows[0]) + [1]]
+    is_ahead = [0] * len(rows[0]) + [1]
+    table = [is_ahead]
     for row, limit in zip(rows, limits, strict=True):
         table.append(whole([*(-entry for entry in row), limit]))
     cone = extreme_rays(table)
 
     is_point = np.array([ray[-1] > 0 for ray in cone.rays], np.bool_)
+    on = cone.on[is_point, 1:]
     points = [[Fraction(entry, ray[-1]) for entry in ray[:-1]] for ray in cone.rays if ray[-1]]
     directions = [ray[:-1] for ray in cone.rays if not ray[-1]]
-    return Vertices(points, cone.on[is_point, 1:], directions, [line[:-1] for line in cone.lines])
+    lines = [line[:-1] for line in cone.lines]
+    return Vertices(points, on, directions, lines)
 
 
 def null_space(matrix: list[Rationals]) -> list[Row]:
     """Return a basis of {x: matrix x = 0}."""
-    size = len(matrix[0])
-    basis = [[int(i == j) for j in range(size)] for i in range(size)]
+    basis = _unit_vectors(len(matrix[0]))
     for row in map(whole, matrix):
         heights = [dot(row, line) for line in basis]
-        pivot = next((k for k, height in enumerate(heights) if height), None)
-        if pivot is not None:
-            height = heights.pop(pivot)
-            line = basis.pop(pivot)
-            basis = [
-                combined(height, one, -shift, line)
-                for one, shift in zip(basis, heights, strict=True)
-            ]
+        pivot = _first_nonzero(heights)
+        if pivot is None:
+            continue
+        height = heights.pop(pivot)
+        line = basis.pop(pivot)
+        basis = _moved_along(basis, heights, line, height)
     return basis
 
 
@@ -106,9 +106,7 @@ def product(rows: list[Rationals], matrix: list[Rationals]) -> list[Rationals]:
 
 
 def whole(numbers: Rationals) -> Row:
-    """Return rational numbers times a common positive factor, as integers without a common
-    divisor.
-    """
+    """Return rational numbers times a positive factor, as integers without a common divisor."""
     divisor = math.lcm(*(number.denominator for number in numbers))
     return shortest([number.numerator * (divisor // number.denominator) for number in numbers])
 
@@ -132,38 +130,53 @@ def extreme_rays(rows: list[Row]) -> Cone:
     """Return the extreme rays of {z: rows z >= 0}, one step of the double description for each row.
 
     It starts with the whole space, which has no ray and as many lines as dimensions. Rows that end
-    lines come first, then always the one that most rays violate: an empty set ends after few of
+    lines come first, then always the row that most rays violate: an empty set ends after few of
     many rows.
     """
-    size = len(rows[0])
-    lines = [[int(i == j) for j in range(size)] for i in range(size)]
+    lines = _unit_vectors(len(rows[0]))
     rays: list[Row] = []
     on = np.zeros((0, len(rows)), np.bool_)
     done = np.zeros(len(rows), np.bool_)
     for number, row in enumerate(rows):
         heights = [dot(row, line) for line in lines]
-        pivot = next((k for k, height in enumerate(heights) if height), None)
+        pivot = _first_nonzero(heights)
         if pivot is None:
             continue
 
-        # The half of a line that is above the row becomes a ray; all else moves along the line,
-        # onto the row.
+        # The half of a line that is above the row becomes a ray; all other lines and rays move
+        # along the line, onto the row.
         height = abs(heights.pop(pivot))
         line = lines.pop(pivot)
         above = line if dot(row, line) > 0 else [-entry for entry in line]
-        lines = [
-            combined(height, one, -shift, above) for one, shift in zip(lines, heights, strict=True)
-        ]
-        rays = [combined(height, ray, -dot(row, ray), above) for ray in rays]
-        on[:, number] = True
+        lines = _moved_along(lines, heights, above, height)
+        rays = _moved_along(rays, [dot(row, ray) for ray in rays], above, height)
         rays.append(above)
+
+        # The new ray lies on all rows before this one, and the others also on this one.
+        on[:, number] = True
         on = np.vstack([on, done])
         done[number] = True
     return _inserted(rows, rays, on, done, lines)
 
 
+def _unit_vectors(size: int) -> list[Row]:
+    return [[int(i == j) for j in range(size)] for i in range(size)]
+
+
+def _first_nonzero(numbers: Row) -> int | None:
+    """Return the position of the first number that is not zero."""
+    return next((k for k, number in enumerate(numbers) if number), None)
+
+
+def _moved_along(vectors: list[Row], heights: Row, line: Row, height: int) -> list[Row]:
+    """Return vectors with some `heights` over a row, moved onto it along a line with a `height`."""
+    moved = zip(vectors, heights, strict=True)
+    return [combined(height, vector, -above, line) for vector, above in moved]
+
+
 def _inserted(rows: list[Row], rays: list[Row], on: Flags, done: Flags, lines: list[Row]) -> Cone:
     """Return the cone after the rows that are not `done`, each a combination of rows that are."""
+    # An edge of the cone modulo its lines, of some dimension d, lies on d - 2 rows.
     least = len(rows[0]) - len(lines) - 2
     units = np.array([_rounded(row) for row in rows])
     while not done.all():
@@ -171,15 +184,17 @@ def _inserted(rows: list[Row], rays: list[Row], on: Flags, done: Flags, lines: l
         number = int(left[0])
         if rays:
             heights = units[left] @ np.array([_rounded(ray) for ray in rays]).T
-            number = int(left[(heights < 0.0).sum(axis=1).argmax()])
+            violations = (heights < 0.0).sum(axis=1)
+            number = int(left[violations.argmax()])
         rays, on = _cut(rays, on, rows[number], number, least)
         done[number] = True
     return Cone(rays, on, lines)
 
 
 def _cut(rays: list[Row], on: Flags, row: Row, number: int, least: int) -> tuple[list[Row], Flags]:
-    """Return the rays above a row, which has a `number`, and those where edges cross it, and their
-    rows.
+    """Return the rays above a row and the rays in which edges cross it, and which is on which row.
+
+    The row has a `number`; an edge lies on at least `least` rows.
     """
     heights = [dot(row, ray) for ray in rays]
     on[:, number] = [height == 0 for height in heights]
@@ -208,23 +223,27 @@ def edges_across(bits: Bits, signs: Integers, least: int) -> Integers:
     pairs = np.empty((count, 2), np.int64)
     made = 0
     for p in np.flatnonzero(signs > 0):
+        # Only rays with enough common rows can be the other end of an edge, or forbid it.
         common(bits[p], columns, shared)
         found = 0
         for k in range(count):
             near[found] = k
             found += shared[k] >= least
+
         for q in near[:found]:
             if signs[q] >= 0:
                 continue
             is_edge = True
             for k in near[:found]:
                 is_edge &= k in (p, q) or not contains_common(bits[k], bits[p], bits[q])
-            if is_edge:
-                if made == len(pairs):
-                    pairs = np.concatenate((pairs, pairs))
-                pairs[made, 0] = p
-                pairs[made, 1] = q
-                made += 1
+            if not is_edge:
+                continue
+
+            if made == len(pairs):
+                pairs = np.concatenate((pairs, pairs))
+            pairs[made, 0] = p
+            pairs[made, 1] = q
+            made += 1
     return pairs[:made]
 
 

@@ -12,8 +12,9 @@ class EmptyPolytopeError(ValueError):
 
 
 class UnboundedPolytopeError(ValueError):
-    """An unbounded set has no answer; `direction`, shape (n,), of unit length, is one in which it
-    is unbounded.
+    """The result does not exist because the set is unbounded.
+
+    The set is unbounded along `direction`, shape (n,), of unit length.
     """
 
     def __init__(self, direction: Floats) -> None:

@@ -1,9 +1,8 @@
-"""Vertices and facets of zonotopes: the sets of centre + t_1 g_1 + ... + t_m g_m with all -1 <= t_i
-<= 1.
+"""Vertices and facets of zonotopes.
 
-A facet of a zonotope of R^3 is parallel to two generators; all the others are at their ends, t = 1
-or -1, on the side of the facet. Signs of determinants are therefore enough: nothing is enlarged
-step by step.
+A zonotope is {centre + t_1 g_1 + ... + t_m g_m: all -1 <= t_i <= 1} for generators g_i. A facet of
+a zonotope of R^3 is parallel to two generators; all the others are at their ends, t = 1 or -1, on
+the side of the facet. Signs of determinants are therefore enough: no set is enlarged step by step.
 
 References
 ----------
@@ -22,27 +21,27 @@ from infoset.arrays import Flags, Floats, Integers
 from infoset.geometry.double_words import affine_image, two_product, two_sum
 from infoset.geometry.polytope import double_description as dd
 from infoset.geometry.polytope.arrays import PolytopeArrays
-from infoset.geometry.polytope.outward import push_out
+from infoset.geometry.polytope.outward import MAX_MOVE, push_out
 from infoset.geometry.polytope.scaled_coordinates import coordinates
 from infoset.geometry.tolerances import EPS, ON, SNAP, UNSURE
 from infoset.kernels import Kernels
 
 _kernels = Kernels()
 PARALLEL = SNAP
-"""Sine of the angle between two generators that count as parallel: what differs is flat, relative
-to them.
+"""Sine of the angle between two generators that count as parallel: their difference is flat,
+relative to them.
 """
 _NEARLY_PARALLEL = 1.0 - 1e-6
-"""Cosine from which the angle is computed: it does not show one of 1e-11."""
+"""Cosine from which the angle is computed: a cosine of 1 - 5e-23 is rounded to 1."""
 COPLANAR = 128.0 * UNSURE
 """Determinant of three generators of length one that count as coplanar: 500 roundings.
 
-It is far below that of two generators that are nearly parallel and a third one that is not in a
-plane with them.
+It is 60 times below the determinant of two generators that just count as parallel and a third one
+at right angles.
 """
 _BLUNT = 0.1
-"""Cosine of the angles between a mean normal and normals, down to which a vertex moves by at most
-ten roundings.
+"""Cosine of the angle between the mean normal of a vertex and the normals of its facets, down to
+which the vertex moves along the mean normal: by at most ten roundings.
 """
 SHORT = ON
 """Sum of the sizes of generators, in scaled coordinates, that only move facets and vertices
@@ -62,8 +61,8 @@ class Span:
     generators : ndarray, shape (m, n)
         In scaled coordinates.
     own, others : ndarray of int, shapes (d,) and (n - d,)
-        Numbers of coordinates that are independent in the set, and of those that are functions of
-        them.
+        Numbers of coordinates that are independent in the set, and of the others, which are
+        functions of them.
     rows : ndarray, shape (m, d)
         The generators in the own scaled coordinates.
     basis : ndarray of int, shape (d,)
@@ -93,8 +92,7 @@ class Span:
 
     @cached_property
     def coefficients(self) -> Floats:
-        """Generators as combinations of those of the base, shape (m, d): in these coordinates no
-        set is thin.
+        """Generators as combinations of the base, shape (m, d), in which no set is thin.
 
         The residuals of two corrections have doubled digits, so that they are exact to rounding
         also if the set is.
@@ -123,10 +121,10 @@ class Distinct(NamedTuple):
     rows: Floats
     """In own scaled coordinates, shape (k, d)."""
     coefficients: Floats
-    """As combinations of those of the base, shape (k, d)."""
+    """As combinations of the base, shape (k, d)."""
     missed: Floats
-    """Half-widths of a box, shape (d,): the zonotope is inside that of the rows, enlarged by the
-    box.
+    """Half-widths of a box, shape (d,): the zonotope of the rows, enlarged by the box, contains the
+    given one.
     """
 
 
@@ -152,8 +150,7 @@ class Faces(NamedTuple):
 
 
 def polytope_of(kind: Any, centre: Floats, generators: Floats) -> Any:
-    """Return a zonotope as a polytope of a class `kind`, which contains it and exceeds it by
-    rounding.
+    """Return a zonotope as a polytope of a class `kind` that contains it, larger by rounding.
 
     In up to three dimensions all facets and vertices follow from signs. In more, or where rounding
     decides which generators are coplanar, it is a sum of segments.
@@ -161,23 +158,25 @@ def polytope_of(kind: Any, centre: Floats, generators: Floats) -> Any:
     span = Span(centre, generators)
     if not len(span.own):
         return kind.from_vertices(centre[None])
+
     kept = without_parallel(span)
-    faces = faces_of(kept.coefficients) if len(span.own) <= 3 else None
-    if faces is None:
-        scale = span.scale[span.own]
-        inner = _sum_of_segments(kind, centre[span.own], kept.rows * scale).enlarged(
-            kept.missed * scale
-        )
-    else:
+    faces = None
+    if len(span.own) <= 3:
+        faces = faces_of(kept.coefficients)
+    if faces is not None:
         inner = _of_faces(kind, faces, span, kept)
+    else:
+        scale = span.scale[span.own]
+        segments = _sum_of_segments(kind, centre[span.own], kept.rows * scale)
+        inner = segments.enlarged(kept.missed * scale)
     return inner if inner.space == len(centre) else _lifted(kind, inner, span, centre)
 
 
 def _independent(generators: Floats) -> tuple[Integers, Integers]:
     """Return independent coordinates and generators of a zonotope, shapes (d,), by elimination.
 
-    In each step the coordinate goes in which the rest of the set is widest, until no rest is wider
-    than `FLAT`.
+    Each step eliminates the coordinate in which the rest of the set is widest, until no rest is
+    wider than SNAP.
     """
     rest = generators.copy()
     columns: list[int] = []
@@ -187,6 +186,7 @@ def _independent(generators: Floats) -> tuple[Integers, Integers]:
         column = int(widths.argmax())
         if widths[column] <= SNAP:
             break
+
         row = int(np.abs(rest[:, column]).argmax())
         rest -= np.outer(rest[:, column] / rest[row, column], rest[row])
         rest[:, column] = 0.0
@@ -197,8 +197,9 @@ def _independent(generators: Floats) -> tuple[Integers, Integers]:
 
 
 def exact_determinant(matrix: Floats) -> float:
-    """Return the determinant of a regular matrix, shape (d, d), rounded once: by elimination in
-    fractions.
+    """Return the determinant of a regular matrix, shape (d, d), rounded once.
+
+    Gaussian elimination in fractions.
     """
     rows = [[Fraction(entry) for entry in row] for row in matrix.tolist()]
     determinant = Fraction(1)
@@ -210,9 +211,8 @@ def exact_determinant(matrix: Floats) -> float:
         determinant *= rows[k][k]
         for i in range(k + 1, len(rows)):
             factor = rows[i][k] / rows[k][k]
-            rows[i] = [
-                entry - factor * above for entry, above in zip(rows[i], rows[k], strict=True)
-            ]
+            pairs = zip(rows[i], rows[k], strict=True)
+            rows[i] = [entry - factor * above for entry, above in pairs]
     return float(determinant)
 
 
@@ -229,22 +229,8 @@ def without_parallel(span: Span) -> Distinct:
     is_short[span.basis] = False
     missed = np.abs(span.rows[is_short]).sum(axis=0)
 
-    long = order[::-1][~is_short[order[::-1]]]
-    units = span.coefficients[long] / np.linalg.norm(span.coefficients[long], axis=1)[:, None]
-    directions = np.empty_like(units)
-    groups: list[list[int]] = []
-    for number, unit in zip(long.tolist(), units, strict=True):
-        known = directions[: len(groups)]
-        cosines = known @ unit
-        near = np.flatnonzero(np.abs(cosines) > _NEARLY_PARALLEL)
-        away = unit - cosines[near, None] * known[near]
-        same = near[np.linalg.norm(away, axis=1) <= PARALLEL]
-        if len(same):
-            groups[int(same[0])].append(number)
-        else:
-            directions[len(groups)] = unit
-            groups.append([number])
-
+    descending = order[::-1]
+    groups, directions = _parallel_groups(span.coefficients, descending[~is_short[descending]])
     rows = np.empty((len(groups), len(span.own)))
     coefficients = np.empty_like(rows)
     for k, group in enumerate(groups):
@@ -259,19 +245,42 @@ def without_parallel(span: Span) -> Distinct:
     return Distinct(rows, coefficients, missed)
 
 
-def faces_of(generators: Floats) -> Faces | None:
-    """Return the faces of a zonotope in one to three dimensions without parallel generators, shape
-    (m, d).
+def _parallel_groups(generators: Floats, numbers: Integers) -> tuple[list[list[int]], Floats]:
+    """Return groups of parallel generators, some `numbers` of them, and the directions of groups.
 
-    It is None if rounding decides which generators are coplanar.
+    A direction, of length one, is the direction of the first generator of a group.
     """
-    if generators.shape[1] == 1:
+    units = generators[numbers] / np.linalg.norm(generators[numbers], axis=1)[:, None]
+    directions = np.empty_like(units)
+    groups: list[list[int]] = []
+    for number, unit in zip(numbers.tolist(), units, strict=True):
+        known = directions[: len(groups)]
+        cosines = known @ unit
+        near = np.flatnonzero(np.abs(cosines) > _NEARLY_PARALLEL)
+        away = unit - cosines[near, None] * known[near]
+        same = near[np.linalg.norm(away, axis=1) <= PARALLEL]
+        if len(same):
+            groups[int(same[0])].append(number)
+        else:
+            directions[len(groups)] = unit
+            groups.append([number])
+    return groups, directions
+
+
+def faces_of(generators: Floats) -> Faces | None:
+    """Return the faces of a zonotope in one to three dimensions, of generators of shape (m, d).
+
+    No two generators are parallel. It is None if rounding decides which generators are coplanar.
+    """
+    dimension = generators.shape[1]
+    if dimension == 1:
         ends = np.array([1.0, -1.0])
+        signs = np.sign(generators) * ends[:, None]
         numbers = np.arange(2)
-        return Faces(
-            np.zeros((2, 0), np.int64), ends, np.sign(generators) * ends[:, None], numbers, numbers
-        )
-    return _sides(generators) if generators.shape[1] == 2 else _facets(generators)
+        return Faces(np.zeros((2, 0), np.int64), ends, signs, numbers, numbers)
+    if dimension == 2:
+        return _sides(generators)
+    return _facets(generators)
 
 
 def _normals(faces: Faces, rows: Floats) -> Floats:
@@ -286,15 +295,15 @@ def _normals(faces: Faces, rows: Floats) -> Floats:
         normals = units[faces.along[:, 0]][:, ::-1] * [1.0, -1.0]
     else:
         normals = _cross_products(units, *faces.along.T.copy())
-    normals /= np.abs(normals).max(axis=1)[:, None]  # one exactly, for a normal along an axis
+    # A normal along an axis has an entry of exactly one.
+    normals /= np.abs(normals).max(axis=1)[:, None]
     return np.asarray(normals * faces.ahead[:, None])
 
 
 def _corners(generators: Floats) -> tuple[Floats, Integers]:
-    """Return the factors of generators of the plane at the corners of their zonogon, shape (2 m,
-    m).
+    """Return the factors of generators of the plane at the corners of their zonogon, (2 m, m).
 
-    The corners are counter-clockwise from the lowest one; the side after corner i is parallel to
+    The corners are counter-clockwise from the lowest corner; the side after corner i is parallel to
     generator i of the returned order, shape (m,), and so is the side after corner m + i. O(m^2).
     """
     is_up = (generators[:, 1] > 0.0) | ((generators[:, 1] == 0.0) & (generators[:, 0] > 0.0))
@@ -323,6 +332,17 @@ def _sides(generators: Floats) -> Faces:
     )
 
 
+class _Part(NamedTuple):
+    """Facets, one of each pair of opposite facets, and their vertices, facet by facet."""
+
+    pairs: Integers
+    """The pair of generators that spans each facet, as its number, shape (f,)."""
+    sizes: Integers
+    """The numbers of vertices of the facets, shape (f,)."""
+    signs: Floats
+    """The factors of the generators at the vertices, shape (sum of sizes, m)."""
+
+
 def _facets(generators: Floats) -> Faces | None:
     """Return the faces of a zonotope in three dimensions, or None if rounding decides about them.
 
@@ -338,58 +358,71 @@ def _facets(generators: Floats) -> Faces | None:
     within[pairs, second] = True
     outside = np.where(within, 0.0, np.sign(heights))
 
-    # Facets that are parallelograms.
+    parts = [_parallelograms(within, outside, first, second)]
+    others = np.flatnonzero(within.sum(axis=1) > 2)
+    groups, group_of = np.unique(within[others], axis=0, return_inverse=True)
+    for k, group in enumerate(groups):
+        # Each pair of the generators in a plane must have found the same ones.
+        same = others[group_of.reshape(-1) == k]
+        members = np.flatnonzero(group)
+        if 2 * len(same) != len(members) * (len(members) - 1):
+            return None
+        best = same[np.linalg.norm(normals[same], axis=1).argmax()]
+        in_plane = _in_plane(units[members], normals[best])
+        parts.append(_zonogon(best, members, in_plane, outside[best]))
+
+    half = np.vstack([part.signs for part in parts])
+    sizes = np.tile(np.concatenate([part.sizes for part in parts]), 2)
+    used, vertex_of = _different(np.vstack([half, -half]))
+    # A facet has as many edges as corners, and each is on two facets (Euler).
+    if 2 * (len(used) + len(sizes) - 2) != sizes.sum():
+        return None
+
+    chosen = np.concatenate([part.pairs for part in parts])
+    along = np.column_stack([first[chosen], second[chosen]])
+    ahead = np.repeat([1.0, -1.0], len(chosen))
+    facet_of = np.repeat(np.arange(len(sizes)), sizes)
+    order = np.argsort(vertex_of, kind="stable")
+    return Faces(np.vstack([along, along]), ahead, used, vertex_of[order], facet_of[order])
+
+
+def _parallelograms(within: Flags, outside: Floats, first: Integers, second: Integers) -> _Part:
+    """Return the facets that are parallel to no more than the two generators of a pair.
+
+    `within`, shape (p, m), is whether a generator is in the plane of a pair, and `outside` its
+    factor if not.
+    """
     simple = np.flatnonzero(within.sum(axis=1) == 2)
     corners = np.repeat(outside[simple, None], 4, axis=1)
     ends = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]])
     every = np.arange(len(simple))
     corners[every, :, first[simple]] = ends[:, 0]
     corners[every, :, second[simple]] = ends[:, 1]
-    signs = [corners.reshape(-1, len(units))]
-    counts = [np.full(len(simple), 4)]
-    chosen = [simple]
+    signs = corners.reshape(-1, outside.shape[1])
+    return _Part(simple, np.full(len(simple), 4), signs)
 
-    # Facets with more than two generators: each pair of them must have found the same ones.
-    others = np.flatnonzero(within.sum(axis=1) > 2)
-    groups, group_of = np.unique(within[others], axis=0, return_inverse=True)
-    for k, group in enumerate(groups):
-        same = others[group_of.reshape(-1) == k]
-        members = np.flatnonzero(group)
-        if 2 * len(same) != len(members) * (len(members) - 1):
-            return None
-        best = same[np.linalg.norm(normals[same], axis=1).argmax()]
-        around, _ = _corners(_in_plane(units[members], normals[best]))
-        corners = np.repeat(outside[best, None], len(around), axis=0)
-        corners[:, members] = around
-        signs.append(corners)
-        counts.append(np.array([len(around)]))
-        chosen.append(best[None])
 
-    half = np.vstack(signs)
-    sizes = np.tile(np.concatenate(counts), 2)
-    used, vertex_of = _different(np.vstack([half, -half]))
-    # A facet has as many edges as corners, and each is on two facets (Euler).
-    if 2 * (len(used) + len(sizes) - 2) != sizes.sum():
-        return None
-    pairs = np.concatenate(chosen)
-    along = np.column_stack([first[pairs], second[pairs]])
-    ahead = np.repeat([1.0, -1.0], len(pairs))
-    facet_of = np.repeat(np.arange(len(sizes)), sizes)
-    order = np.argsort(vertex_of, kind="stable")
-    return Faces(np.vstack([along, along]), ahead, used, vertex_of[order], facet_of[order])
+def _zonogon(pair: int, members: Integers, in_plane: Floats, outside: Floats) -> _Part:
+    """Return the facet of a pair that is parallel to more than two generators, the `members`.
+
+    `in_plane`, shape (k, 2), are the members in the plane; `outside`, shape (m,), the factors of
+    the other generators.
+    """
+    around, _ = _corners(in_plane)
+    signs = np.repeat(outside[None], len(around), axis=0)
+    signs[:, members] = around
+    return _Part(np.array([pair]), np.array([len(around)]), signs)
 
 
 def _in_plane(rows: Floats, normal: Floats) -> Floats:
-    """Return coordinates in the plane across a normal, counter-clockwise seen from its end, shape
-    (k, 2).
-    """
+    """Return coordinates, (k, 2), in the plane across a normal, counter-clockwise from its end."""
     one = rows[0] / np.linalg.norm(rows[0])
     two = np.cross(normal / np.linalg.norm(normal), one)
     return np.column_stack([rows @ one, rows @ two])
 
 
 def _different(signs: Floats) -> tuple[Floats, Integers]:
-    """Return the different rows of signs, and the number of the one that equals each row."""
+    """Return the different rows of signs, and for each row the number of its equal."""
     words = np.packbits(signs > 0.0, axis=1)
     words = np.pad(words, ((0, 0), (0, -words.shape[1] % 8))).view(np.uint64)
     order = np.lexsort(words.T)
@@ -402,8 +435,9 @@ def _different(signs: Floats) -> tuple[Floats, Integers]:
 
 @_kernels.compiled
 def _cross_products(rows: Floats, first: Integers, second: Integers) -> Floats:
-    """Return the cross products of pairs of rows, shape (p, 3), each entry exact to rounding of
-    itself.
+    """Return the cross products of pairs of rows, shape (p, 3).
+
+    Each entry is exact to rounding of itself.
     """
     result = np.empty((len(first), 3))
     for k in range(len(first)):
@@ -443,7 +477,7 @@ def _of_faces(kind: Any, faces: Faces, span: Span, kept: Distinct) -> Any:
         points, is_ahead = _ahead(points, facets, faces)
     incidence = faces.incidence()
     if not is_ahead.all():
-        most = ON + 32.0 * kept.missed.max()
+        most = ON + MAX_MOVE * kept.missed.max()
         points = push_out(points, facets, incidence, np.int64(0), False, most)
     return kind(
         points,
@@ -456,11 +490,10 @@ def _of_faces(kind: Any, faces: Faces, span: Span, kept: Distinct) -> Any:
 
 
 def _ahead(points: Floats, facets: Floats, faces: Faces) -> tuple[Floats, Flags]:
-    """Return vertices, shape (v, d), and which are now beyond their facets: those at blunt corners
-    moved.
+    """Return vertices, shape (v, d), moved at blunt corners, and whether each one was moved.
 
-    They move along the mean normal of their facets. `push_out` moves the others; at a blunt corner
-    it would move a vertex farther than this.
+    They move along the mean normal of their facets, to the outer sides. `push_out` moves the
+    others; at a blunt corner it would move a vertex farther than this.
     """
     vertex = faces.vertex
     facet = faces.facet
@@ -481,13 +514,10 @@ def _ahead(points: Floats, facets: Floats, faces: Faces) -> tuple[Floats, Flags]
 
 
 def _sum_of_segments(kind: Any, centre: Floats, generators: Floats) -> Any:
-    """Return a zonotope as the sum of a parallelepiped and segments, one `add_segment` after the
-    other.
-    """
+    """Return a zonotope as the sum of a parallelepiped and segments, one after the other."""
     _, basis = _independent(generators)
-    found = kind.from_box(-np.ones(len(basis)), np.ones(len(basis))).affine_map(
-        generators[basis].T, centre
-    )
+    cube = kind.from_box(-np.ones(len(basis)), np.ones(len(basis)))
+    found = cube.affine_map(generators[basis].T, centre)
     for row in np.delete(generators, basis, axis=0):
         found = found.add_segment(row)
     return found

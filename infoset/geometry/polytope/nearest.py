@@ -12,12 +12,13 @@ from infoset.geometry.double_words import two_product, two_sum
 from infoset.geometry.tolerances import EPS, ON
 from infoset.kernels import Kernels
 
-_kernels = Kernels()  # without fast-math: reordered sums would lose the errors
+# Without fast-math: sums in another order would lose the errors.
+_kernels = Kernels()
 
-_MAX_STEPS = 1000
-"""Number of vertices that Wolfe's algorithm may add: it ends after a few of each hull."""
+_MAX_PAIRS = 1000
+"""Number of pairs of vertices that Wolfe's algorithm may add: it ends after a few of each hull."""
 _PRECISION = 64.0 * EPS
-"""Decrease of x . d, relative to the sizes of x and of the hulls, that a step must offer: 64
+"""Decrease of x . d, relative to the sizes of x and of the hulls, that a new pair must offer: 64
 roundings.
 """
 _REFINEMENTS = 3
@@ -57,21 +58,23 @@ def nearest_pair(one: Floats, two: Floats) -> NearestPair:
     largest = max(float(np.abs(one).max()), float(np.abs(two).max()))
     if extent <= _SMALLEST * largest:
         return NearestPair(one[0], two[0], one[0] - two[0])
+
     unit = np.ldexp(1.0, np.frexp(extent)[1])
-    i, j, shares = _shares_of_nearest(
-        np.ascontiguousarray(one / unit), np.ascontiguousarray(two / unit)
-    )
+    one_unit = np.ascontiguousarray(one / unit)
+    two_unit = np.ascontiguousarray(two / unit)
+    i, j, shares = _shares_of_nearest(one_unit, two_unit)
     difference, _ = _combination(shares, one[i], two[j])
     return NearestPair(shares @ one[i], shares @ two[j], difference)
 
 
 def _shares_of_nearest(one: Floats, two: Floats) -> tuple[Integers, Integers, Floats]:
-    """Return pairs of vertices, as their numbers, and shares of them, of the nearest points of
-    hulls of size one.
+    """Return the vertices i and j of pairs, and the shares of the pairs in the nearest points.
+
+    The hulls have the size one.
     """
     i = j = np.zeros(1, np.int64)
     shares = np.ones(1)
-    for _ in range(_MAX_STEPS):
+    for _ in range(_MAX_PAIRS):
         p, q, gap, is_known = _next_pair(one, two, i, j, shares)
         if is_known or gap <= 0.0:
             break
@@ -84,9 +87,11 @@ def _shares_of_nearest(one: Floats, two: Floats) -> tuple[Integers, Integers, Fl
             if (target > 0.0).all():
                 shares = target
                 break
+
             # Go toward the minimizer until a share is zero; drop that pair.
             below = target <= 0.0
-            part = float(np.min(shares[below] / np.maximum(shares[below] - target[below], 1e-300)))
+            decrease = np.maximum(shares[below] - target[below], 1e-300)
+            part = float(np.min(shares[below] / decrease))
             shares = shares + min(1.0, part) * (target - shares)
             shares[below & (shares <= shares[below].min())] = 0.0
             kept = shares > 0.0
@@ -100,11 +105,10 @@ def _shares_of_nearest(one: Floats, two: Floats) -> tuple[Integers, Integers, Fl
 def _next_pair(
     one: Floats, two: Floats, i: Integers, j: Integers, shares: Floats
 ) -> tuple[int, int, float, bool]:
-    """Return the pair of vertices whose difference is lowest along the present one, x, and what it
-    offers.
+    """Return the pair of vertices with the lowest difference along x, its gain, and if it is known.
 
-    The third value is how much lower it is than x, less the minimum for a step; the last one is
-    whether the present pairs have this difference.
+    x is the present difference. The gain is the distance along x by which the new difference is
+    lower, less the minimum gain. It is known if a present pair has the same difference.
     """
     x, low = _combination(shares, one[i], two[j])
     heights = _heights(one, one[i[0]], x, low)
@@ -120,51 +124,30 @@ def _next_pair(
         for axis in range(len(x)):
             is_same &= one[i[k], axis] - one[p, axis] == two[j[k], axis] - two[q, axis]
         is_known |= is_same
-    length = 0.0
+
+    length_squared = 0.0
     for value in x:
-        length += value * value
-    return p, q, gap - _PRECISION * min(1.0, max(length, _PRECISION)), is_known
+        length_squared += value * value
+    return p, q, gap - _PRECISION * min(1.0, max(length_squared, _PRECISION)), is_known
 
 
 @_kernels.compiled
 def _affine_minimizer(one: Floats, two: Floats, shares: Floats) -> Floats:
-    """Return the coefficients, sum 1, of the shortest combination x of the differences one - two,
-    shape (k, n).
+    """Return the coefficients of the shortest affine combination x of the differences one - two.
 
-    Newton steps from `shares`: the derivatives e . x along the edges e are precise, also if x is
-    much longer than they. The edges of length one have a triangular factor; edges that depend on
-    earlier ones keep their shares.
+    The differences have the shape (k, n); the coefficients have the sum 1. Newton steps from
+    `shares`: the derivatives e . x along the edges e are precise, also if x is much longer than
+    they.
     """
-    count = len(shares) - 1
     result = shares.copy()
-    if count == 0:
+    if len(shares) == 1:
         return result
-    lengths = np.empty(count)
-    basis = (one[1:] - one[0]) - (two[1:] - two[0])
-    triangle = np.zeros((count, count))
-    for k in range(count):
-        lengths[k] = math.sqrt(np.square(basis[k]).sum())
-        basis[k] /= lengths[k]
-        for m in range(2 * k):  # twice, for rounding
-            along = (basis[m % k] * basis[k]).sum()
-            triangle[m % k, k] += along
-            basis[k] -= along * basis[m % k]
-        triangle[k, k] = math.sqrt(np.square(basis[k]).sum())
-        if triangle[k, k] > _DEPENDENT:
-            basis[k] /= triangle[k, k]
-        else:
-            triangle[k, k], basis[k] = 0.0, 0.0
+
+    lengths, triangle = _edge_factor(one, two)
     for _ in range(_REFINEMENTS):
         x, low = _combination(result, one, two)
         step = (_heights(two, two[0], x, low) - _heights(one, one[0], x, low))[1:] / lengths
-        for k in range(count):
-            for m in range(k):
-                step[k] -= triangle[m, k] * step[m]
-            step[k] = step[k] / triangle[k, k] if triangle[k, k] > 0.0 else 0.0
-        for k in range(count - 1, -1, -1):
-            for m in range(k + 1, count):
-                step[k] -= triangle[k, m] * step[m]
-            step[k] = step[k] / triangle[k, k] if triangle[k, k] > 0.0 else 0.0
+        _solve(triangle, step)
         step /= lengths
         result[1:] += step
         result[0] -= step.sum()
@@ -174,10 +157,51 @@ def _affine_minimizer(one: Floats, two: Floats, shares: Floats) -> Floats:
 
 
 @_kernels.compiled
-def _combination(shares: Floats, one: Floats, two: Floats) -> tuple[Floats, Floats]:
-    """Return the sum of shares times differences of points, shapes (k,) and (k, n), as a sum of two
-    numbers each.
+def _edge_factor(one: Floats, two: Floats) -> tuple[Floats, Floats]:
+    """Return the lengths of the edges and R of E = Q R, with edges of length one as columns of E.
+
+    The edges are the differences one - two, less the first one. An edge that depends on earlier
+    edges has a zero on the diagonal of R.
     """
+    basis = (one[1:] - one[0]) - (two[1:] - two[0])
+    count = len(basis)
+    lengths = np.empty(count)
+    triangle = np.zeros((count, count))
+    for k in range(count):
+        lengths[k] = math.sqrt(np.square(basis[k]).sum())
+        basis[k] /= lengths[k]
+        # Orthogonalized twice, because of rounding.
+        for m in range(2 * k):
+            along = (basis[m % k] * basis[k]).sum()
+            triangle[m % k, k] += along
+            basis[k] -= along * basis[m % k]
+
+        triangle[k, k] = math.sqrt(np.square(basis[k]).sum())
+        if triangle[k, k] > _DEPENDENT:
+            basis[k] /= triangle[k, k]
+        else:
+            triangle[k, k] = 0.0
+            basis[k] = 0.0
+    return lengths, triangle
+
+
+@_kernels.allocation_free
+def _solve(triangle: Floats, step: Floats) -> None:
+    """Solve R' R z = step, in place; z is 0 where the diagonal of the triangle R is 0."""
+    count = len(step)
+    for k in range(count):
+        for m in range(k):
+            step[k] -= triangle[m, k] * step[m]
+        step[k] = step[k] / triangle[k, k] if triangle[k, k] > 0.0 else 0.0
+    for k in range(count - 1, -1, -1):
+        for m in range(k + 1, count):
+            step[k] -= triangle[k, m] * step[m]
+        step[k] = step[k] / triangle[k, k] if triangle[k, k] > 0.0 else 0.0
+
+
+@_kernels.compiled
+def _combination(shares: Floats, one: Floats, two: Floats) -> tuple[Floats, Floats]:
+    """Return the sum of shares, (k,), times differences of points, (k, n), as two parts each."""
     size = one.shape[1]
     high = np.zeros(size)
     low = np.zeros(size)
@@ -193,12 +217,14 @@ def _combination(shares: Floats, one: Floats, two: Floats) -> tuple[Floats, Floa
 
 @_kernels.compiled
 def _heights(points: Floats, base: Floats, high: Floats, low: Floats) -> Floats:
-    """Return (point - base) . (high + low) of points, shape (k, n), each rounded once: differences
-    are exact.
+    """Return (point - base) . (high + low) of points, shape (k, n), each rounded once.
+
+    The differences are exact.
     """
     heights = np.empty(len(points))
     for k in range(len(points)):
-        total, rest = 0.0, 0.0
+        total = 0.0
+        rest = 0.0
         for axis in range(len(base)):
             step, step_low = two_sum(points[k, axis], -base[axis])
             product, rounded = two_product(step, high[axis])

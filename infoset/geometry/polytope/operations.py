@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -13,8 +13,13 @@ from infoset.geometry.polytope.polytope import Polytope
 from infoset.geometry.tolerances import ON, REDUCED
 
 _MAX_ROUNDS = 200
+"""Number of enlargements of the hull, a guard: each adds a point beyond every facet that the set
+exceeds, so that a set with at most `max_facets` facets is found after few.
+"""
 _FLAT = 4.0 * REDUCED
-"""Thickness of a flat set of points that a solver of linear programs found."""
+"""Thickness of a flat set of points that a solver of linear programs found: 1.2e-7. HiGHS satisfies
+constraints to 1e-7 by default.
+"""
 
 
 def polytope_from_support(
@@ -23,17 +28,16 @@ def polytope_from_support(
     tolerance: float = 1e-9,
     max_facets: int = 10_000,
 ) -> Polytope:
-    """Return a polytope from its support vectors: a projection of a set that is known only by
-    programs over it.
+    """Return a polytope from its support vectors, such as a projection of a set of programs.
 
     `furthest` returns a point of the set furthest along a direction, both of shape (space,).
     `space` is 2 or 3; more works but the cost grows fast. Vertices of the result are points of the
     set; the set extends beyond its facets, at most `max_facets`, by no more than the relative
     `tolerance`.
 
-    The hull of the points known is enlarged: each facet (and each direction across it, where it is
-    flat) beyond which the set extends gives a new point. It ends when none does, after a program a
-    facet and a vertex: exact, for a polytope.
+    The hull of the known points is enlarged: each facet beyond which the set extends gives a new
+    point, and so does each direction across a flat hull. It ends if there is no such facet, after
+    one call of `furthest` for each facet and vertex; for a polytope the result is exact.
 
     Raises
     ------
@@ -45,6 +49,7 @@ def polytope_from_support(
     known: set[tuple[float, ...]] = set()
     for _ in range(_MAX_ROUNDS):
         hull = Polytope.from_vertices(points, _FLAT)
+        # A point of a set far from the origin is known to ON of its coordinates.
         size = max(float(np.ptp(points, axis=0).max()), ON * float(np.abs(points).max()))
         rows, limits = hull.constraints()
         if len(rows) > max_facets:
@@ -66,42 +71,48 @@ def polytope_from_support(
 
 
 def product(*polytopes: Polytope) -> Polytope:
-    """Return the Cartesian product of `polytopes`, with v1 v2 ... vertices and f1 + f2 + ...
-    facets.
+    """Return the Cartesian product of `polytopes`.
+
+    It has v1 v2 ... vertices and f1 + f2 + ... facets.
 
     Raises
     ------
     ValueError
         If there is no polytope.
     """
-    if not [need_set("each factor", factor, Polytope) for factor in polytopes]:
+    factors = [need_set("each factor", factor, Polytope) for factor in polytopes]
+    if not factors:
         raise ValueError("a product needs at least one polytope")
     if any(factor.is_empty for factor in polytopes):
         return Polytope.empty(sum(factor.space for factor in polytopes))
     if not all(factor.is_bounded for factor in polytopes):
-        axes = np.eye(sum(factor.space for factor in polytopes))
-        ends = np.cumsum([factor.space for factor in polytopes])[:-1]
-        parts = zip(polytopes, np.split(axes, ends), strict=True)
-        cylinders = [factor.preimage(rows) for factor, rows in parts]
-        return cylinders[0].intersection(*cylinders[1:])
+        return _product_of_cylinders(polytopes)
+
     points = polytopes[0].points
     on = polytopes[0].incidence
     for factor in polytopes[1:]:
+        # Each point with each point of the factor.
+        before = len(points)
         count = len(factor.points)
-        on = np.hstack([np.repeat(on, count, axis=0), np.tile(factor.incidence, (len(points), 1))])
-        points = np.hstack(
-            [np.repeat(points, count, axis=0), np.tile(factor.points, (len(points), 1))]
-        )
-    facets, equations = (
-        np.column_stack(
-            [
-                block_diag(*[rows[:, :-1] for rows in tables]),
-                np.concatenate([rows[:, -1] for rows in tables]),
-            ]
-        )
-        for tables in ([one.facets for one in polytopes], [one.equations for one in polytopes])
-    )
-    centre, scale = (
-        np.concatenate([getattr(one, name) for one in polytopes]) for name in ("centre", "scale")
-    )
+        points = np.hstack([np.repeat(points, count, axis=0), np.tile(factor.points, (before, 1))])
+        on = np.hstack([np.repeat(on, count, axis=0), np.tile(factor.incidence, (before, 1))])
+    facets = _side_by_side([one.facets for one in polytopes])
+    equations = _side_by_side([one.equations for one in polytopes])
+    centre = np.concatenate([one.centre for one in polytopes])
+    scale = np.concatenate([one.scale for one in polytopes])
     return Polytope(points, facets, equations, on, centre, scale)
+
+
+def _product_of_cylinders(polytopes: Sequence[Polytope]) -> Polytope:
+    """Return the product of sets, some of them unbounded: the points whose parts are in them."""
+    spaces = [factor.space for factor in polytopes]
+    axes = np.split(np.eye(sum(spaces)), np.cumsum(spaces)[:-1])
+    cylinders = [factor.preimage(rows) for factor, rows in zip(polytopes, axes, strict=True)]
+    return cylinders[0].intersection(*cylinders[1:])
+
+
+def _side_by_side(tables: Sequence[Floats]) -> Floats:
+    """Return rows (a, b) of the factors of a product as rows of the product."""
+    normals = block_diag(*[rows[:, :-1] for rows in tables])
+    limits = np.concatenate([rows[:, -1] for rows in tables])
+    return np.column_stack([normals, limits])

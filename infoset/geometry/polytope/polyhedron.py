@@ -1,10 +1,10 @@
-"""Convex polyhedra in exact integers: what polytopes that are unbounded are made of.
+"""Convex polyhedra in exact integers, which represent unbounded polytopes.
 
 A polyhedron is {x: a . x <= b for all facets, a . x = b for all equations}, and the sum of the hull
-of its points, the cone of its directions and the span of its lines. Every list holds rows of n + 1
+of its points, the cone of its directions and the span of its lines. Every list has rows of n + 1
 integers: (a, b) for facets and equations, (x t, t) with t > 0 for a point x, (d, 0) for directions
-and lines. Each representation follows from the other by `cone.extreme_rays`, which rounding does
-not touch: a direction that lies in a facet stays in it.
+and lines. Each representation follows from the other by `cone.extreme_rays`, without rounding: a
+direction that lies in a facet stays in it.
 """
 
 from __future__ import annotations
@@ -23,8 +23,9 @@ from infoset.geometry.polytope.cone import Row, combined, dot, extreme_rays, sho
 
 @dataclass(frozen=True, eq=False)
 class Polyhedron:
-    """A convex polyhedron in R^n by both representations, without redundant rows; without points it
-    is empty.
+    """A convex polyhedron in R^n in both representations, without redundant rows.
+
+    Without points it is empty.
     """
 
     space: int
@@ -66,11 +67,12 @@ def of_half_spaces(space: int, rows: Iterable[Row]) -> Polyhedron:
 def of_generators(
     space: int, points: Sequence[Row], directions: Sequence[Row], lines: Sequence[Row]
 ) -> Polyhedron:
-    """Return the sum of the hull of points, at least one, the cone of directions and the span of
-    lines, in R^n.
+    """Return the sum of the hull of points, the cone of directions and the span of lines, in R^n.
+
+    There is at least one point.
     """
-    along = [_turned(row) for row in (*directions, *lines, *(_negative(line) for line in lines))]
-    dual = extreme_rays([*(_turned(point) for point in points), *along])
+    both_ends = [*lines, *(_negative(line) for line in lines)]
+    dual = extreme_rays([_turned(row) for row in (*points, *directions, *both_ends)])
     equations, pivots = _reduced(dual.lines)
     facets = []
     for ray in dual.rays:
@@ -81,15 +83,9 @@ def of_generators(
         if any(facet[:-1]):
             facets.append(facet)
 
-    # What is left of the generators, after those that the others contain.
-    primal = extreme_rays(
-        [
-            _unit(space),
-            *map(_turned, facets),
-            *map(_turned, equations),
-            *(_turned(_negative(row)) for row in equations),
-        ]
-    )
+    # The facets give the generators without redundant ones.
+    half_spaces = [*facets, *equations, *(_negative(row) for row in equations)]
+    primal = extreme_rays([_unit(space), *(_turned(row) for row in half_spaces)])
     return Polyhedron(
         space,
         tuple(ray for ray in primal.rays if ray[-1] > 0),
@@ -104,16 +100,13 @@ def image(
     one: Polyhedron, matrix: Sequence[Sequence[Fraction]], offset: Sequence[Fraction]
 ) -> Polyhedron:
     """Return {matrix x + offset}."""
-    moved = []
-    for rows in one.generators:
-        moved.append([_mapped(row, matrix, offset) for row in rows])
-    points, directions, lines = moved
-    return of_generators(
-        len(matrix),
-        points,
-        [d for d in directions if any(d)],
-        [line for line in lines if any(line)],
+    points, directions, lines = (
+        [_mapped(row, matrix, offset) for row in rows] for rows in one.generators
     )
+    # A direction whose image is zero is none.
+    directions = [direction for direction in directions if any(direction)]
+    lines = [line for line in lines if any(line)]
+    return of_generators(len(matrix), points, directions, lines)
 
 
 def preimage(
@@ -154,8 +147,9 @@ def moved_outward(rows: Iterable[Row], by: Sequence[Fraction]) -> list[Row]:
 
 
 def moved_inward(rows: Iterable[Row], other: Polyhedron) -> list[Row] | None:
-    """Return rows of {x: x + y in the set for all y of the other}; None if no x is, as the other
-    extends too far.
+    """Return rows of {x: x + y in the set for all y of the other}.
+
+    It is None if there is no such x because the other set is unbounded along a normal.
     """
     smaller = []
     for row in rows:
@@ -183,8 +177,9 @@ def recession(one: Polyhedron) -> Polyhedron:
 
 def hull(sets: Sequence[Polyhedron]) -> Polyhedron:
     """Return the closed convex hull of the union of sets that have points."""
-    parts = [one.generators for one in sets]
-    points, directions, lines = ([row for part in parts for row in part[kind]] for kind in range(3))
+    points = [row for one in sets for row in one.points]
+    directions = [row for one in sets for row in one.directions]
+    lines = [row for one in sets for row in one.lines]
     return of_generators(sets[0].space, points, directions, lines)
 
 
@@ -199,7 +194,7 @@ def as_points(rows: Floats) -> list[Row]:
 
 
 def as_directions(rows: Floats) -> list[Row]:
-    """Return directions, shape (k, n), as integer rows; zeros are none."""
+    """Return directions, shape (k, n), as integer rows, without zeros."""
     return [whole([*map(Fraction, row), Fraction(0)]) for row in rows.tolist() if any(row)]
 
 
@@ -223,8 +218,9 @@ def rounded_directions(rows: Sequence[Row], space: int) -> Floats:
 
 
 def rounded_rows(rows: Sequence[Row], space: int) -> Floats:
-    """Return rows (a, b), shape (k, n + 1), the largest entry of a from 1/2 to 1; dyadic ones are
-    exact.
+    """Return rows (a, b), shape (k, n + 1), with a largest entry of a from 1/2 to 1.
+
+    Rows of dyadic numbers are exact.
     """
     table = []
     for row in rows:
@@ -259,8 +255,9 @@ def _product(integers: Sequence[int], numbers: Sequence[Fraction]) -> Fraction:
 
 
 def _reduced(rows: Sequence[Row]) -> tuple[list[Row], list[int]]:
-    """Return equations, each with a coordinate that the others do not have and its positive factor,
-    and these axes.
+    """Return equations in reduced echelon form, and the pivot axis of each.
+
+    No other equation has a factor of this axis; its own factor is positive.
     """
     left = list(rows)
     done: list[Row] = []
@@ -279,9 +276,7 @@ def _reduced(rows: Sequence[Row]) -> tuple[list[Row], list[int]]:
 
 
 def _turned(row: Row) -> Row:
-    """Return the row of the cone {(x, t): b t - a . x >= 0} for (a, b), and of its dual for a
-    generator (x, t).
-    """
+    """Return the row (-a, b) of the cone {(x, t): b t - a . x >= 0}, or of its dual, (-x, t)."""
     return [*(-entry for entry in row[:-1]), row[-1]]
 
 

@@ -34,6 +34,7 @@ from infoset.geometry.polytope import double_description as dd
 from infoset.geometry.polytope._measures import largest_ball, simplices_of, triangle_of
 from infoset.geometry.polytope.arrays import PolytopeArrays, half_spaces, own_and_others
 from infoset.geometry.polytope.generators import polytope_of
+from infoset.geometry.polytope.hulls import hull, hull_of
 from infoset.geometry.polytope.nearest import nearest_pair
 from infoset.geometry.polytope.outward import image, swept
 from infoset.geometry.polytope.reduction import reduced_outward
@@ -45,8 +46,8 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
 _WIDE = 2.0**6
-"""Size of a sum, in coordinates in which a term is one wide, from which it gets its own: two digits
-are lost.
+"""Coordinates of a sum, in the coordinates of a term that is one wide, from which it gets its own:
+two digits are lost.
 """
 
 
@@ -59,10 +60,10 @@ class Polytope(PolytopeArrays, ConvexSet):
     constructors are the methods `from_...`.
 
     One algorithm, the double description, computes all sets; its result is checked, and where the
-    check fails exact integers decide, which takes longer. Vertices and facets that are given are
-    kept; those that are computed are rounded outward, by about 1e-12 of the size. A set that is
+    check fails exact integers decide, which takes longer. Given vertices and facets are kept;
+    computed ones are rounded outward, by about 1e-12 of the size. A set that is
     thinner than 7e-12, in units in which it is one wide along each axis, counts as flat: across it,
-    the exact set may stick out by as much. A set that sticks out by less than 1e-12 of its size
+    the exact set may be as thick as this. A set that sticks out by less than 1e-12 of its size
     from a half-space touches it.
 
     The arrays are stored in scaled coordinates y, x = `centre` + `scale` y, with powers of two,
@@ -73,8 +74,8 @@ class Polytope(PolytopeArrays, ConvexSet):
     An unbounded set is the sum of the hull of its `vertices`, of the cone of its `directions` and
     of the span of its `lines`; one that contains lines has points of its smallest faces in the
     place of vertices. It is stored and computed in exact integers (`exact`), which takes longer; a
-    result that is bounded is rounded to nearest. What is infinite is inf; what does not exist, such
-    as a centroid, raises an UnboundedPolytopeError.
+    result that is bounded is rounded to nearest. Infinite results are inf; results that do not
+    exist, such as a centroid, raise an UnboundedPolytopeError.
 
     Operations on the empty set give the empty set; points such as its centroid do not exist
     (EmptyPolytopeError). All arguments are checked: numbers are finite (TypeError if they are not
@@ -85,7 +86,7 @@ class Polytope(PolytopeArrays, ConvexSet):
     Operators: `P & Q` (intersection), `P + Q` (Minkowski sum), `P + vector` (translation), `A @ P`
     (linear map), `2 * P`, `-P`, `point in P`, `P <= Q` (subset, to rounding); `ConvexSet` defines
     them by the methods of these names. `P == Q` compares objects; `equals` compares sets. The
-    vertices are in no order; `plot` and `to_shapely` order those of a set of the plane.
+    vertices are not ordered; `plot` and `to_shapely` order the vertices of a set of the plane.
     """
 
     def polytope(self) -> Polytope:
@@ -108,6 +109,11 @@ class Polytope(PolytopeArrays, ConvexSet):
         )
 
     @classmethod
+    def _of_exact(cls, found: polyhedron.Polyhedron) -> Polytope:
+        """Return a set that was computed in exact integers."""
+        return cls._of(construction.of_polyhedron(found))
+
+    @classmethod
     def empty(cls, space: int) -> Polytope:
         """Return the empty set of R^n, n = `space`."""
         COUNT.need("space", space)
@@ -115,17 +121,15 @@ class Polytope(PolytopeArrays, ConvexSet):
 
     @classmethod
     def from_vertices(cls, points: ArrayLike, flat: float = SNAP) -> Polytope:
-        """Return the convex hull of `points`, shape (m, n), at least one. Its vertices are points,
-        bit for bit.
+        """Return the convex hull of `points`, shape (m, n), at least one.
 
-        `flat` is the relative thickness below which a set counts as flat: greater for points that
-        are known to fewer digits. The facets are the rays of a double description: O(m f) for f
-        facets in the plane, O(m f^2) at worst.
+        Its vertices are points, bit for bit. `flat` is the relative thickness below which a set
+        counts as flat: greater for points that are known to fewer digits. The facets are the rays
+        of a double description: O(m f) for f facets in the plane, O(m f^2) at worst.
         """
-        array = finite_values(
-            "points", points, "m", "n"
-        ).copy()  # in the order for which kernels are compiled
-        return cls._of(construction.hull_of(array, flat))
+        # A copy has the order of entries for which kernels are compiled.
+        array = finite_values("points", points, "m", "n").copy()
+        return cls._of(hull_of(array, flat))
 
     @classmethod
     def from_constraints(
@@ -135,11 +139,10 @@ class Polytope(PolytopeArrays, ConvexSet):
         across: ArrayLike | None = None,
         levels: ArrayLike = (),
     ) -> Polytope:
-        """Return {x: normals x <= offsets, across x = levels}, with the shapes (m, n), (m,), (k, n)
-        and (k,).
+        """Return {x: normals x <= offsets, across x = levels}.
 
-        It may be empty or unbounded. Infinite offsets are no limit. One step of the double
-        description for each row.
+        The shapes are (m, n), (m,), (k, n) and (k,). The set may be empty or unbounded. Rows with
+        infinite offsets are left out. One step of the double description for each row.
         """
         rows, limits = constraint_values(("normals", "offsets"), normals, offsets, "k", "n")
         if across is not None:
@@ -175,11 +178,10 @@ class Polytope(PolytopeArrays, ConvexSet):
     def from_rays(
         cls, points: ArrayLike, directions: ArrayLike = (), lines: ArrayLike = ()
     ) -> Polytope:
-        """Return the hull of `points` and of the rays from them along `directions`, and along both
-        ends of `lines`.
+        """Return the hull of `points` and of the rays from them along `directions` and `lines`.
 
-        The shapes are (m, n), m at least 1, (k, n) and (l, n). Without directions and lines it is
-        `from_vertices`.
+        A line is a ray in both of its directions. The shapes are (m, n), m at least 1, (k, n) and
+        (l, n). Without directions and lines it is `from_vertices`.
         """
         array = finite_values("points", points, "m", "n")
         space = array.shape[1]
@@ -187,13 +189,14 @@ class Polytope(PolytopeArrays, ConvexSet):
         both = polyhedron.as_directions(finite_values("lines", lines, "k", space))
         if not far and not both:
             return cls.from_vertices(array)
-        found = polyhedron.of_generators(space, polyhedron.as_points(array), far, both)
-        return cls._of(construction.of_polyhedron(found))
+        rows = polyhedron.as_points(array)
+        return cls._of_exact(polyhedron.of_generators(space, rows, far, both))
 
     @classmethod
     def from_box(cls, lower: ArrayLike, upper: ArrayLike) -> Polytope:
-        """Return {x: lower <= x <= upper} for bounds of shape (n,); flat along axes whose bounds
-        are equal. Exact.
+        """Return {x: lower <= x <= upper} for bounds of shape (n,). Exact.
+
+        It is flat along axes whose bounds are equal.
         """
         minimum, most = box_ends(lower, upper, "n")
         return cls._of(construction.box(minimum, most))
@@ -209,28 +212,30 @@ class Polytope(PolytopeArrays, ConvexSet):
         """
         middle = finite_values("centre", centre, "n")
         size = float(radius_values(radius))
-        rows = np.array(
-            [row for row in itertools.product((-1.0, 0.0, 1.0), repeat=len(middle)) if any(row)]
-        )
-        rows /= np.linalg.norm(rows, axis=1)[:, None]
-        if outer and size > ON * np.abs(middle).max():  # rounding of the coordinates is smaller
-            ends = middle - size, middle + size
-            return cls._of(
-                construction.of_half_spaces(rows, np.full(len(rows), size), middle, ends)
-            )
-        return cls.from_vertices(middle + size * rows)
+        ratios = itertools.product((-1.0, 0.0, 1.0), repeat=len(middle))
+        directions = np.array([row for row in ratios if any(row)])
+        directions /= np.linalg.norm(directions, axis=1)[:, None]
+
+        # A ball that is smaller than the rounding of its coordinates has no facets.
+        if not outer or size <= ON * np.abs(middle).max():
+            return cls.from_vertices(middle + size * directions)
+        limits = np.full(len(directions), size)
+        ends = middle - size, middle + size
+        return cls._of(construction.of_half_spaces(directions, limits, middle, ends))
 
     @classmethod
     def from_shapely(cls, geometry: BaseGeometry) -> Polytope:
-        """Return a convex shapely Point, LineString or Polygon as a set of R^2; see
-        `ConvexPolygons.from_shapely`.
+        """Return a convex shapely Point, LineString or Polygon as a set of R^2.
+
+        See `ConvexPolygons.from_shapely`.
         """
         ring = conversion.ring_of_geometry(geometry)
         return cls.from_vertices(ring) if len(ring) else cls.empty(2)
 
     def to_shapely(self) -> BaseGeometry:
-        """Return a set of R^2 as a shapely Point, LineString or Polygon; the empty set is an empty
-        Polygon.
+        """Return a set of R^2 as a shapely Point, LineString or Polygon.
+
+        The empty set is an empty Polygon.
         """
         return conversion.geometry_of_ring(self._polygon())
 
@@ -244,8 +249,7 @@ class Polytope(PolytopeArrays, ConvexSet):
 
     @classmethod
     def from_zonotope(cls, zonotope: ZonotopeArrays) -> Polytope:
-        """Return a `Zonotope` as a polytope, which contains it and exceeds it by about 1e-12 of its
-        size.
+        """Return a `Zonotope` as a polytope that contains it, larger by about 1e-12 of its size.
 
         Parallel generators are summed first. In up to three dimensions of the affine hull, all
         facets and vertices of the g generators follow from signs of determinants: O(g^2) facets,
@@ -257,30 +261,28 @@ class Polytope(PolytopeArrays, ConvexSet):
         return found
 
     def affine_map(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> Polytope:
-        """Return {matrix x + offset}, with a matrix of shape (m, n), singular or not, and an offset
-        of shape (m,) or 0.
+        """Return {matrix x + offset}.
 
-        Vertices are rounded once. Under a regular matrix facets and incidence are mapped; otherwise
-        it is a hull, which may take long.
+        The matrix, singular or not, has the shape (m, n), and the offset (m,), or it is 0. Vertices
+        are rounded once. Under a regular matrix facets and incidence are mapped; otherwise it is a
+        hull, which may take long.
         """
-        rows = finite_values(
-            "matrix", matrix, "m", self.space
-        ).copy()  # kernels are compiled once, for such arrays
+        # Copies have the order of entries for which kernels are compiled.
+        rows = finite_values("matrix", matrix, "m", self.space).copy()
         moved = offset_values(offset, len(rows)).copy()
         if self.is_empty:
             return self.empty(len(rows))
         if self.exact is not None:
-            mapped = polyhedron.image(
-                self.exact, cone.rationals(rows), cone.rationals(moved[None])[0]
-            )
-            return self._of(construction.of_polyhedron(mapped))
+            (shift,) = cone.rationals(moved[None])
+            return self._of_exact(polyhedron.image(self.exact, cone.rationals(rows), shift))
+
         points, facets, centre, scale, errors = image(
             self.points, self.facets, self.centre, self.scale, rows, moved
         )
-        mapped_set = replace(self, points=points, facets=facets, centre=centre, scale=scale)
         if self.dimension < self.space or not len(facets):
-            return self._of(construction.enlarged(construction.hull(points, centre, scale), errors))
-        return self._of(construction.enlarged(mapped_set, errors))
+            return self._of(construction.enlarged(hull(points, centre, scale), errors))
+        mapped = replace(self, points=points, facets=facets, centre=centre, scale=scale)
+        return self._of(construction.enlarged(mapped, errors))
 
     def preimage(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> Polytope:
         """Return {x in R^m: matrix x + offset in the set}, with a matrix of shape (n, m).
@@ -294,6 +296,7 @@ class Polytope(PolytopeArrays, ConvexSet):
             return self.empty(factor.shape[1])
         if self.exact is not None or _has_null_space(factor):
             return self._exact_preimage(factor, moved)
+
         rows, limits = half_spaces(self, moved)
         mapped, rounded = affine_image(
             rows, np.ascontiguousarray(factor.T), np.zeros(factor.shape[1])
@@ -313,28 +316,29 @@ class Polytope(PolytopeArrays, ConvexSet):
         Facets and equations are rounded: where they leave nothing, they are relaxed by the rounding
         of n + 2 operations.
         """
-        factor, (shift,) = cone.rationals(matrix), cone.rationals(offset[None])
+        factor = cone.rationals(matrix)
+        (shift,) = cone.rationals(offset[None])
         found = polyhedron.preimage(self._polyhedron.half_spaces, factor, shift)
-        if not found.points and self.exact is None:
-            rows, limits = half_spaces(self, offset)
-            terms = np.abs(rows) @ (
-                np.abs(self.vertices).max(axis=0) + np.abs(offset) + np.abs(self.centre)
-            )
-            relaxed = polyhedron.as_half_spaces(rows, limits + (self.space + 2) * UNSURE * terms)
-            found = polyhedron.preimage(relaxed, factor, [Fraction(0)] * self.space)
-        return self._of(construction.of_polyhedron(found))
+        if found.points or self.exact is not None:
+            return self._of_exact(found)
+
+        rows, limits = half_spaces(self, offset)
+        sizes = np.abs(self.vertices).max(axis=0) + np.abs(offset) + np.abs(self.centre)
+        rounding = (self.space + 2) * UNSURE * (np.abs(rows) @ sizes)
+        relaxed = polyhedron.as_half_spaces(rows, limits + rounding)
+        return self._of_exact(polyhedron.preimage(relaxed, factor, [Fraction(0)] * self.space))
 
     def minkowski_sum(self, other: ConvexSet) -> Polytope:
-        """Return {x + y: x in the set, y in the other}, the hull of all v1 v2 sums of two
-        vertices.
-        """
+        """Return {x + y: x in the set, y in the other}: the hull of all sums of two vertices."""
         two = self._need_other(other)
-        if self.is_empty or two.is_empty:
-            return self if self.is_empty else two
+        if self.is_empty:
+            return self
+        if two.is_empty:
+            return two
         if self._any_is_unbounded(two):
-            return self._of(
-                construction.of_polyhedron(polyhedron.total(self._polyhedron, two._polyhedron))
-            )
+            return self._of_exact(polyhedron.total(self._polyhedron, two._polyhedron))
+
+        # The image of the product of both sets, of which only the vertices are needed.
         pairs = [
             np.repeat(self.points, len(two.points), axis=0),
             np.tile(two.points, (len(self.points), 1)),
@@ -356,37 +360,32 @@ class Polytope(PolytopeArrays, ConvexSet):
             return self
         if self.dimension < self.space or self.exact is not None:
             return self.minkowski_sum(self.from_vertices([-along, along]))
+
         points, facets, incidence, errors = swept(
             self.points, self.facets, self.incidence, along / self.scale
         )
-        rough = construction.enlarged(
-            replace(self, points=points, facets=facets, incidence=incidence), errors
-        )
-        found = construction.settled(rough, len(facets))
+        rough = replace(self, points=points, facets=facets, incidence=incidence)
+        found = construction.settled(construction.enlarged(rough, errors), len(facets))
         if found is None:
-            return self._of(
-                construction.enlarged(construction.hull(points, self.centre, self.scale), errors)
-            )
+            convex = hull(points, self.centre, self.scale)
+            return self._of(construction.enlarged(convex, errors))
         whole = self._of(found)
         return whole if np.abs(points).max() < _WIDE else whole.affine_map(np.eye(self.space))
 
     def enlarged(self, by: ArrayLike) -> Polytope:
-        """Return a set that contains {x + e: |e_i| <= by_i}, shape (n,): each facet moves outward
-        by as much.
+        """Return a set that contains {x + e: |e_i| <= by_i}, with `by` of shape (n,).
 
-        A flat set becomes 3e-8 of its coordinates thick. O((v + f) n) for a set with an interior.
+        Each facet moves outward. A flat set becomes 3e-8 of its coordinates thick. O((v + f) n) for
+        a set with an interior.
         """
         margin = finite_values("by", by, self.space)
         not_negative("by", float(margin.min()))
         if self.is_empty or not margin.any():
             return self
         if self.exact is not None:
-            outward = polyhedron.moved_outward(
-                self.exact.half_spaces, cone.rationals(margin[None])[0]
-            )
-            return self._of(
-                construction.of_polyhedron(polyhedron.of_half_spaces(self.space, outward))
-            )
+            (distances,) = cone.rationals(margin[None])
+            outward = polyhedron.moved_outward(self.exact.half_spaces, distances)
+            return self._of_exact(polyhedron.of_half_spaces(self.space, outward))
         solid = self if self.dimension == self.space else self._layer(margin)
         return self._of(construction.enlarged(solid, margin / solid.scale))
 
@@ -403,20 +402,17 @@ class Polytope(PolytopeArrays, ConvexSet):
         ends = np.vstack([self.equations, -self.equations])
         ends[:, -1] += np.tile(heights, 2)
 
-        open_set = replace(
-            self, facets=np.vstack([self.facets, ends]), equations=self.equations[:0]
-        )
-        sides, limits = half_spaces(open_set, self.centre)
+        facets = np.vstack([self.facets, ends])
+        solid = replace(self, facets=facets, equations=self.equations[:0])
+        sides, limits = half_spaces(solid, self.centre)
         lower, upper = self.bounding_box()
-        return self._of(
-            construction.of_half_spaces(sides, limits, self.centre, (lower - sizes, upper + sizes))
-        )
+        box = lower - sizes, upper + sizes
+        return self._of(construction.of_half_spaces(sides, limits, self.centre, box))
 
     def minkowski_difference(self, other: ConvexSet) -> Polytope:
-        """Return the Pontryagin difference {x: x + y in the set for all y in the other}: each facet
-        moves inward.
+        """Return the Pontryagin difference {x: x + y in the set for all y in the other}.
 
-        If the difference is flat, rounding decides whether it is empty.
+        Each facet moves inward. If the difference is flat, rounding decides whether it is empty.
 
         Raises
         ------
@@ -432,9 +428,8 @@ class Polytope(PolytopeArrays, ConvexSet):
             inward = polyhedron.moved_inward(self._polyhedron.half_spaces, two._polyhedron)
             if inward is None:
                 return self.empty(self.space)
-            return self._of(
-                construction.of_polyhedron(polyhedron.of_half_spaces(self.space, inward))
-            )
+            return self._of_exact(polyhedron.of_half_spaces(self.space, inward))
+
         rows, limits = half_spaces(self, self.centre)
         if self.dimension < self.space:
             # The difference plus a point of the other set is a part of this one: it cannot leave
@@ -442,6 +437,7 @@ class Polytope(PolytopeArrays, ConvexSet):
             start = two.vertices[0]
             less = _less(limits, supports(two.vertices - start, rows))
             return self._of(construction.cut(self, rows, less, self.centre)).translate(-start)
+
         less = _less(limits, supports(two.vertices, rows))
         lower, upper = np.array(self.bounding_box()) - two.bounding_box()
         ends = lower, np.maximum(lower, upper)
@@ -449,19 +445,20 @@ class Polytope(PolytopeArrays, ConvexSet):
         return self._of(construction.of_half_spaces(rows, less, self.centre, ends, sizes))
 
     def intersection(self, *others: ConvexSet) -> Polytope:
-        """Return the intersection with one or more polytopes: one step of the double description
-        for each facet.
+        """Return the intersection with one or more polytopes.
 
-        If one of them is unbounded, it is computed with integers.
+        One step of the double description for each facet of all sets but one
+        (`construction.cut`). If a set is unbounded, integers compute the intersection.
         """
         every = (self, *map(self._need_other, others))
         if self._any_is_unbounded(*every):
             if any(one.is_empty for one in every):
                 return self.empty(self.space)
             rows = [row for one in every for row in one._polyhedron.half_spaces]
-            return self._of(construction.of_polyhedron(polyhedron.of_half_spaces(self.space, rows)))
-        # A flat set first: cuts of it stay in its affine hull. Then one with many facets: those are
-        # not inserted again.
+            return self._of_exact(polyhedron.of_half_spaces(self.space, rows))
+
+        # Start from a flat set: its cuts stay in its affine hull. Of several sets, start from the
+        # one with most facets: these are not inserted again.
         sets = sorted(every, key=lambda one: (one.dimension, -len(one.facets)))
         found = sets[0]
         for one in sets[1:]:
@@ -472,34 +469,37 @@ class Polytope(PolytopeArrays, ConvexSet):
     def _cut_by(self, other: Polytope) -> Polytope:
         """Return the intersection with another bounded set.
 
-        One that is much smaller than this set is computed from all half-spaces together, in its own
-        coordinates. `cut` asks the same of its result: boxes that overlap do not show how small it
-        is.
+        If the bounding boxes show that it is much smaller than this set, it is computed from all
+        half-spaces together, in its own coordinates. `construction.cut` does the same if only the
+        result shows this.
         """
+        rows, limits = half_spaces(other, other.centre)
         ends = np.array([self.bounding_box(), other.bounding_box()])
         lower = ends[:, 0].max(axis=0)
         upper = ends[:, 1].min(axis=0)
-        rows, limits = half_spaces(other, other.centre)
         is_small = construction.FINE * (upper - lower) < np.ptp(self.vertices, axis=0)
         if is_small.any() and (lower <= upper).all():
             own, own_limits = half_spaces(self, other.centre)
-            every = np.vstack([own, rows]), np.append(own_limits, limits)
-            found = construction.of_half_spaces(*every, other.centre, (lower, upper))
-            # If it is flatter than this set, rounding may decide that: a cut keeps what touches.
+            all_rows = np.vstack([own, rows])
+            all_limits = np.append(own_limits, limits)
+            found = construction.of_half_spaces(all_rows, all_limits, other.centre, (lower, upper))
+            # If it is flatter than this set, rounding may decide this: a cut keeps sets that touch.
             if len(found.equations) == len(self.equations):
                 return self._of(found)
         return self._of(construction.cut(self, rows, limits, other.centre))
 
     def convex_hull(self, *others: ConvexSet) -> Polytope:
-        """Return the convex hull of the union with one or more polytopes; its closure if one is
-        unbounded.
+        """Return the convex hull of the union with one or more polytopes.
+
+        If a set is unbounded, it is the closure of the hull.
         """
-        sets = [one for one in (self, *map(self._need_other, others)) if not one.is_empty]
+        every = (self, *map(self._need_other, others))
+        sets = [one for one in every if not one.is_empty]
+        if not sets:
+            return self
         if self._any_is_unbounded(*sets):
-            return self._of(
-                construction.of_polyhedron(polyhedron.hull([one._polyhedron for one in sets]))
-            )
-        return self.from_vertices(np.vstack([one.vertices for one in sets])) if sets else self
+            return self._of_exact(polyhedron.hull([one._polyhedron for one in sets]))
+        return self.from_vertices(np.vstack([one.vertices for one in sets]))
 
     def cut(
         self,
@@ -509,21 +509,23 @@ class Polytope(PolytopeArrays, ConvexSet):
         *,
         slack_ulp: float = 0.0,
     ) -> Polytope:
-        """Return the part in one or more strips lower <= normals x <= upper, or the set itself if
-        they contain it.
+        """Return the part in one or more strips lower <= normals x <= upper.
 
-        `normals`, shape (n,) or (m, n), have any length. The bounds have the shape () or (m,);
-        infinite ones give half-spaces. Each strip is wider on both sides by `slack_ulp` ulp of the
-        products in normals x: a point that satisfies the bounds up to rounding is not lost.
+        It is the set itself if they contain it. `normals`, shape (n,) or (m, n), have any length.
+        The bounds have the shape () or (m,); infinite bounds give half-spaces. Each strip is wider
+        on both sides by `slack_ulp` ulp of the products in normals x: a point that satisfies the
+        bounds up to rounding is not lost.
         """
-        rows = real_values("normals", normals)
-        rows = np.atleast_2d(finite_values("normals", rows, *["m"] * (rows.ndim > 1), self.space))
+        given = real_values("normals", normals)
+        shape: tuple[str | int, ...] = ("m", self.space) if given.ndim > 1 else (self.space,)
+        rows = np.atleast_2d(finite_values("normals", given, *shape))
         minimum = bound_values("lower", lower, (), (len(rows),))
         most = bound_values("upper", upper, (), (len(rows),))
         sizes = np.abs(self.vertices).max(axis=0, initial=0.0)
         wider = not_negative("slack_ulp", slack_ulp) * EPS * (np.abs(rows) @ sizes)
         if self.is_empty:
             return self
+
         rows = np.vstack([rows, -rows])
         limits = np.concatenate([most + wider, wider - minimum])
         if np.isneginf(limits).any() or (minimum > most + 2.0 * wider).any():
@@ -532,42 +534,37 @@ class Polytope(PolytopeArrays, ConvexSet):
         limits = limits[limits < np.inf]
         if self.exact is not None:
             sides = [*self.exact.half_spaces, *polyhedron.as_half_spaces(rows, limits)]
-            return self._of(
-                construction.of_polyhedron(polyhedron.of_half_spaces(self.space, sides))
-            )
+            return self._of_exact(polyhedron.of_half_spaces(self.space, sides))
         return self._of(construction.cut(self, rows, limits))
 
     def project(self, axes: ArrayLike) -> Polytope:
-        """Return the projection on `axes`, an integer or a sequence of integers, as a set of as
-        many dimensions.
-        """
+        """Return the projection on `axes`, an integer or k integers, as a set of R^k."""
         return self.affine_map(np.eye(self.space)[axis_numbers(axes, self.space, self.space)])
 
     def slice(self, axes: ArrayLike, values: ArrayLike) -> Polytope:
-        """Return the set of the other coordinates where the coordinates `axes`, not all, have some
-        `values`.
+        """Return the other coordinates of the points whose coordinates `axes` have some `values`.
 
-        `values` is a number, or an array with one for each of the axes.
+        `axes` are not all axes. `values` is a number, or an array with a number for each axis.
         """
         numbers = axis_numbers(axes, self.space, self.space - 1)
-        fixed = finite_values("values", values, *[len(numbers)] * min(np.ndim(values), 1))
-        return self.cut(np.eye(self.space)[numbers], fixed, fixed).project(
-            np.delete(np.arange(self.space), numbers)
-        )
+        shape = (len(numbers),) if np.ndim(values) else ()
+        fixed = finite_values("values", values, *shape)
+        part = self.cut(np.eye(self.space)[numbers], fixed, fixed)
+        return part.project(np.delete(np.arange(self.space), numbers))
 
     def reduce_outward(self, cap: int, max_vertices: int = 10**9) -> Polytope:
-        """Return a polytope with at most `cap` (>= 2n) facets, and `max_vertices` (>= 2^n), that
-        contains the set.
+        """Return a polytope with few facets and vertices that contains the set.
 
-        It starts with the bounding box. Then it is cut by the facet with the greatest excess,
-        relative to the width of the set along its normal, until it has `cap` facets. A flat set
-        becomes 3e-8 of its coordinates thick.
+        It has at most `cap` (>= 2n) facets and `max_vertices` (>= 2^n) vertices. It starts with the
+        bounding box. Then it is cut by the facet with the greatest excess, relative to the width of
+        the set along its normal, until it has `cap` facets. A flat set becomes 3e-8 of its
+        coordinates thick.
         """
         Limits(minimum=2 * self.space, whole=True).need("cap", cap)
         self.bounded()
-        if self.is_empty or (
-            len(self.facets) + 2 * len(self.equations) <= cap and len(self.points) <= max_vertices
-        ):
+        sides = len(self.facets) + 2 * len(self.equations)
+        is_small = sides <= cap and len(self.points) <= max_vertices
+        if self.is_empty or is_small:
             return self
         solid = self if self.dimension == self.space else self._layer(np.zeros(self.space))
         return self._of(reduced_outward(solid, cap, max_vertices))
@@ -580,9 +577,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         return polytope
 
     def _any_is_unbounded(self, *others: Polytope) -> bool:
-        """Whether an operation on some sets is computed in exact integers: one of them is
-        unbounded.
-        """
+        """Whether this set or another one is unbounded: their operation is computed in integers."""
         return not all(one.is_bounded for one in (self, *others))
 
     @cached_property
@@ -590,39 +585,36 @@ class Polytope(PolytopeArrays, ConvexSet):
         """The set in integers; of a bounded one, its vertices and facets as they are stored."""
         if self.exact is not None:
             return self.exact
-        centre, scale = (cone.rationals(each[None])[0] for each in (self.centre, self.scale))
+        (centre,) = cone.rationals(self.centre[None])
+        (scale,) = cone.rationals(self.scale[None])
         points = []
         for point in cone.rationals(self.points):
-            moved = [
-                middle + unit * entry
-                for middle, unit, entry in zip(centre, scale, point, strict=True)
-            ]
+            axes = zip(centre, scale, point, strict=True)
+            moved = [middle + unit * entry for middle, unit, entry in axes]
             points.append(cone.whole([*moved, Fraction(1)]))
-        tables = []
-        for rows in (self.facets, self.equations):
+
+        def unscaled(rows: Floats) -> tuple[cone.Row, ...]:
+            """Return rows (a, b), a . y <= b, for x = centre + scale y."""
             table = []
             for row in cone.rationals(rows):
                 normal = [entry / unit for entry, unit in zip(row[:-1], scale, strict=True)]
-                shift = sum(
-                    (entry * middle for entry, middle in zip(normal, centre, strict=True)),
-                    Fraction(0),
-                )
-                table.append(cone.whole([*normal, row[-1] + shift]))
-            tables.append(tuple(table))
-        return polyhedron.Polyhedron(self.space, tuple(points), (), (), *tables)
+                products = (a * middle for a, middle in zip(normal, centre, strict=True))
+                table.append(cone.whole([*normal, row[-1] + sum(products, Fraction(0))]))
+            return tuple(table)
+
+        facets = unscaled(self.facets)
+        equations = unscaled(self.equations)
+        return polyhedron.Polyhedron(self.space, tuple(points), (), (), facets, equations)
 
     def recession(self) -> Polytope:
-        """Return the cone of the directions in which the set is unbounded: the origin if it is
-        bounded.
-        """
-        return self._of(construction.of_polyhedron(polyhedron.recession(self.needed()._polyhedron)))
+        """Return the cone of the directions in which the set is unbounded, {0} if it is bounded."""
+        return self._of_exact(polyhedron.recession(self.needed()._polyhedron))
 
     def support_function(self, directions: ArrayLike) -> Floats:
-        """Return max direction . x, shape (...), for `directions`, shape (..., n); -inf for the
-        empty set. O(v n).
+        """Return max direction . x, shape (...), for `directions`, shape (..., n). O(v n).
 
-        It is inf where the set is unbounded. A product of two directions that is zero to rounding
-        counts as zero.
+        It is -inf for the empty set, and inf where the set is unbounded. A product of two
+        directions that is zero to rounding counts as zero.
         """
         rows = finite_values("directions", directions, "...", self.space)
         heights = np.asarray((rows @ self.vertices.T).max(axis=-1, initial=-np.inf))
@@ -631,9 +623,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         return heights
 
     def _rises(self, rows: Floats) -> Flags:
-        """Whether the set is unbounded along `rows`, shape (..., n), beyond the rounding of scalar
-        products.
-        """
+        """Whether the set is unbounded along `rows`, shape (..., n), to rounding of products."""
         along = np.vstack([self.directions, self.lines, -self.lines])
         rounding = 2.0 * (self.space + 2) * EPS * (np.abs(rows) @ np.abs(along).T)
         return np.asarray((rows @ along.T > rounding).any(axis=-1))
@@ -647,44 +637,42 @@ class Polytope(PolytopeArrays, ConvexSet):
 
     @cached_property
     def _outer_rows(self) -> tuple[Floats, Floats]:
-        """The rows of `constraints`, with offsets that no vertex exceeds because of the rounding of
-        these rows.
-        """
+        """The rows of `constraints`, with offsets that no vertex exceeds by their rounding."""
         rows, limits = self.constraints()
-        # Points within a few tolerances of the double description count as in the affine hull.
+        # Points within the thickness of a flat set count as in its affine hull.
         near = SNAP * (np.abs(rows) @ np.abs(self.vertices).max(axis=0))
         near[: len(self.facets)] = 0.0
         return rows, np.maximum(limits, self.support_function(rows)) + near
 
     def margin(self, points: ArrayLike) -> Floats:
-        """Return the minimum distance of `points`, shape (..., n), from the facets, positive
-        inside, shape (...).
+        """Return the minimum distance of `points`, shape (..., n), from the facets, shape (...).
 
-        In a flat set it is at most minus the distance from the affine hull, in the empty set -inf.
-        It is not negative at the vertices: the rounding of a scalar product, and of the
-        representation (distances of vertices beyond facets), is added. Outside, -`margin` is at
-        most the `distance`.
+        It is positive inside. For a flat set it is at most minus the distance from the affine hull,
+        for the empty set -inf. It is not negative at the vertices: the rounding of a scalar
+        product, and of the representation (distances of vertices beyond facets), is added. Outside,
+        -`margin` is at most the `distance`.
         """
         x = finite_values("points", points, "...", self.space)
         if self.is_empty:
             return np.full(x.shape[:-1], -np.inf)
         rows, limits = self._outer_rows
-        rounding = (self.space + 2) * EPS * np.maximum(np.abs(x), np.abs(self.vertices).max(axis=0))
-        return np.asarray(
-            (limits + rounding @ np.abs(rows).T - x @ rows.T).min(axis=-1, initial=np.inf)
-        )
+        sizes = np.maximum(np.abs(x), np.abs(self.vertices).max(axis=0))
+        rounding = (self.space + 2) * EPS * sizes
+        distances = limits + rounding @ np.abs(rows).T - x @ rows.T
+        return np.asarray(distances.min(axis=-1, initial=np.inf))
 
     def contains(self, points: ArrayLike, tolerance: float = 0.0) -> Flags:
-        """Return whether `points`, shape (..., n), are in the set, to rounding or within a
-        `tolerance` (`margin`).
+        """Return whether `points`, shape (..., n), are in the set, to rounding.
+
+        Points within a `tolerance` of it (`margin`) count, too.
         """
         return np.asarray(self.margin(points) >= -not_negative("tolerance", tolerance))
 
     def is_subset(self, other: ConvexSet, tolerance: float = 0.0) -> bool:
-        """Return whether all vertices are in the other set, to rounding, or within a `tolerance` of
-        its facets.
+        """Return whether the set is in the other one, to rounding, or within a `tolerance` of it.
 
-        Of an unbounded set, also whether the other one is unbounded in the same directions.
+        All vertices must be in the other set, and this set must not be unbounded in a direction in
+        which the other one is bounded.
         """
         two = self._need_other(other)
         is_inside = bool(two.contains(self.vertices, tolerance).all())
@@ -694,63 +682,65 @@ class Polytope(PolytopeArrays, ConvexSet):
         return not self._rises(rows).any()
 
     def volume(self) -> float:
-        """Return the volume within the affine hull, of its dimension; 1 for a point, 0 for the
-        empty set.
-        """
+        """Return the volume within the affine hull; 1 for a point, 0 for the empty set."""
         if self.is_empty:
             return 0.0
         if self.exact is not None:
             return float("inf")
-        # Along each column of the triangle of `_steps` scaled coordinates are turned and stretched
-        # by its diagonal.
-        stretch = np.prod(np.abs(np.diag(triangle_of(self._steps)[0]))) if self.dimension else 1.0
-        return float(self._simplices[1].sum() * stretch / factorial(self.dimension))
+        if not self.dimension:
+            return 1.0
+        # The steps of d scaled coordinates span a parallelotope of this volume.
+        triangle, _ = triangle_of(self._steps)
+        stretch = np.prod(np.abs(np.diag(triangle)))
+        _, sizes = self._simplices
+        return float(sizes.sum() * stretch / factorial(self.dimension))
 
     @cached_property
     def _simplices(self) -> tuple[Integers, Floats]:
-        """Vertices of simplices that divide the set, shape (k, d + 1), and their determinants in d
-        coordinates.
+        """Vertices of simplices that divide the set, shape (k, d + 1), and their determinants.
+
+        The determinants are in d scaled coordinates.
         """
         if not self.dimension:
             return np.zeros((1, 1), np.int64), np.ones(1)
         corners = simplices_of(self.incidence.T, self.dimension)
-        inner = self.points[:, own_and_others(self.equations)[0]]
-        return corners, np.abs(np.linalg.det(inner[corners[:, 1:]] - inner[corners[:, :1]]))
+        own, _ = own_and_others(self.equations)
+        inner = self.points[:, own]
+        edges = inner[corners[:, 1:]] - inner[corners[:, :1]]
+        return corners, np.abs(np.linalg.det(edges))
 
     def area(self) -> float:
-        """Return the area of a set of R^2; 0 for a segment or a point. `volume` is for any
-        space.
+        """Return the area of a set of R^2; 0 for a segment or a point.
+
+        `volume` is for any space.
         """
         if self.exact is not None and self.space == 2:
             return float("inf") if self.dimension == self.space else 0.0
         return self.volume() if len(self._polygon()) > 2 else 0.0
 
     def centroid(self) -> Floats:
-        """Return the centroid within the affine hull, shape (n,), from a division into
-        simplices.
-        """
+        """Return the centroid within the affine hull, shape (n,), from a division in simplices."""
         corners, sizes = self.needed().bounded()._simplices
-        return np.asarray(
-            self.centre + self.scale * (sizes / sizes.sum() @ self.points[corners].mean(axis=1))
-        )
+        mean = sizes / sizes.sum() @ self.points[corners].mean(axis=1)
+        return np.asarray(self.centre + self.scale * mean)
 
     def sample(self, count: int, seed: int | np.random.Generator = 0) -> Floats:
-        """Return points distributed uniformly over the set, shape (count, n), from a division into
-        simplices.
+        """Return points distributed uniformly over the set, shape (count, n).
+
+        They are combinations of the vertices of simplices that divide the set.
         """
         random = np.random.default_rng(seed)
         corners, sizes = self.needed().bounded()._simplices
         weights = random.dirichlet(np.ones(corners.shape[1]), count)
         chosen = corners[random.choice(len(sizes), count, p=sizes / sizes.sum())]
-        return np.asarray(
-            self.centre + self.scale * np.einsum("ij,ijk->ik", weights, self.points[chosen])
-        )
+        inner = np.einsum("ij,ijk->ik", weights, self.points[chosen])
+        return np.asarray(self.centre + self.scale * inner)
 
     def chebyshev_centre(self) -> tuple[Floats, float]:
-        """Return the centre, shape (n,), and radius of a largest ball in the set, within its affine
-        hull (HiGHS).
+        """Return the centre, shape (n,), and radius of a largest ball within the affine hull.
 
-        An UnboundedPolytopeError is raised if the set has balls of any size.
+        It is found by a linear program (HiGHS). An UnboundedPolytopeError is raised if the set has
+        balls of any size.
         """
         middle = self.needed().vertices.mean(axis=0)
         if self.exact is not None and self.recession().dimension == self.dimension:
@@ -763,19 +753,19 @@ class Polytope(PolytopeArrays, ConvexSet):
         return middle + self._steps @ inner, max(0.0, radius)
 
     def diameter(self) -> float:
-        """Return the maximum distance between two vertices; 0 for the empty set, inf for an
-        unbounded one. O(v^2 n).
+        """Return the maximum distance between two points of the set. O(v^2 n).
+
+        It is 0 for the empty set and inf for an unbounded one.
         """
         if self.exact is not None:
             return float("inf")
         return float(cdist(self.vertices, self.vertices).max(initial=0.0))
 
     def closest_point(self, point: ArrayLike) -> Floats:
-        """Return the point of the set nearest to a `point`, both of shape (n,), within 1e-12 of the
-        size of the set.
+        """Return the point of the set nearest to a `point`, both of shape (n,).
 
-        Wolfe's algorithm: a least-squares problem of at most n + 1 points in each of a few steps.
-        The point may be far away: rounding is relative to the set and its coordinates.
+        It is exact to 1e-12 of the size of the set, also if the point is far away. Wolfe's
+        algorithm: a least-squares problem of at most n + 1 points in each of a few steps.
         """
         x = finite_values("point", point, self.space)
         if x in self:
@@ -785,8 +775,9 @@ class Polytope(PolytopeArrays, ConvexSet):
         return nearest_pair(self.needed().vertices, x[None]).point
 
     def distance(self, other: ConvexSet | ArrayLike) -> float:
-        """Return the distance from a set or point `other`, shape (n,); inf if one is empty. As
-        `closest_point`.
+        """Return the distance from a set or point `other`, shape (n,); inf if one is empty.
+
+        See `closest_point`.
         """
         if not isinstance(other, ConvexSet):
             other = self.from_vertices(finite_values("other", other, self.space)[None])
@@ -796,13 +787,11 @@ class Polytope(PolytopeArrays, ConvexSet):
         return float(np.linalg.norm(self._nearest_difference(two)))
 
     def _nearest_difference(self, other: Polytope) -> Floats:
-        """Return the difference x - y of nearest points x of this set and y of the other, shape
-        (n,).
-        """
+        """Return x - y, shape (n,), for nearest points x of this set and y of the other."""
         if not self._any_is_unbounded(other):
             return nearest_pair(self.vertices, other.vertices).difference
-        # The nearest difference is at most as long as the one of two points, so that it is in a box
-        # of this size.
+        # The nearest difference is at most as long as the difference of any two points: it is in a
+        # box of this size.
         differences = self + -other
         some = differences.vertices[0]
         size = float(np.ldexp(1.0, np.frexp(np.linalg.norm(some))[1]))
@@ -815,11 +804,10 @@ class Polytope(PolytopeArrays, ConvexSet):
         return self.is_empty or two.is_empty or self.separating_direction(two) is not None
 
     def separating_direction(self, other: ConvexSet) -> Floats | None:
-        """Return a witness that two sets are disjoint; None if they meet, to rounding, or one is
-        empty.
+        """Return a direction d, shape (n,), that proves that two sets are disjoint, or None.
 
-        It is a direction d, shape (n,), of unit length, with d . x < d . y for all x of this set
-        and y of the other.
+        It has unit length, and d . x < d . y for all x of this set and y of the other. It is None
+        if the sets meet, to rounding, or one is empty.
         """
         two = self._need_other(other)
         if self.is_empty or two.is_empty:
@@ -827,64 +815,57 @@ class Polytope(PolytopeArrays, ConvexSet):
         between = two._nearest_difference(self)
         length = float(np.linalg.norm(between))
         direction = np.asarray(between / (length or 1.0))
-        return (
-            direction
-            if self.support_function(direction) < -two.support_function(-direction)
-            else None
-        )
+        is_proof = self.support_function(direction) < -two.support_function(-direction)
+        return direction if is_proof else None
 
     def hausdorff_distance(self, other: ConvexSet) -> float:
-        """Return the Hausdorff distance; inf between an empty and a nonempty set. One `distance`
-        for each vertex.
+        """Return the Hausdorff distance: the maximum `distance` of a vertex from the other set.
 
-        It is inf if the sets are not unbounded in the same directions.
+        It is inf between an empty and a nonempty set, and if the sets are not unbounded in the same
+        directions.
         """
         two = self._need_other(other)
         have_points = not (self.is_empty or two.is_empty)
-        if (
-            have_points
-            and self._any_is_unbounded(two)
-            and not self.recession().equals(two.recession())
-        ):
+        are_unbounded = have_points and self._any_is_unbounded(two)
+        if are_unbounded and not self.recession().equals(two.recession()):
             return float("inf")
         from_this = [two.distance(vertex) for vertex in self.vertices]
         from_other = [self.distance(vertex) for vertex in two.vertices]
         return max(from_this + from_other, default=0.0)
 
     def plot(self, ax: Any = None, **style: Any) -> list[Any]:
-        """Draw a set of R^2 or R^3 on matplotlib axes, and return the artists: one, or none for the
-        empty set.
+        """Draw a set of R^2 or R^3 on matplotlib axes, and return the artists.
 
-        Without axes the present ones of pyplot are used, or new ones if these have not as many
-        dimensions as the set. `style` has the options of matplotlib's `fill` in the plane and
-        `Poly3DCollection` in space, and of `scatter` for a point. Facets in space are transparent.
-        Segments and thin sets are visible by their edges. Of an unbounded set the part within the
-        limits of the axes is drawn: set them before.
+        There is one artist, or none for the empty set. Without `ax` the present axes of pyplot are
+        used, or new axes if these do not have the dimensions of the set. `style` has the options of
+        matplotlib's `fill` in the plane and `Poly3DCollection` in space, and of `scatter` for a
+        point. Facets in space are transparent. Segments and thin sets are visible by their edges.
+        Of an unbounded set the part within the limits of the axes is drawn: set them before.
 
         Raises
         ------
         ValueError
-            If the set is in another space, or the axes have not as many dimensions.
+            If the set is in another space, or the axes do not have its dimensions.
         """
         if self.space in (2, 3) and not self.is_bounded:
             axes = axes_of(ax, self.space)
-            return (self & self.from_box(*limits_of(axes, self.space))).plot(axes, **style)
+            lower, upper = limits_of(axes, self.space)
+            return (self & self.from_box(lower, upper)).plot(axes, **style)
         if self.space == 2:
             return draw_polygons(ax, [self._polygon()], style)
         if self.space == 3:
             return draw_facets(ax, self._facet_rings(), style)
-        instead = (
-            "project it on two or three axes first"
-            if self.space > 3
-            else "it is the interval of bounding_box()"
-        )
+        instead = "it is the interval of bounding_box()"
+        if self.space > 3:
+            instead = "project it on two or three axes first"
         raise ValueError(
             f"sets of R^2 and R^3 are drawn, and this one is of R^{self.space}: {instead}"
         )
 
     def _facet_rings(self) -> list[Floats]:
-        """Return the vertices of each facet of a set of R^3 in their order around it; of a flat
-        set, all vertices.
+        """Return the vertices of each facet of a set of R^3 in their order around it.
+
+        All vertices of a flat set are one facet.
         """
         if self.is_empty:
             return []
@@ -902,10 +883,9 @@ def _less(limits: Floats, widths: Floats) -> Floats:
 
 
 def _has_null_space(matrix: Floats) -> bool:
-    """Whether matrix x = 0 has solutions other than zero, exactly decided; the matrix has the shape
-    (n, m).
-    """
+    """Whether matrix x = 0 has solutions other than zero, exactly decided."""
     units = dd.in_units(np.ascontiguousarray(matrix.T))
-    if len(dd.pivots(units, REDUCED, -1)[0]) == matrix.shape[1]:
+    chosen, _ = dd.pivots(units, REDUCED, -1)
+    if len(chosen) == matrix.shape[1]:
         return False
     return bool(cone.null_space(cone.rationals(matrix)))

@@ -18,16 +18,17 @@ _kernels = Kernels("contract", "nnan", "nsz")
 
 
 def reduced_outward(polytope: PolytopeArrays, cap: int, max_vertices: int) -> PolytopeArrays:
-    """Return a set that contains a polytope with an interior, with at most `cap` facets and
-    `max_vertices` vertices.
+    """Return a set that contains a polytope with an interior, with few facets and vertices.
 
-    It starts with the bounding box, so that all widths are exact, and is cut by the facet beyond
-    which it extends most, relative to the width along its normal.
+    It has at most `cap` facets and `max_vertices` vertices. It starts with the bounding box, so
+    that all widths are exact, and is cut by the facet beyond which it extends most, relative to the
+    width along its normal.
     """
     points, facets, incidence = _cut_by_worst(polytope.points, polytope.facets, cap, max_vertices)
     outer = replace(polytope, points=points, facets=facets, incidence=incidence)
     found = construction.settled(outer, 2 * polytope.space)
-    if found is None:  # with fewer facets it is right at last: a box is
+    if found is None:
+        # The check fails less often with fewer facets, and not for the box.
         return reduced_outward(polytope, cap // 2, max_vertices)
     return found
 
@@ -36,29 +37,26 @@ def reduced_outward(polytope: PolytopeArrays, cap: int, max_vertices: int) -> Po
 def _cut_by_worst(
     points: Floats, facets: Floats, cap: int, max_vertices: int
 ) -> tuple[Floats, Floats, Flags]:
-    """Return points, facets and incidence of a box around a set, cut to at most `cap` sides and so
-    many vertices.
+    """Return points, facets and incidence of a box around a set, cut by facets of the set.
 
-    The excess of a facet only decreases, so that one of an earlier round is an upper bound: only
-    the greatest one is computed again.
+    The result has at most `cap` facets and `max_vertices` vertices. The excess of a facet only
+    decreases, so that an excess of an earlier round is an upper bound: only the greatest one is
+    computed again.
     """
-    (f, n), number = (len(facets), points.shape[1]), 2 * points.shape[1]  # of sides
+    f = len(facets)
+    n = points.shape[1]
+    number = 2 * n
     sides = np.zeros((number + min(f, cap), n + 1))
-    row = np.empty(n + 1)
     rays = np.ones((2**n, n + 1))
     bits = np.zeros((2**n, len(sides) // 64 + 1), np.uint64)
-    for j in range(n):
-        sides[j, j], sides[j, n] = 1.0, points[:, j].max()
-        sides[n + j, j], sides[n + j, n] = -1.0, -points[:, j].min()
-        for k in range(2**n):
-            side = j + n * (k >> j & 1)
-            rays[k, j] = sides[side, j] * sides[side, n]
-            bits[k, 0] |= np.uint64(1) << np.uint64(side)
+    _write_box(points, sides, rays, bits)
+
     columns = np.ascontiguousarray(rays.T)
     turned = np.ascontiguousarray(-points.T)
     widths = np.array([max(facets[i, n] + _highest(turned, facets[i]), ON) for i in range(f)])
     excess = np.full(f, np.inf)
     round_of = np.zeros(f, np.int64)
+    row = np.empty(n + 1)
     while number < len(sides):
         worst = int(np.argmax(excess))
         facet = facets[worst]
@@ -68,18 +66,37 @@ def _cut_by_worst(
             continue
         if excess[worst] <= ON:
             break
-        row[:n], row[n] = -facet[:n], facet[n]
+
+        row[:n] = -facet[:n]
+        row[n] = facet[n]
         cut, cut_bits = dd.insert(rays, bits, row, number, n - 1, np.bool_(True))
-        if len(cut) > max_vertices or (
-            number >= cap and _count_sides(cut_bits, number + 1, n) > cap
-        ):
+        if len(cut) > max_vertices:
+            break
+        # A cut can make facets redundant, so that the cap may allow it.
+        if number >= cap and _count_sides(cut_bits, number + 1, n) > cap:
             break
         rays = cut
         bits = cut_bits
         columns = np.ascontiguousarray(cut.T)
-        sides[number], excess[worst] = facet, -np.inf
+        sides[number] = facet
+        excess[worst] = -np.inf
         number += 1
     return rays[:, :n].copy(), sides[:number], unpacked(bits, number)
+
+
+@_kernels.allocation_free
+def _write_box(points: Floats, sides: Floats, rays: Floats, bits: Bits) -> None:
+    """Write the 2 n sides of the bounding box of points, its vertices, and their bits."""
+    n = points.shape[1]
+    for j in range(n):
+        sides[j, j] = 1.0
+        sides[j, n] = points[:, j].max()
+        sides[n + j, j] = -1.0
+        sides[n + j, n] = -points[:, j].min()
+        for k in range(2**n):
+            side = j + n * (k >> j & 1)
+            rays[k, j] = sides[side, j] * sides[side, n]
+            bits[k, 0] |= np.uint64(1) << np.uint64(side)
 
 
 @_kernels.compiled
@@ -87,7 +104,8 @@ def _highest(columns: Floats, facet: Floats) -> float:
     """Return the maximum of a . y over the points y in columns."""
     heights = np.zeros(columns.shape[1])
     for j in range(len(columns)):
-        for k in range(len(heights)):  # several k at once
+        # In this order of the loops several points are added at once.
+        for k in range(len(heights)):
             heights[k] += facet[j] * columns[j, k]
     highest = -np.inf
     for height in heights:

@@ -1,5 +1,4 @@
-"""Scaled coordinates y of a set, x = centre + scale y, in which it is about one wide along each
-axis.
+"""Scaled coordinates y of a set, x = centre + scale y: the set is about one wide along each axis.
 
 The scales are powers of two, which round nothing; a centre is used only where the set is far from
 the origin.
@@ -20,8 +19,8 @@ from infoset.kernels import Kernels
 
 _kernels = Kernels()
 _FAR = 16.0
-"""Coordinates, in scales, from which a centre is used: nearer to the origin four digits more are
-lost at most.
+"""Coordinates, in scales, from which a centre is used: nearer to the origin at most four bits are
+lost.
 """
 
 
@@ -29,10 +28,10 @@ lost at most.
 def coordinates(
     lower: Floats, upper: Floats, minimum: Floats, share: float
 ) -> tuple[Floats, Floats]:
-    """Return a centre and scales, powers of two, for a set between two points, or as wide as
-    `minimum`, each (n,).
+    """Return a centre and scales, powers of two, each of shape (n,), for a set between two points.
 
-    A scale is at least a `share` of the coordinates. Differences from a centre far away are exact.
+    `minimum`, shape (n,), are minimum widths of the set. A scale is at least a `share` of the
+    coordinates. Differences from a centre far away are exact.
     """
     centre = np.zeros(len(lower))
     scale = np.empty(len(lower))
@@ -63,16 +62,23 @@ def exact_coordinates(box: Box) -> tuple[Floats, Floats]:
 
 def scaled_points(points: list[list[Fraction]], centre: Floats, scale: Floats) -> Floats:
     """Return exact points in scaled coordinates, shape (k, n), each number rounded once."""
-    frame = list(zip(centre.tolist(), scale.tolist(), strict=True))
+    middles = [Fraction(middle) for middle in centre.tolist()]
+    units = [Fraction(unit) for unit in scale.tolist()]
     scaled = []
     for point in points:
-        entries = zip(point, frame, strict=True)
-        scaled.append(
-            [float((x - Fraction(middle)) / Fraction(unit)) for x, (middle, unit) in entries]
-        )
+        axes = zip(point, middles, units, strict=True)
+        scaled.append([float((x - middle) / unit) for x, middle, unit in axes])
     return np.array(scaled)
 
 
 def moved_limits(rows: Floats, limits: Floats, shift: Floats) -> Floats:
-    """Return the limits of rows (x - shift) from those of rows x."""
-    return affine_image(shift[None], -rows, limits.copy())[0][0] if shift.any() else limits
+    """Return the limits of half-spaces rows (x - shift) <= limits for rows x <= `limits`."""
+    if not shift.any():
+        return limits
+    moved, _ = affine_image(shift[None], -rows, limits.copy())
+    return moved[0]
+
+
+def largest_coordinate(points: Floats) -> float:
+    """Return the maximum absolute coordinate of points, at least 1. Tolerances are relative."""
+    return max(1.0, float(np.abs(points).max()))

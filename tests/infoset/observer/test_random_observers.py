@@ -1,8 +1,9 @@
 """1 000 random observers of three and four states, 30 steps each, with the default bound on facets.
 
 The errors of all steps are at their bounds, which is the worst case for rounding. Witnesses are
-motions in exact rationals: those of linear programs, moved a little to one that is well inside, so
-that they satisfy all measurements. Their states must be in the sets, and in the smoothed sets.
+motions in exact rationals: motions of linear programs, moved a little to a motion that is well
+inside, so that they satisfy all measurements. Their states must be in the sets, and in the smoothed
+sets.
 """
 
 from __future__ import annotations
@@ -108,7 +109,7 @@ def beyond(polytope: Polytope, state: list[Fraction]) -> float:
 
 
 @pytest.mark.parametrize("first", range(0, 1000, BLOCK))
-def test_the_true_state_is_inside_at_every_step(first: int) -> None:
+def test_true_state_is_inside_at_every_step(first: int) -> None:
     for seed in range(first, first + BLOCK):
         system = System(seed)
         observer = system.observer()

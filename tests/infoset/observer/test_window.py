@@ -323,7 +323,7 @@ def test_contradiction_that_only_a_program_shows_is_located_with_its_excess() ->
     assert all(estimate.is_empty for estimate in observer.smooth(estimates))
 
 
-def test_contradiction_that_the_zonotope_shows_is_found_at_once() -> None:
+def test_contradiction_that_the_zonotope_shows_is_found_without_a_program() -> None:
     system = WideSystem.chain(8)
     observer = system.observer()
 

@@ -40,19 +40,22 @@ parallel ones.
 """
 MAX_LOSS = 1e-12
 """Distance of exact vertices from the hull of the computed ones, in the same widths."""
-OUTWARD, FLAT_ROUNDING = 0.0, 1e-13
+OUTWARD = 0.0
 """Distance of exact vertices beyond the computed facets, relative to the terms of normal . x."""
+FLAT_ROUNDING = 1e-13
+"""The same distance for flat sets, whose facets are rounded to nearest."""
 STEP = 1e-6
-"""Distance from a facet, relative to that of the centre, of points that are clearly inside or
-outside.
+"""Distance from a facet of points that are clearly inside or outside, relative to the distance of
+the centre.
 """
 POINTS = {3: 12, 4: 12, 5: 11, 6: 10}
 """Points of a set in each space."""
 
 
 class Exact:
-    """A bounded polyhedron of PPL, its vertices as rationals and its facets as floats; `widths` are
-    those of inputs.
+    """A bounded polyhedron of PPL, its vertices as rationals and its facets as floats.
+
+    `widths` are the widths of the given sets.
     """
 
     def __init__(self, polyhedron: Any, widths: Floats) -> None:
@@ -221,12 +224,9 @@ def points_of(kind: str, space: int, random: np.random.Generator) -> Floats:
 
 
 def pair_of(kind: str, points: Floats, random: np.random.Generator) -> Floats:
-    """Points of another set; for `touching`, one that has a vertex, an edge or more in common with
-    the first.
-    """
+    """Points of another set; if `touching`, a face of it, such as a vertex, is common to both."""
     if kind == "touching":
-        # The mirrored set at a support plane: what is common is the face in which the plane
-        # touches.
+        # The mirrored set at a support plane: the face in which the plane touches is common.
         axis = int(random.integers(points.shape[1]))
         other = points.copy()
         other[:, axis] = 2.0 * points[:, axis].max() - points[:, axis]
@@ -313,7 +313,7 @@ def checks(
         image = (np.array(rationals(points)) @ np.array(rationals(matrix)).T).tolist()
         yield name, partial(one.linear_map, matrix), partial(Exact.hull, image, reach)
 
-    # The preimage under a regular matrix, and that of an image under a tall one.
+    # The preimage under a regular matrix, and the preimage of an image under a tall one.
     def composed(of: Exact, matrix: Floats, reach: Floats) -> Exact:
         exact_rows = [
             [*(np.array(row[:-1]) @ np.array(rationals(matrix))).tolist(), row[-1]]

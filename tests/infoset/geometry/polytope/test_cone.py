@@ -1,6 +1,4 @@
-"""Extreme rays in integers against another exact library (PPL), and what they are of sets without
-vertices.
-"""
+"""Extreme rays in integers against another exact library (PPL), also of sets without vertices."""
 
 from __future__ import annotations
 
@@ -41,7 +39,7 @@ def rows_of(seed: int) -> tuple[Floats, Floats]:
 
 @needs_ppl
 @pytest.mark.parametrize("count", [60, pytest.param(1500, marks=pytest.mark.thorough)])
-def test_vertices_directions_and_lines_are_those_of_ppl(count: int) -> None:
+def test_vertices_directions_and_lines_equal_ppl(count: int) -> None:
     import ppl
 
     for seed in range(count):

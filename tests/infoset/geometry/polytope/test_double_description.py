@@ -1,6 +1,4 @@
-"""Cases that were wrong or refused before polytopes had one double description, and its
-invariants.
-"""
+"""Invariants of the double description, and sets that were wrong or refused before it was one."""
 
 from __future__ import annotations
 
@@ -14,14 +12,16 @@ from infoset.geometry.polytope.incidence import packed, unpacked
 def test_vertices_are_the_points_bit_for_bit() -> None:
     points = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     np.testing.assert_array_equal(Polytope.from_vertices(points).vertices, points)
+
+    # All points of a simplex are vertices.
     random = np.random.default_rng(0)
-    for far in (0.0, 1e3, 1e9):  # a simplex has all points as vertices
+    for far in (0.0, 1e3, 1e9):
         simplex = far + random.normal(size=(5, 4))
         np.testing.assert_array_equal(Polytope.from_vertices(simplex).vertices, simplex)
 
 
 @pytest.mark.parametrize("matrix", [[[1.0], [2.0]], [[0.3], [0.1]], [[1e-6], [1e6]]])
-def test_the_preimage_of_a_flat_set_under_a_tall_matrix_is_the_set(
+def test_preimage_of_a_flat_set_under_a_tall_matrix_is_the_set(
     matrix: list[list[float]],
 ) -> None:
     interval = Polytope.from_box([0.0], [1.0])
@@ -32,9 +32,8 @@ def test_the_preimage_of_a_flat_set_under_a_tall_matrix_is_the_set(
 @pytest.mark.parametrize(("points", "space"), [(14, 5), (14, 6)])
 def test_gaussian_polytopes_of_five_and_six_dimensions_intersect(points: int, space: int) -> None:
     random = np.random.default_rng([5, points, 0])
-    one, two = (
-        Polytope.from_vertices(random.normal(size=(points, space)) * size) for size in (1.0, 0.8)
-    )
+    one = Polytope.from_vertices(random.normal(size=(points, space)))
+    two = Polytope.from_vertices(random.normal(size=(points, space)) * 0.8)
     both = one & two
     assert space == 6 or len(both.vertices) == 516
     assert both.is_subset(one, 1e-12)
@@ -52,10 +51,8 @@ def test_sets_that_touch_in_a_vertex_meet_in_it() -> None:
 
 
 @pytest.mark.parametrize("space", [2, 3, 4, 5])
-def test_incidence_is_that_of_vertices_and_facets(space: int) -> None:
-    """A sum of segments, cut and mapped: vertices are on the facets that their bits name, to 1e-11,
-    and on no other.
-    """
+def test_incidence_agrees_with_vertices_and_facets(space: int) -> None:
+    """A sum of segments, cut and mapped: vertices are on the facets of their bits to 1e-11."""
     random = np.random.default_rng(space)
     one = Polytope.from_box(-np.ones(space), np.ones(space))
     for _ in range(3):
@@ -69,7 +66,7 @@ def test_incidence_is_that_of_vertices_and_facets(space: int) -> None:
     assert on.sum(axis=0).min() >= space
 
 
-def test_flags_are_packed() -> None:
+def test_flags_are_packed_and_unpacked() -> None:
     flags = np.random.default_rng(0).random((70, 130)) < 0.5
     np.testing.assert_array_equal(unpacked(packed(flags), 130), flags)
     np.testing.assert_array_equal(

@@ -59,7 +59,7 @@ def reached(matrix: Floats) -> tuple[Polytope, float]:
     return whole, 8.0 * sum(abs(float(np.linalg.det(np.array(triple)))) for triple in triples)
 
 
-def test_volume_and_centroid_of_a_sum_with_nearly_parallel_facets() -> None:
+def test_sum_with_nearly_parallel_facets_has_the_exact_volume_and_centroid() -> None:
     """Formerly 48.2321 and (0.08, 0.002, -0.01): one facet was two, each with some of its
     vertices.
     """
@@ -85,7 +85,7 @@ def edges_of(one: Polytope) -> list[tuple[int, int]]:
         pytest.param(tuple(range(1000)), marks=pytest.mark.thorough),
     ],
 )
-def test_volumes_of_sums_and_of_their_parts_are_those_of_determinants(
+def test_volumes_of_sums_and_of_their_parts_equal_sums_of_determinants(
     seeds: tuple[int, ...],
 ) -> None:
     """Formerly 14 of these 1000 sums, and 11 of their halves, had a wrong volume."""
@@ -121,7 +121,9 @@ def singular_case(seed: int) -> tuple[Floats, Floats, Floats]:
 
 @needs_ppl
 @pytest.mark.parametrize("count", [200, pytest.param(2800, marks=pytest.mark.thorough)])
-def test_preimage_under_a_singular_matrix_is_empty_or_unbounded_as_exactly(count: int) -> None:
+def test_preimage_under_a_singular_matrix_is_empty_or_unbounded_if_the_exact_one_is(
+    count: int,
+) -> None:
     """Formerly about 1 % of such preimages were called unbounded where they are empty, or the other
     way round.
     """
@@ -310,7 +312,7 @@ def test_set_without_an_end_along_one_axis_is_unbounded_along_it(width: float) -
 
 
 @pytest.mark.parametrize("upper", [-0.5, 0.5])
-def test_an_intersection_with_a_very_long_set_does_not_depend_on_the_order(upper: float) -> None:
+def test_intersection_with_a_very_long_set_does_not_depend_on_the_order(upper: float) -> None:
     """Its honest facets are 1e15 times shorter than others, and were taken for rounding: the result
     was empty.
     """
@@ -323,7 +325,7 @@ def test_an_intersection_with_a_very_long_set_does_not_depend_on_the_order(upper
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_a_thin_part_loses_only_the_dimension_in_which_it_is_flat(seed: int) -> None:
+def test_thin_part_loses_only_the_dimension_in_which_it_is_flat(seed: int) -> None:
     """A bar, 2e-10 thick along one axis and 3e-12 along the other: formerly both were flat."""
     turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
     bar = Polytope.from_box([-1.0] * 3, [1.0] * 3).cut(turn, [-0.5, 0.0, 0.0], [0.5, 2e-10, 3e-12])
@@ -335,7 +337,7 @@ def test_a_thin_part_loses_only_the_dimension_in_which_it_is_flat(seed: int) -> 
     assert bar.contains(corners, SNAP).all()
 
 
-def test_a_cut_of_a_small_flat_set_is_as_precise_as_the_set() -> None:
+def test_cut_of_a_small_flat_set_is_as_precise_as_the_set() -> None:
     """The coordinate that is zero has no width: an oblique half-space was compared with a width of
     one.
     """

@@ -1,6 +1,4 @@
-"""The proof that vertices and facets are all: it accepts polytopes, and nothing that was
-changed.
-"""
+"""The proof that no vertex or facet is missing accepts polytopes and refuses changed ones."""
 
 from __future__ import annotations
 
@@ -70,9 +68,7 @@ def test_vertices_and_facets_of_a_polytope_are_closed(name: str) -> None:
 
 @pytest.mark.parametrize("name", POLYTOPES)
 @pytest.mark.parametrize("by_facets", [False, True])
-def test_a_changed_bit_or_a_missing_or_doubled_vertex_is_refused(
-    name: str, by_facets: bool
-) -> None:
+def test_incidence_with_a_changed_bit_or_vertex_is_refused(name: str, by_facets: bool) -> None:
     one = polytope(name)
     on: Flags = one.incidence.T.copy() if by_facets else one.incidence
     random = np.random.default_rng(len(on))
@@ -87,7 +83,7 @@ def test_a_changed_bit_or_a_missing_or_doubled_vertex_is_refused(
 
 
 @pytest.mark.parametrize("name", POLYTOPES)
-def test_two_polytopes_are_not_one(name: str) -> None:
+def test_incidence_of_two_separate_polytopes_is_refused(name: str) -> None:
     on = polytope(name).incidence
     apart = np.block([[on, np.zeros_like(on)], [np.zeros_like(on), on]])
     assert not is_closed(apart, polytope(name).dimension)
@@ -98,7 +94,7 @@ def settled(one: PolytopeArrays) -> PolytopeArrays | None:
 
 
 @pytest.mark.parametrize("name", POLYTOPES)
-def test_a_moved_vertex_is_put_back_and_a_facet_that_cuts_it_off_is_refused(name: str) -> None:
+def test_moved_vertex_is_put_back_and_facet_that_cuts_it_off_is_refused(name: str) -> None:
     one = polytope(name)
     found = settled(one)
     assert found is not None
@@ -123,9 +119,7 @@ def test_a_moved_vertex_is_put_back_and_a_facet_that_cuts_it_off_is_refused(name
 
 
 def half_spaces_of(seed: int) -> tuple[Floats, Floats]:
-    """Half-spaces of a bounded set: round, in mixed units, with integers, or a thin box far
-    away.
-    """
+    """Half-spaces of a bounded set: round, in mixed units, of integers, or a thin box far away."""
     random = np.random.default_rng([seed, 5])
     space = int(random.integers(2, 6))
     unit = np.vstack([np.eye(space), -np.eye(space)])
@@ -155,9 +149,7 @@ def half_spaces_of(seed: int) -> tuple[Floats, Floats]:
 def test_vertices_that_are_accepted_without_integers_are_all_vertices(
     count: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Where the proof fails, integers decide: they are switched off here, and such sets left
-    out.
-    """
+    """Integers, which decide if the proof fails, are switched off here: such sets are empty."""
     accepted = 0
     monkeypatch.setattr(construction, "_with_integers", lambda *_: construction.empty(1))
     for seed in range(count):
@@ -175,12 +167,12 @@ def test_vertices_that_are_accepted_without_integers_are_all_vertices(
         assert len(found.vertices) == len(exact), seed
         assert is_same.any(axis=0).all(), seed
         assert is_same.any(axis=1).all(), seed
-    # Round sets and those of integers are; a thin box and mixed units may need integers for a box.
+    # Round sets and sets of integers are; a thin box and mixed units may need integers for a box.
     assert accepted >= count // 2
 
 
 def is_accepted(one: PolytopeArrays, right: PolytopeArrays) -> bool:
-    """Whether a changed result passes as it is: neither refused nor put back to the right one."""
+    """Whether a changed result is accepted: neither refused nor changed back to the right one."""
     found = settled(one)
     if found is None:
         return False
@@ -191,9 +183,7 @@ def is_accepted(one: PolytopeArrays, right: PolytopeArrays) -> bool:
 
 
 def changed(one: PolytopeArrays, random: np.random.Generator) -> dict[str, PolytopeArrays]:
-    """Eight changes of a set: its bits, its vertices or its facets are no longer those of a
-    polytope.
-    """
+    """Eight changes of a set: with its bits, vertices or facets it is not a polytope any more."""
     on = one.incidence
     vertex = int(random.integers(len(on)))
     facet = int(random.integers(on.shape[1]))
@@ -254,7 +244,7 @@ def test_changed_results_are_refused_or_put_back(count: int) -> None:
 
 
 @pytest.mark.parametrize("space", [2, 3, 4, 5])
-def test_a_simplex_that_has_lost_a_vertex_is_no_flat_set(space: int) -> None:
+def test_simplex_without_a_vertex_is_refused_and_not_taken_for_a_flat_set(space: int) -> None:
     one = Polytope.from_vertices(np.vstack([np.zeros(space), np.eye(space)]))
     for vertex in range(space + 1):
         less = np.delete(np.arange(space + 1), vertex)

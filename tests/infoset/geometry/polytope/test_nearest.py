@@ -60,7 +60,9 @@ def exact_closest(vertices: Floats, point: Floats) -> Floats:
 
 
 @pytest.mark.parametrize("far", [1.0, 1e4, 1e9, 1e12])
-def test_closest_point_of_a_tetrahedron_is_the_middle_of_its_face(far: float) -> None:
+def test_closest_point_of_a_tetrahedron_to_a_point_ahead_is_the_middle_of_its_face(
+    far: float,
+) -> None:
     """From 1e9 it was a vertex: rounding of the distance hid the differences of the vertices."""
     corners = Polytope.from_vertices([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 
@@ -70,7 +72,7 @@ def test_closest_point_of_a_tetrahedron_is_the_middle_of_its_face(far: float) ->
 
 
 @pytest.mark.parametrize("count", [100, pytest.param(1500, marks=pytest.mark.thorough)])
-def test_closest_points_of_far_points_are_the_exact_ones(count: int) -> None:
+def test_closest_points_to_far_points_are_exact(count: int) -> None:
     """Formerly 398 of 1500 were wrong by over 1e-9 of the size."""
     for seed in range(count):
         random = np.random.default_rng(seed)
@@ -91,7 +93,7 @@ def test_closest_points_of_far_points_are_the_exact_ones(count: int) -> None:
 
 
 @pytest.mark.parametrize("far", [0.0, 1e6, 1e9])
-def test_distance_of_far_sets_is_that_of_their_faces(far: float) -> None:
+def test_distance_of_far_sets_equals_the_distance_of_their_faces(far: float) -> None:
     """Two unit cubes, the second one moved along two axes: two parallel edges are nearest."""
     cube = np.array(list(itertools.product([0.0, 1.0], repeat=3)))
 

@@ -1,6 +1,4 @@
-"""Operations of polytopes of R^3 and R^4 against exact rational polytopes, published cases, and
-mended mistakes.
-"""
+"""Operations of polytopes against exact rational polytopes, published cases, and earlier errors."""
 
 from __future__ import annotations
 
@@ -30,9 +28,7 @@ KIND = st.sampled_from(["plain", "flat", "segment", "point", "mixed", "lattice"]
 
 
 def points_of(kind: str, seed: int, space: int) -> Floats:
-    """Points of a set with an interior, of a flat set, of a set with axes 1e9 times longer than
-    others, ...
-    """
+    """Return random points of a kind: "mixed" has axes up to 1e9 times longer than others."""
     random = np.random.default_rng(seed)
     points = random.uniform(-1.0, 1.0, (space + 5, space))
     if kind == "lattice":
@@ -71,11 +67,15 @@ def assert_same(got: Polytope, exact: RationalSet, size: Floats) -> None:
 @given(SEED, SPACE, KIND, KIND)
 @example(seed=827447, space=4, kind="lattice", other_kind="mixed")
 @example(seed=7293, space=4, kind="lattice", other_kind="mixed")
-def test_operations_on_two_sets(seed: int, space: int, kind: str, other_kind: str) -> None:
+def test_operations_on_two_sets_equal_exact_ones(
+    seed: int, space: int, kind: str, other_kind: str
+) -> None:
     points = points_of(kind, seed, space)
-    others = points_of(
-        "mixed" if kind == "mixed" else other_kind, seed if kind == "mixed" else seed + 1, space
-    )
+    if kind == "mixed":
+        # The same axes are long.
+        others = points_of(kind, seed, space)
+    else:
+        others = points_of(other_kind, seed + 1, space)
     others = 0.5 * others + 0.25 * points.mean(axis=0)
     size = np.maximum(np.abs(points).max(axis=0), np.abs(others).max(axis=0)) + 1e-300
     size = np.maximum(size, 1e-9 * size.max())
@@ -84,21 +84,26 @@ def test_operations_on_two_sets(seed: int, space: int, kind: str, other_kind: st
     exact_one = polyhedron_of(exactly(points))
     exact_two = polyhedron_of(exactly(others))
     assert_same(one, rounded(exact_one), size)
+
     both = polyhedron_of(exactly(points))
     both.poly_hull_assign(exact_two)
     assert_same(one.convex_hull(two), rounded(both), size)
+
     sums = [
         [a + b for a, b in zip(p, q, strict=True)]
         for p in vertices_of(exact_one)
         for q in vertices_of(exact_two)
     ]
     assert_same(one + two, rounded(polyhedron_of(sums)), size)
-    if kind not in ("plain", "mixed", "lattice") or other_kind not in ("plain", "mixed", "lattice"):
-        return  # rounding decides whether flat sets meet
+
+    # Rounding decides whether flat sets meet.
+    if not {kind, other_kind} <= {"plain", "mixed", "lattice"}:
+        return
     common = polyhedron_of(exactly(points))
     common.intersection_assign(exact_two)
     if common.is_empty() or common.affine_dimension() == space:
         assert_same(one & two, rounded(common), size)
+
     less = polyhedron_of(exactly(points))
     small = exactly(0.05 * (others - others.mean(axis=0)))
     for q in small:
@@ -115,7 +120,7 @@ def test_operations_on_two_sets(seed: int, space: int, kind: str, other_kind: st
 @some
 @given(SEED, SPACE, KIND)
 @example(seed=2000, space=3, kind="mixed")
-def test_maps_projections_and_slices(seed: int, space: int, kind: str) -> None:
+def test_maps_projections_and_slices_equal_exact_ones(seed: int, space: int, kind: str) -> None:
     points = points_of(kind, seed, space)
     one = Polytope.from_vertices(points)
     size = np.maximum(np.abs(points).max(axis=0), 1e-9 * np.abs(points).max())
@@ -126,16 +131,19 @@ def test_maps_projections_and_slices(seed: int, space: int, kind: str) -> None:
         [Fraction(float(v)) for v in offset]
     )
     reach = np.full(2, float(size.max()) + 2.0)
+
     assert_same(one.affine_map(matrix, offset), rounded(polyhedron_of(image.tolist())), reach)
     assert_same(
         one.project([0, space - 1]),
         rounded(polyhedron_of(exactly(points[:, [0, space - 1]]))),
         size[[0, space - 1]],
     )
+
     if kind == "plain":
         square = np.eye(space) + np.triu(random.integers(-1, 2, (space, space)), 1)
         back = one.affine_map(square, np.ones(space)).preimage(square, np.ones(space))
         assert back.equals(one, 1e-9 * float(size.max() + 1.0))
+
         value = float(points[:, 0].mean())
         half = one.slice([0], [value])
         lifted = np.column_stack([np.full(len(half.vertices), value), half.vertices])
@@ -149,42 +157,44 @@ def test_maps_projections_and_slices(seed: int, space: int, kind: str) -> None:
 
 @some
 @given(SEED, SPACE, KIND)
-def test_measures(seed: int, space: int, kind: str) -> None:
-    """Identities: the centre of the largest ball, samples inside, distances, reduced sets
-    outside.
-    """
+def test_measures_satisfy_their_identities(seed: int, space: int, kind: str) -> None:
     points = points_of(kind, seed, space)
     one = Polytope.from_vertices(points)
     size = float(np.abs(points).max())
     assert (one.margin(one.vertices) >= 0.0).all()
     assert one.contains(points, 1e-9 * size).all()
+
     centre, radius = one.chebyshev_centre()
     assert one.contains(centre, 1e-9 * size)
     assert float((one.offsets - one.normals @ centre).min(initial=np.inf)) >= radius - 1e-9 * size
     assert one.contains(one.sample(20), 1e-9 * size).all()
     assert one.contains(one.centroid(), 1e-9 * size)
+
     far = one.vertices[0] + 3.0 * size * np.eye(space)[0]
     near = one.closest_point(far)
     assert one.contains(near, 1e-9 * size)
-    # The nearest point is the one with the variational inequality (x - near) . (y - near) <= 0 for
-    # all y of the set.
+    # For the nearest point to x, (x - near) . (y - near) <= 0 for all y of the set.
     assert float(((one.vertices - near) @ (far - near)).max()) <= 1e-8 * size**2
     assert one.distance(far) == pytest.approx(float(np.linalg.norm(far - near)), rel=1e-9)
+
     moved = one.translate(4.0 * size * np.eye(space)[0])
     assert one.hausdorff_distance(moved) == pytest.approx(4.0 * size, rel=1e-9)
     assert one.distance(moved) <= 4.0 * size * (1.0 + 1e-15)
     assert one.diameter() == pytest.approx(
         max(float(np.linalg.norm(p - q)) for p in points for q in points), rel=1e-9
     )
+
     if kind == "plain":
         fewer = one.reduce_outward(2 * space + 2)
         assert len(fewer.normals) <= 2 * space + 2
         assert one.is_subset(fewer, 1e-9 * size)
+
         again = Polytope.from_constraints(*one.constraints())
         assert len(again.normals) == len(one.normals)
         # Rounded offsets can divide a vertex of many facets.
         apart = np.abs(again.vertices[:, None] - one.vertices).max(axis=2)
         assert max(apart.min(axis=0).max(), apart.min(axis=1).max()) <= 1e-10 * size
+
         share = one.cut(np.eye(space)[0], upper=float(one.centroid()[0])).volume() / one.volume()
         assert float((one.sample(20_000)[:, 0] < one.centroid()[0]).mean()) == pytest.approx(
             share, abs=0.02
@@ -206,7 +216,7 @@ def test_boxes_are_exact(space: int) -> None:
     assert (flat.dimension, len(flat.vertices)) == (1, 2)
 
 
-def test_an_empty_set_that_is_unbounded_by_its_directions_is_empty() -> None:
+def test_empty_set_is_empty_also_if_its_facets_leave_a_direction_open() -> None:
     """Formerly {x <= 2, y <= 10, y >= 11} was called unbounded."""
     empty = Polytope.from_constraints([[1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [2.0, 10.0, -11.0])
     assert empty.is_empty
@@ -217,33 +227,54 @@ def test_an_empty_set_that_is_unbounded_by_its_directions_is_empty() -> None:
     ).is_bounded
 
 
-def test_cuts_and_pairs_without_a_common_point_are_empty() -> None:
-    cube = Polytope.from_box([0.0] * 3, [1.0] * 3)
-    for normal, lower, upper in (
+@pytest.mark.parametrize(
+    ("normal", "lower", "upper"),
+    [
         ([1, 0, 0], 0.7, 0.5),
         ([1000, 0, 0], 700, 500),
         ([1, 0, 0], 2.7, 2.5),
         ([1, 0, 0], np.nextafter(0.5, 1.0), 0.5),
         ([1, 0, 0], -np.inf, -np.inf),
         ([1, 0, 0], np.inf, np.inf),
-    ):
-        assert cube.cut(normal, lower, upper).is_empty
+    ],
+)
+def test_cut_by_a_strip_without_points_is_empty(
+    normal: list[float], lower: float, upper: float
+) -> None:
+    cube = Polytope.from_box([0.0] * 3, [1.0] * 3)
+
+    assert cube.cut(normal, lower, upper).is_empty
+
+
+def test_difference_and_intersection_without_points_are_empty() -> None:
     floor = Polytope.from_box([0, 0, 0], [1, 1, 0])
     tall = Polytope.from_box([0, 0, 0], [1.5, 1, 0.2])
     assert floor.minkowski_difference(tall).is_empty
     assert (Polytope.from_vertices([[2, 2], [3, 3]]) & Polytope.from_box([0, 0], [1, 1])).is_empty
 
 
-def test_operations_on_empty_sets() -> None:
+def test_operations_on_the_empty_set_are_empty_and_its_points_do_not_exist() -> None:
     empty = Polytope.empty(3)
     box = Polytope.from_box([0.0] * 3, [1.0] * 3)
     made = [
-        empty & box, box & empty, empty + box, box + empty, np.eye(3) @ empty, empty.translate([1.0, 0.0, 0.0]),
-        empty.preimage(np.eye(3)), empty.cut([1.0, 0.0, 0.0], 0.0, 1.0), empty.slice([0], 0.0), empty.project([0, 1]),
-        empty.minkowski_difference(box), empty.reduce_outward(6), empty.convex_hull(empty),
-        box & Polytope.from_box([2.0] * 3, [3.0] * 3), box.cut([1.0, 0.0, 0.0], 0.75, 0.25),
-    ]  # fmt: skip
+        empty & box,
+        box & empty,
+        empty + box,
+        box + empty,
+        np.eye(3) @ empty,
+        empty.translate([1.0, 0.0, 0.0]),
+        empty.preimage(np.eye(3)),
+        empty.cut([1.0, 0.0, 0.0], 0.0, 1.0),
+        empty.slice([0], 0.0),
+        empty.project([0, 1]),
+        empty.minkowski_difference(box),
+        empty.reduce_outward(6),
+        empty.convex_hull(empty),
+        box & Polytope.from_box([2.0] * 3, [3.0] * 3),
+        box.cut([1.0, 0.0, 0.0], 0.75, 0.25),
+    ]
     assert all(one.is_empty for one in made)
+
     assert empty.convex_hull(box).equals(box)
     assert (empty.volume(), empty.diameter(), empty.distance(box)) == (0.0, 0.0, np.inf)
     assert empty <= box
@@ -251,14 +282,15 @@ def test_operations_on_empty_sets() -> None:
     assert [0.5] * 3 not in empty
     assert float(empty.support_function([1.0, 0.0, 0.0])) == -np.inf
     assert repr(empty) == "<empty polytope in R^3: 0 vertices, 0 facets>"
+
     for measure in (
-        Polytope.centroid,
-        Polytope.bounding_box,
-        Polytope.chebyshev_centre,
-        Polytope.sample,
+        empty.centroid,
+        empty.bounding_box,
+        empty.chebyshev_centre,
+        lambda: empty.sample(3),
     ):
         with pytest.raises(EmptyPolytopeError):
-            measure(empty, *([3] if measure is Polytope.sample else []))
+            measure()
     with pytest.raises(ValueError, match="unbounded"):
         box.minkowski_difference(empty)
     with pytest.raises(ValueError, match=r"in R\^3"):
@@ -266,7 +298,7 @@ def test_operations_on_empty_sets() -> None:
 
 
 @pytest.mark.parametrize("small", [1e-3, 1e-6, 3e-7, 1e-9])
-def test_a_part_that_is_far_smaller_than_the_sets_is_found_in_its_own_coordinates(
+def test_part_that_is_far_smaller_than_the_sets_is_found_in_its_own_coordinates(
     small: float,
 ) -> None:
     """Parts that are 1e12 times narrower than the first set were a point or a segment beside the
@@ -278,55 +310,67 @@ def test_a_part_that_is_far_smaller_than_the_sets_is_found_in_its_own_coordinate
     both = tall & broad
     assert both.contains([[-small, -small], [small, small], [-small, small]]).all()
     np.testing.assert_allclose(both.bounding_box(), [[-small] * 2, [small] * 2], rtol=1e-9)
+
     line = Polytope.from_vertices([[-wide, 0.0], [wide, 0.0]])
     square = Polytope.from_box([-small] * 2, [small] * 2)
     for piece in (line & square, square & line):
         np.testing.assert_allclose(
             piece.bounding_box(), [[-small, 0.0], [small, 0.0]], rtol=1e-9, atol=1e-300
         )
+
     less = Polytope.from_box([0.0] * 2, [1e6] * 2).minkowski_difference(
         Polytope.from_box([0.0] * 2, [1e6 - small] * 2)
     )
     assert less.contains([small / 2.0] * 2)
 
 
-def test_axes_of_very_different_sizes() -> None:
+@pytest.mark.parametrize("scale", itertools.permutations([1.0, 1e-9, 1e-4]))
+def test_set_with_axes_of_very_different_sizes_is_not_flat(scale: tuple[float, ...]) -> None:
     """Formerly a set with axes 1e9 times longer than others counted as flat."""
     points = np.random.default_rng(0).uniform(-1.0, 1.0, (12, 3))
     plain = Polytope.from_vertices(points)
-    for scale in itertools.permutations([1.0, 1e-9, 1e-4]):
-        set_of_sizes = Polytope.from_vertices(points * scale)
-        assert (set_of_sizes.dimension, len(set_of_sizes.vertices)) == (3, len(plain.vertices))
-        assert set_of_sizes.volume() == pytest.approx(plain.volume() * np.prod(scale), rel=1e-12)
-        again = Polytope.from_constraints(*set_of_sizes.constraints())
-        for end, wanted in zip(again.bounding_box(), plain.bounding_box(), strict=True):
-            assert end / scale == pytest.approx(wanted, rel=1e-9)
+
+    found = Polytope.from_vertices(points * scale)
+
+    assert (found.dimension, len(found.vertices)) == (3, len(plain.vertices))
+    assert found.volume() == pytest.approx(plain.volume() * np.prod(scale), rel=1e-12)
+    again = Polytope.from_constraints(*found.constraints())
+    for end, wanted in zip(again.bounding_box(), plain.bounding_box(), strict=True):
+        assert end / scale == pytest.approx(wanted, rel=1e-9)
 
 
-def test_balls_and_zonotopes() -> None:
-    for space, most in ((1, 1.0), (2, 1.09), (3, 1.13), (4, 1.17), (5, 1.19)):
-        outer, inner = (
-            Polytope.from_ball(np.ones(space), 2.0, outer=outer) for outer in (True, False)
-        )
-        for one, depth in ((outer, 2.0), (inner, 2.0 / most)):
-            assert (one.offsets - one.normals.sum(axis=1)).min() >= depth - 1e-14
-            assert np.linalg.norm(one.normals, axis=1) == pytest.approx(1.0)
-            if space < 5:  # a hull of 3840 points takes long
-                hull = Polytope.from_vertices(one.vertices)
-                assert (len(hull.vertices), len(hull.normals)) == (
-                    len(one.vertices),
-                    len(one.normals),
-                )
-                assert hull.equals(one, 1e-12)
-        assert outer.chebyshev_centre()[1] == pytest.approx(2.0)
-        assert np.linalg.norm(inner.vertices - 1.0, axis=1) == pytest.approx(2.0)
-        assert np.linalg.norm(outer.vertices - 1.0, axis=1).max() <= 2.0 * most
-    for around in (True, False):
-        assert Polytope.from_ball([1e10, 1.0], 1e-8, outer=around).dimension < 2
+@pytest.mark.parametrize(("space", "most"), [(1, 1.0), (2, 1.09), (3, 1.13), (4, 1.17), (5, 1.19)])
+def test_polytopes_of_a_ball_are_larger_or_smaller_by_the_documented_factor(
+    space: int, most: float
+) -> None:
+    outer = Polytope.from_ball(np.ones(space), 2.0)
+    inner = Polytope.from_ball(np.ones(space), 2.0, outer=False)
+
+    for one, depth in ((outer, 2.0), (inner, 2.0 / most)):
+        assert (one.offsets - one.normals.sum(axis=1)).min() >= depth - 1e-14
+        assert np.linalg.norm(one.normals, axis=1) == pytest.approx(1.0)
+        # A hull of the 3840 points of R^5 takes long.
+        if space < 5:
+            hull = Polytope.from_vertices(one.vertices)
+            assert len(hull.vertices) == len(one.vertices)
+            assert len(hull.normals) == len(one.normals)
+            assert hull.equals(one, 1e-12)
+    assert outer.chebyshev_centre()[1] == pytest.approx(2.0)
+    assert np.linalg.norm(inner.vertices - 1.0, axis=1) == pytest.approx(2.0)
+    assert np.linalg.norm(outer.vertices - 1.0, axis=1).max() <= 2.0 * most
+
+
+@pytest.mark.parametrize("outer", [True, False])
+def test_polytope_of_a_ball_that_is_smaller_than_rounding_is_flat(outer: bool) -> None:
+    assert Polytope.from_ball([1e10, 1.0], 1e-8, outer=outer).dimension < 2
+
+
+def test_polytope_of_a_zonotope_has_its_support_function() -> None:
     generators = np.random.default_rng(0).normal(size=(5, 3))
     zonotope = Polytope.from_zonotope(Zonotope([1.0, 2.0, 3.0], generators))
     directions = np.random.default_rng(1).normal(size=(20, 3))
     wanted = directions @ [1.0, 2.0, 3.0] + np.abs(directions @ generators.T).sum(axis=1)
+
     np.testing.assert_allclose(zonotope.support_function(directions), wanted, rtol=1e-12)
     assert Polytope.from_zonotope(Zonotope([1.0, 2.0], [])).dimension == 0
 
@@ -337,12 +381,14 @@ def test_balls_and_zonotopes() -> None:
 THERE_AND_BACK = [
     # cddlib issue 34 (also CDDLib.jl issue 47): "Numerically inconsistent"; vertices were doubled
     # 2.5e-9 apart here.
-    [(-8.02, -2.955, -2.412), (-7.942, -2.622, -2.362), (-7.956, -1.271, -2.403), (-7.878, -0.937, -2.353),
-     (-7.763, 1.284, -2.392), (-7.685, 1.617, -2.342), (-7.699, 2.968, -2.383), (-7.621, 3.301, -2.333),
-     (-6.495, 3.278, -1.779), (0.773, 3.13, -2.645)],
+    [(-8.02, -2.955, -2.412), (-7.942, -2.622, -2.362), (-7.956, -1.271, -2.403),
+     (-7.878, -0.937, -2.353), (-7.763, 1.284, -2.392), (-7.685, 1.617, -2.342),
+     (-7.699, 2.968, -2.383), (-7.621, 3.301, -2.333), (-6.495, 3.278, -1.779),
+     (0.773, 3.13, -2.645)],
     # pycvxset, test_polytope_unary.py: a quadrangle; the cross-polytope; a simplex.
     [(1.9, 0.2), (0.0, -2.0), (-0.3, 0.17), (3.0, 4.01)],
-    [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)],
+    [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0),
+     (0.0, 0.0, -1.0)],
     [(1.0, 0.0), (0.0, 1.0), (0.0, 0.0)],
     # pycvxset issue 4: a segment.
     [(3.0, 2.4), (6.0, 4.8)],
@@ -383,20 +429,24 @@ def vertex_errors(one: Polytope) -> Floats:
 CONSTRAINTS: list[tuple[list[tuple[float, ...]], int]] = [
     # Rows (b, -a) of b - a x >= 0 with the number of vertices. cddlib issue 34, of 19 August 2026:
     # a ray was reported.
-    ([(1.3660253171818983, -0.49999999999999994, -0.8660254037844387), (0.36602545378443874, -0.8660254037844387,
-      0.49999999999999994), (1, 0, 1), (1, -1, 0), (1, 0, -1), (1, 1, 0)], 5),
+    ([(1.3660253171818983, -0.49999999999999994, -0.8660254037844387),
+      (0.36602545378443874, -0.8660254037844387, 0.49999999999999994),
+      (1, 0, 1), (1, -1, 0), (1, 0, -1), (1, 1, 0)], 5),
     # cddlib issue 67: two of five vertices were missing.
-    ([(-0.5367662906646729, 0.9292178750038147, 0.36953237652778625), (0.39611172676086426, 0.058287363499403,
-      -0.9982998371124268), (-0.17240175604820251, -0.0582873672246933, 0.9982998371124268), (-0.45, 1, 0),
-      (0.45, 0, -1), (-0.35, 0, 1)], 5),
+    ([(-0.5367662906646729, 0.9292178750038147, 0.36953237652778625),
+      (0.39611172676086426, 0.058287363499403, -0.9982998371124268),
+      (-0.17240175604820251, -0.0582873672246933, 0.9982998371124268),
+      (-0.45, 1, 0), (0.45, 0, -1), (-0.35, 0, 1)], 5),
     # LazySets issue 918: infeasible constraints had vertices.
     ([(0, -1, -1), (-1, 1, 0), (-1, 0, 1)], 0),
     # LazySets issue 994: a triangle.
     ([(0.25, 0, -1), (0.25, -1, 0), (0, 1, 1)], 3),
     # polytope, tulip-control issue 23: boxes of 30000 and 40000 by 25; the result depended on the
     # order.
-    ([(30000, -1, 0), (25, 0, -1), (0, 1, 0), (0, 0, 1), (40000, -1, 0), (25, 0, -1), (0, 1, 0), (0, 0, 1)], 4),
-    ([(40000, -1, 0), (25, 0, -1), (0, 1, 0), (0, 0, 1), (30000, -1, 0), (25, 0, -1), (0, 1, 0), (0, 0, 1)], 4),
+    ([(30000, -1, 0), (25, 0, -1), (0, 1, 0), (0, 0, 1),
+      (40000, -1, 0), (25, 0, -1), (0, 1, 0), (0, 0, 1)], 4),
+    ([(40000, -1, 0), (25, 0, -1), (0, 1, 0), (0, 0, 1),
+      (30000, -1, 0), (25, 0, -1), (0, 1, 0), (0, 0, 1)], 4),
     # pycvxset issue 2: the unit square. test_polytope_binary.py: an empty box.
     ([(1, -1, 0), (1, 0, -1), (0, 1, 0), (0, 0, 1)], 4),
     ([(-1, -1, 0), (-1, 0, -1), (-1, 1, 0), (-1, 0, 1)], 0),
@@ -404,10 +454,13 @@ CONSTRAINTS: list[tuple[list[tuple[float, ...]], int]] = [
 
 
 @pytest.mark.parametrize(("rows", "count"), CONSTRAINTS)
-def test_published_constraints(rows: list[tuple[float, ...]], count: int) -> None:
+def test_published_constraints_have_the_published_number_of_vertices(
+    rows: list[tuple[float, ...]], count: int
+) -> None:
     array = np.array(rows, dtype=float)
     polygon = ConvexPolygons.from_constraints(-array[:, 1:], array[:, 0])
     polytope = Polytope.from_constraints(-array[:, 1:], array[:, 0])
+
     assert int(polygon.counts) == len(polytope.vertices) == count
     gaps = np.abs(polytope.vertices[:, None] - polygon.polygon()[None]).max(axis=-1, initial=0.0)
     assert count == 0 or float(gaps.min(axis=1).max()) <= 1e-11 * float(
@@ -430,7 +483,7 @@ def test_intersections_with_sets_that_are_a_billion_times_larger(
 
 
 @pytest.mark.parametrize("states", [2, 3, 4])
-def test_a_simplex_is_one_simplex(states: int) -> None:
+def test_simplex_is_divided_into_one_simplex(states: int) -> None:
     """A triangulation by Qhull needs one point more; a flat triangle in R^3 is one too."""
     corners = np.vstack([np.zeros(states), np.eye(states)])
     for points in (corners, np.hstack([corners, np.full((states + 1, 1), 0.25)])):
@@ -439,9 +492,8 @@ def test_a_simplex_is_one_simplex(states: int) -> None:
         assert simplex.contains(simplex.sample(50), 1e-12).all()
 
 
-def test_other_published_cases() -> None:
-    # polytope issue 93: the constraints leave the direction (0, 0, 1, 1) free; vertices of 3e13
-    # were returned.
+def test_constraints_that_leave_a_direction_free_give_an_unbounded_set() -> None:
+    """Issue 93 of polytope: vertices of 3e13 were returned for the free direction (0, 0, 1, 1)."""
     rows = np.array(
         [
             [-1, 0, 0, 0],
@@ -454,34 +506,37 @@ def test_other_published_cases() -> None:
     )
     found = Polytope.from_constraints(rows, [-0.33333, 0.3125, 0.05724, -0.01478, 0.3566, -0.16667])
     np.testing.assert_allclose(found.directions, [[0.0, 0.0, 0.5**0.5, 0.5**0.5]], rtol=1e-15)
-    # pycvxset issue 4: points on a segment, and its intersection with lines.
+
+
+def test_segment_contains_its_points_and_meets_lines_in_points() -> None:
+    """Issue 4 of pycvxset."""
     segment = Polytope.from_vertices([[3.0, 2.4], [6.0, 4.8]])
     inside = segment.contains([[3.0, 2.4], [6.0, 4.8], [2.97, 2.376], [3.97, 3.176]])
-    assert inside.tolist() == [
-        True,
-        True,
-        False,
-        True,
-    ]
+    assert inside.tolist() == [True, True, False, True]
     assert segment.cut([1.0, 0.0], 2.97, 2.97).is_empty
     np.testing.assert_allclose(
         segment.cut([1.0, 0.0], 3.97, 3.97).vertices, [[3.97, 3.176]], rtol=1e-12
     )
-    # pycvxset, test_polytope_binary.py: a flat square less a cube is empty; less itself it is a
-    # point.
+
+
+def test_difference_of_a_flat_square_and_a_cube_is_empty_and_with_itself_a_point() -> None:
+    """From test_polytope_binary.py of pycvxset."""
     flat = Polytope.from_box([-1.0, -1.0, 0.0], [1.0, 1.0, 0.0])
     assert flat.minkowski_difference(Polytope.from_box([-1.0] * 3, [1.0] * 3)).is_empty
     np.testing.assert_allclose(
         flat.minkowski_difference(flat).vertices, [[0.0, 0.0, 0.0]], atol=1e-12
     )
-    # pycvxset, test_polytope_unary.py: the projection of a cylinder.
+
+
+def test_projection_of_a_cylinder_is_its_base() -> None:
+    """From test_polytope_unary.py of pycvxset."""
     cylinder = [[-1, 0, 0], [0, -1, 0], [1, 1, 0], [0, 0, 1], [0, 0, -1]]
     shade = Polytope.from_constraints(cylinder, [0, 0, 1, 1, 1]).project([0, 1])
     assert shade.equals(Polytope.from_vertices([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]]), 1e-12)
 
 
 @pytest.mark.parametrize("space", [2, 3])
-def test_no_facet_of_an_image_excludes_an_exact_vertex(space: int) -> None:
+def test_facets_of_an_image_exclude_none_of_its_exact_vertices(space: int) -> None:
     """In rationals, in the coordinates of the image: formerly one of two such maps, by up to
     1e-16.
     """
@@ -495,7 +550,7 @@ def test_no_facet_of_an_image_excludes_an_exact_vertex(space: int) -> None:
         lower = random.integers(-5, 0, space)
         upper = random.integers(1, 6, space)
         image = Polytope.from_box(lower, upper).linear_map(matrix)
-        mapped = mapped + 1
+        mapped += 1
         facets, centre, scale = map(exact, (image.facets, image.centre, image.scale))
         for corner in itertools.product(*zip(lower.tolist(), upper.tolist(), strict=True)):
             point = (exact(matrix) @ np.array(corner) - centre) / scale
@@ -503,12 +558,12 @@ def test_no_facet_of_an_image_excludes_an_exact_vertex(space: int) -> None:
     assert mapped > 50
 
 
-def test_a_segment_that_underflows_is_none() -> None:
+def test_segment_that_underflows_is_ignored() -> None:
     box = Polytope.from_box([-1e5] * 3, [1e5] * 3)
     assert box.add_segment([1e-320, 0.0, 0.0]).equals(box)
 
 
-def test_cuts_that_leave_a_billionth_of_a_set() -> None:
+def test_cut_that_leaves_a_billionth_of_a_set_is_precise() -> None:
     box = Polytope.from_box([0, 0, 0], [1e9, 1, 1])
     np.testing.assert_allclose(box.cut([1, 0, 0], upper=1.0).volume(), 1.0, rtol=1e-9)
     np.testing.assert_allclose(box.cut([1, 1, 1], upper=1.0).volume(), 1.0 / 6.0, rtol=1e-9)

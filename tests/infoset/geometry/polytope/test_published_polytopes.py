@@ -60,7 +60,7 @@ def exact_vertices(rows: list[Row], equations: list[int]) -> set[Row]:
 @pytest.mark.parametrize(
     "case", [case for case in CASES if case["form"] == "constraints"], ids=lambda case: case["case"]
 )
-def test_constraints(case: dict[str, Any]) -> None:
+def test_constraints_give_the_published_vertices(case: dict[str, Any]) -> None:
     rows = [tuple(Fraction(value) for value in row) for row in case["rows"]]
     equations: list[int] = case.get("equations", [])
     table = np.array(rows, dtype=float)
@@ -89,10 +89,8 @@ def test_constraints(case: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     "case", [case for case in CASES if case["form"] == "vertices"], ids=lambda case: case["case"]
 )
-def test_vertices(case: dict[str, Any]) -> None:
-    """All points are inside, and each facet contains points that span it: the facets are those of
-    the hull.
-    """
+def test_vertices_give_the_published_facets(case: dict[str, Any]) -> None:
+    """All points are inside, and each facet contains points that span it: the facets are right."""
     points = np.array(case["rows"], dtype=float)[:, 1:]
     polytope = Polytope.from_vertices(points)
     assert len(polytope.normals) == case.get("facets", len(polytope.normals))

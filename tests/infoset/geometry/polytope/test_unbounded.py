@@ -52,24 +52,20 @@ def wedge() -> Polytope:
 def test_half_space_has_a_line_and_a_direction() -> None:
     half = Polytope.halfspace([3.0, 4.0], 10.0)
 
-    assert (half.dimension, len(half.vertices), len(half.lines), len(half.directions)) == (
-        2,
-        1,
-        1,
-        1,
-    )
+    assert half.dimension == 2
+    assert len(half.vertices) == len(half.lines) == len(half.directions) == 1
     np.testing.assert_allclose(half.normals, [[0.6, 0.8]], rtol=1e-15)
     np.testing.assert_allclose(half.offsets, [2.0], rtol=1e-15)
     assert half.contains([[2.0, 1.0], [2.1, 1.0], [-1e9, 1e8]]).tolist() == [True, False, True]
 
 
-def test_half_space_needs_a_normal() -> None:
+def test_half_space_with_a_zero_normal_is_refused() -> None:
     with pytest.raises(ValueError, match="normal must not be zero"):
         Polytope.halfspace([0.0, 0.0], 1.0)
 
 
 @pytest.mark.parametrize("space", [1, 2, 5])
-def test_the_whole_space_has_no_facet(space: int) -> None:
+def test_whole_space_is_unbounded_and_without_facets(space: int) -> None:
     whole = Polytope.space_of(space)
 
     assert (whole.dimension, len(whole.normals), len(whole.lines)) == (space, 0, space)
@@ -115,11 +111,12 @@ def test_support_along_a_facet_is_finite_in_spite_of_rounding() -> None:
         random = np.random.default_rng(seed)
         cone = Polytope.from_rays(random.normal(size=(1, 4)), random.normal(size=(4, 4)))
         rows, limits = cone.constraints()
+
         np.testing.assert_allclose(cone.support_function(rows), limits, rtol=1e-14, atol=1e-14)
         assert cone.is_subset(cone)
 
 
-def test_intersection_with_a_box_is_bounded() -> None:
+def test_intersections_of_unbounded_sets_are_exact() -> None:
     part = quadrant() & box()
 
     assert part.is_bounded
@@ -130,13 +127,13 @@ def test_intersection_with_a_box_is_bounded() -> None:
     assert (quadrant() & Polytope.empty(2)).is_empty
 
 
-def test_cut_and_slice() -> None:
+def test_cut_and_slice_of_unbounded_sets_are_exact() -> None:
     assert quadrant().cut([1.0, 1.0], upper=1.0).area() == pytest.approx(0.5, rel=1e-15)
     assert quadrant().cut([1.0, 1.0], lower=1.0).vertices.shape == (2, 2)
     np.testing.assert_array_equal(wedge().slice(2, 2.0).bounding_box(), [[0.0, 1.0], [2.0, np.inf]])
 
 
-def test_sums() -> None:
+def test_sums_with_unbounded_sets_are_exact() -> None:
     assert (quadrant() + box()).vertices.tolist() == [[-1.0, -1.0]]
     assert (quadrant() + -quadrant()).equals(Polytope.space_of(2))
     assert quadrant().add_segment([1.0, 0.0]).vertices.tolist() == [[-1.0, 0.0]]
@@ -144,14 +141,14 @@ def test_sums() -> None:
     assert (quadrant().translate([5.0, 7.0])).vertices.tolist() == [[5.0, 7.0]]
 
 
-def test_differences() -> None:
+def test_differences_of_unbounded_sets_are_exact() -> None:
     assert quadrant().minkowski_difference(box()).vertices.tolist() == [[1.0, 1.0]]
     assert quadrant().minkowski_difference(quadrant()).equals(quadrant())
     assert box().minkowski_difference(quadrant()).is_empty
     assert strip().minkowski_difference(box()).dimension == 1
 
 
-def test_maps() -> None:
+def test_images_of_unbounded_sets_are_exact() -> None:
     assert ([[1.0, -1.0]] @ quadrant()).equals(Polytope.space_of(1))
     assert (-quadrant()).support_function([1.0, 1.0]) == 0.0
     assert (np.zeros((1, 2)) @ quadrant()).vertices.tolist() == [[0.0]]
@@ -175,14 +172,14 @@ def test_hull_with_an_unbounded_set_is_closed() -> None:
     assert hull.equals(Polytope.halfspace([0.0, 1.0], 1.0))
 
 
-def test_subsets() -> None:
+def test_subset_of_an_unbounded_set_needs_its_directions() -> None:
     assert Polytope.halfspace([-1.0, -1.0], 0.0) >= quadrant()
     assert not Polytope.halfspace([-1.0, -1.0], 0.0) <= quadrant()
     assert not quadrant() <= box()
     assert Polytope.from_box([0.0, 0.0], [1e9, 1.0]) <= quadrant()
 
 
-def test_distances() -> None:
+def test_distances_of_unbounded_sets_are_exact() -> None:
     assert quadrant().distance([-3.0, -4.0]) == 5.0
     assert quadrant().closest_point([-3.0, 7.0]).tolist() == [0.0, 7.0]
     assert quadrant().distance((-quadrant()).translate([-3.0, -4.0])) == 5.0
@@ -192,7 +189,7 @@ def test_distances() -> None:
     assert strip().distance(strip()) == 0.0
 
 
-def test_separating_direction_of_unbounded_sets() -> None:
+def test_separating_direction_of_unbounded_sets_exists_if_they_are_disjoint() -> None:
     one = Polytope.halfspace([0.0, 1.0], 0.0)
     other = quadrant().translate([3.0, 1.0])
 
@@ -207,14 +204,14 @@ def test_hausdorff_distance_is_finite_for_equal_recession_cones() -> None:
     assert quadrant().hausdorff_distance(box()) == np.inf
 
 
-def test_recession_cone() -> None:
+def test_recession_cone_has_the_directions_of_the_set() -> None:
     assert (quadrant().translate([1.0, 2.0])).recession().equals(quadrant())
     assert box().recession().vertices.tolist() == [[0.0, 0.0]]
     with pytest.raises(EmptyPolytopeError):
         Polytope.empty(2).recession()
 
 
-def test_largest_ball_of_a_strip_exists_and_that_of_a_quadrant_does_not() -> None:
+def test_largest_ball_of_a_strip_is_found_and_of_a_quadrant_is_refused() -> None:
     centre, radius = strip().chebyshev_centre()
 
     assert radius == pytest.approx(1.0)
@@ -232,21 +229,21 @@ def test_largest_ball_of_a_strip_exists_and_that_of_a_quadrant_does_not() -> Non
         Polytope.to_shapely,
     ],
 )
-def test_what_only_bounded_sets_have_is_refused(ask: Callable[[Polytope], object]) -> None:
+def test_operation_for_bounded_sets_refuses_an_unbounded_set(
+    ask: Callable[[Polytope], object],
+) -> None:
     with pytest.raises(UnboundedPolytopeError, match=r"unbounded along \("):
         ask(quadrant())
 
 
-def test_measures_are_infinite() -> None:
-    assert (quadrant().volume(), quadrant().area(), quadrant().diameter()) == (
-        np.inf,
-        np.inf,
-        np.inf,
-    )
+def test_measures_of_unbounded_sets_are_infinite() -> None:
+    assert quadrant().volume() == np.inf
+    assert quadrant().area() == np.inf
+    assert quadrant().diameter() == np.inf
     assert Polytope.from_rays([[0.0, 0.0]], [[1.0, 2.0]]).area() == 0.0
 
 
-def test_product_with_an_unbounded_factor() -> None:
+def test_product_with_an_unbounded_factor_is_unbounded() -> None:
     found = product(quadrant(), Polytope.from_box([0.0], [1.0]))
 
     np.testing.assert_array_equal(found.bounding_box(), [[0.0, 0.0, 0.0], [np.inf, np.inf, 1.0]])
@@ -268,7 +265,7 @@ def test_plot_shows_the_part_within_the_limits_of_the_axes() -> None:
     assert (axes.get_xlim(), axes.get_ylim()) == ((-2.0, 3.0), (4.0, -1.0))
 
 
-def test_unbounded_set_survives_pickling_and_says_what_it_is() -> None:
+def test_unbounded_set_is_pickled_and_shown() -> None:
     again = pickle.loads(pickle.dumps(quadrant()))
 
     assert again.equals(quadrant())
@@ -280,9 +277,7 @@ def test_unbounded_set_survives_pickling_and_says_what_it_is() -> None:
 
 
 def random_set(random: np.random.Generator, space: int) -> tuple[Polytope, Any]:
-    """Return a random set, often unbounded, flat or touching others, and the polyhedron of PPL with
-    the same data.
-    """
+    """Return a random set, often unbounded or flat, and PPL's polyhedron with the same data."""
     import ppl
 
     largest = 2 if random.random() < 0.7 else 1000
@@ -319,9 +314,7 @@ def linear(entries: Any) -> Any:
 
 
 def need_equal(found: Polytope, expected: Any, label: str) -> None:
-    """Compare a set with a polyhedron: exactly if it is unbounded, else its vertices to
-    rounding.
-    """
+    """Compare a set with a polyhedron: exactly if unbounded, else its vertices to rounding."""
     import ppl
 
     assert found.is_empty == expected.is_empty(), label
@@ -346,9 +339,7 @@ def need_equal(found: Polytope, expected: Any, label: str) -> None:
 
 
 def both_representations(one: Polyhedron) -> list[Any]:
-    """Return the polyhedra of PPL of the half-spaces of a set, and of its points, directions and
-    lines.
-    """
+    """Return the polyhedra of PPL from the half-spaces of a set and from its generators."""
     import ppl
 
     sides = ppl.C_Polyhedron(one.space, "universe")
@@ -368,16 +359,12 @@ def both_representations(one: Polyhedron) -> list[Any]:
 
 
 def is_exact(one: Polytope, expected: Any) -> bool:
-    """Whether a set is stored without rounding; vertices or facets of a bounded one may not be
-    floats.
-    """
+    """Whether a set is stored without rounding: all vertices and facets are floats."""
     return one.is_empty or both_representations(one._polyhedron) == [expected, expected]
 
 
 def mapped(given: Any, matrix: Floats, offset: Floats) -> Any:
-    """Return the image of a polyhedron: {y: y = matrix x + offset for an x of it}, by
-    projection.
-    """
+    """Return the image of a polyhedron, {matrix x + offset}, by projection."""
     import ppl
 
     m = len(matrix)
@@ -446,11 +433,13 @@ def test_operations_on_pairs_with_directions_and_lines_equal_exact_ones(
     while compared < count:
         seed += 1
         random = np.random.default_rng([seed, space])
-        (one, first), (two, second) = random_set(random, space), random_set(random, space)
+        one, first = random_set(random, space)
+        two, second = random_set(random, space)
         need_equal(one, first, f"set {seed}")
         # A set whose vertices or facets are rounded is not the polyhedron with the same data.
         if not (is_exact(one, first) and is_exact(two, second)):
             continue
+
         compared += 1
         unbounded += not (one.is_bounded and two.is_bounded)
         matrix = random.integers(-2, 3, (int(random.integers(1, 4)), space)).astype(float)
@@ -466,6 +455,7 @@ def test_operations_on_pairs_with_directions_and_lines_equal_exact_ones(
         )
         if one.is_empty or two.is_empty:
             continue
+
         hull = ppl.C_Polyhedron(first)
         hull.poly_hull_assign(second)
         need_equal(one.convex_hull(two), hull, f"hull {seed}")
