@@ -104,9 +104,9 @@ class Estimate:
     def excess_widths(self) -> Floats:
         """Return the excess of the widths of the set over the exact ones, shape (n,) or (B, n).
 
-        2 n linear programs over the whole record for each reduced run; the exact widths are at most
-        1e-7 of a state smaller than those that they find. 0 for other runs, and NaN for the empty
-        set and where a program has no solution.
+        2 n linear programs over the whole record are solved for each reduced run; the exact widths
+        are at most 1e-7 of a state smaller than the widths that they find. The excess is 0 for
+        other runs, and NaN for the empty set and where a program has no solution.
 
         Raises
         ------

@@ -50,8 +50,9 @@ from infoset.geometry.tolerances import ON, REDUCED, SNAP, UNSURE
 Ends = tuple[Floats, Floats]
 """Minimum and maximum coordinates, each of shape (n,)."""
 FINE = 2.0**14
-"""Ratio of widths from which a part of a set is computed in its own coordinates: its vertices are
-known to ON of the whole, which would be SNAP of a part 2000 times smaller than this."""
+"""Ratio of widths from which a part of a set is computed in its own coordinates: one rounding of
+the whole set, UNSURE, is then 2 SNAP of the part.
+"""
 _GOOD_WIDTH_RATIO = 2.0**6
 """Ratio of widths up to which coordinates are as good as coordinates in which the set is one wide:
 two digits are lost.
@@ -61,11 +62,13 @@ _MAX_FRAMES = 3
 the set found in these, and of the set found in those, whose ends are then known.
 """
 _LEAST_WIDTH = 64.0 * UNSURE / SNAP
-"""Scale of an axis, relative to the coordinates from which limits were computed, in which their
-rounding is flat.
+"""Scale of an axis, relative to the coordinates from which limits were computed, in which 64 of
+their roundings are flat.
 """
 _PIVOT_GROWTH = 64.0
-"""Growth of distances from a plane in the pivots of a flat set."""
+"""Growth of distances from a plane in the pivots of a flat set. For complete pivoting in R^6 it is
+at most 11 (Wilkinson's bound).
+"""
 _MEETING = 16.0 * SNAP
 """Distance from a vertex of computed facets that meet in it; up to 6 SNAP were measured in
 observers of four states.
@@ -398,7 +401,7 @@ def _cutting(whole: PolytopeArrays, facets: Floats) -> Floats | None:
     near = ON * largest_coordinate(whole.points)
     if (heights.min(axis=0) > near).any():
         return None
-    return facets[heights.max(axis=0) > near]
+    return np.asarray(facets[heights.max(axis=0) > near])
 
 
 def _with_facets(whole: PolytopeArrays, cuts: Floats) -> PolytopeArrays:

@@ -246,7 +246,7 @@ def _is_simplex(shared: Integers, others: Integers, dimension: Any) -> bool:
     is_right = len(others) == dimension
     for other in others:
         is_right &= shared[other] == dimension - 1
-    return is_right
+    return bool(is_right)
 
 
 @_kernels.allocation_free

@@ -35,10 +35,11 @@ MAX_MOVE = 32.0
 meet at an angle of 3.6 degrees, their corner moves by 32.
 """
 _MAX_CROSSINGS = 60
-"""Number of moves across single facets, after which a corner counts as too sharp for them."""
+"""Number of moves across single facets, after which a corner counts as too sharp for them; chosen.
+"""
 _BEYOND = 0.25
-"""Part of the need of a facet by which a move goes too far: it then needs no move for the rounding
-of the next ones.
+"""Part of the need of a facet by which a move goes too far, so that later moves rarely bring the
+point back inside by rounding; chosen.
 """
 
 

@@ -76,7 +76,7 @@ def moved_limits(rows: Floats, limits: Floats, shift: Floats) -> Floats:
     if not shift.any():
         return limits
     moved, _ = affine_image(shift[None], -rows, limits.copy())
-    return moved[0]
+    return np.asarray(moved[0])
 
 
 def largest_coordinate(points: Floats) -> float:

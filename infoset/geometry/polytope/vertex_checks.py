@@ -15,8 +15,8 @@ from infoset.kernels import Kernels
 
 _kernels = Kernels()
 SAME_VERTEX = 64.0 * SNAP
-"""Distance of points that are the same vertex: within SNAP of its facets, unless these are at a
-small angle.
+"""Distance of points that are the same vertex: both are within SNAP of its facets. In the plane
+they are if the facets are at an angle above 1.8 degrees.
 """
 
 

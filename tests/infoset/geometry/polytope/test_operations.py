@@ -324,7 +324,7 @@ def test_part_that_is_far_smaller_than_the_sets_is_found_in_its_own_coordinates(
     assert less.contains([small / 2.0] * 2)
 
 
-@pytest.mark.parametrize("scale", itertools.permutations([1.0, 1e-9, 1e-4]))
+@pytest.mark.parametrize("scale", list(itertools.permutations([1.0, 1e-9, 1e-4])))
 def test_set_with_axes_of_very_different_sizes_is_not_flat(scale: tuple[float, ...]) -> None:
     """Formerly a set with axes 1e9 times longer than others counted as flat."""
     points = np.random.default_rng(0).uniform(-1.0, 1.0, (12, 3))
