@@ -13,25 +13,39 @@ from infoset.rendezvous._arrays import Floats, Places
 from infoset.rendezvous.reachability.conic import MAX_GAP, ConeProgram, NoSolutionError, Optimum
 from infoset.rendezvous.reachability.problem import StateBlock
 
-Constraints = tuple[Floats, Floats, Places, Places]
-
-_BROKEN = 3e-10
+_MAX_SHARP_VIOLATION = 3e-10
+"""Maximum violation of a row by a point that was moved onto its active rows: a third of
+`MAX_VIOLATION`, so that the step adds no violation of its own."""
+_SHARP_RANK = 1e-12
+"""Relative singular value below which active rows count as dependent: near rounding."""
 _STILL = 1e-9
-"""A thrust, as a part of its bound, that moves by less than this in a direction counts as constant
-there: a change of this size is the maximum violation of a constraint (`MAX_VIOLATION`)."""
+"""Change of a thrust in a direction, as a part of its bound, below which it counts as constant
+there: the maximum violation of a constraint (`MAX_VIOLATION`)."""
+
+
+class _Rows(NamedTuple):
+    """Constraints rows v <= limits, of shapes (r, p) and (r,).
+
+    `moments` and `labels`, shape (r,), are as in `Lifted`.
+    """
+
+    rows: Floats
+    limits: Floats
+    moments: Places
+    labels: Places
 
 
 @dataclass(frozen=True, eq=False)
 class Lifted:
-    """{v: rows v <= limits, equal v = levels}, with |u(t)| <= 1 for a ball; states and controls are
-    affine in v.
+    """A convex set {v: rows v <= limits, equal v = levels} that parametrises states and controls.
 
-    States are x(t) = free[t] + response[t] v, of shapes (T + 1, n) and (T + 1, n, p).
-    `control_free` and `control_response`, of shapes (T m,) and (T m, p), are the same for all
-    controls, those of the first period first. Of the r rows, `moments` are the times that they
-    refer to, and `labels` the indices of the block's constraints; both are -1 for a bound on a
-    control. `ball` is the number m of controls of a period if their norm is bounded; 0 for a box,
-    whose bounds are among the rows.
+    States are x(t) = free[t] + response[t] v, of shapes (T + 1, n) and (T + 1, n, p). Controls of
+    all periods, beginning with the first period, are control_free + control_response v, of shapes
+    (T m,) and (T m, p). Each of the r rows belongs to the time in `moments` and to the constraint
+    of the block whose index is in `labels`; both are -1 for a bound on a control.
+
+    For thrust in a ball, `ball` is the number m of controls of a period, and |u(t)| <= 1 is a
+    further constraint. For a box it is 0, and the bounds are among the rows.
     """
 
     free: Floats
@@ -76,9 +90,7 @@ class Lifted:
         )
 
     def within(self, point: Floats, basis: Floats) -> Lifted:
-        """Return the set in coordinates z of an affine subspace v = point + basis z in which the
-        equations hold.
-        """
+        """Return the set in coordinates z of v = point + basis z, for which the equations hold."""
         return replace(
             self,
             free=self.free + self.response @ point,
@@ -105,16 +117,19 @@ def lift(block: StateBlock) -> Lifted:
         free[t + 1] = block.transition[t] @ free[t]
         response[t + 1] = block.transition[t] @ response[t]
         response[t + 1][:, t * m : (t + 1) * m] += block.control[t]
-    whole, between = _state_constraints(block, free, response)
-    constraints = [*whole, *(rows for period in between for rows in period)]
+
+    of_periods = _state_constraints(block, free, response)
+    constraints = [each.end for each in of_periods]
+    for each in of_periods:
+        constraints += each.within
     return _lifted(block, free, response, constraints, np.zeros((0, width)), np.zeros(0))
 
 
 def lift_with_states(block: StateBlock) -> Lifted:
-    """Return the set of `lift` with v = all controls, then all states x(1)..x(T), which T n
-    equations determine.
+    """Return the set of `lift` with v = all controls, then all states x(1)..x(T).
 
-    Its rows are sparse, which speeds up an interior-point method.
+    T n equations determine the states. The rows are sparse, which speeds up an interior-point
+    method.
     """
     periods = block.periods
     n = block.size
@@ -126,49 +141,58 @@ def lift_with_states(block: StateBlock) -> Lifted:
     free[0] = block.initial
     for t in range(1, periods + 1):
         response[t][:, width + (t - 1) * n : width + t * n] = np.eye(n)
+
     equal = np.zeros((periods, n, total))
     levels = np.zeros((periods, n))
     for t in range(periods):
         equal[t] = response[t + 1] - block.transition[t] @ response[t]
         equal[t][:, t * m : (t + 1) * m] = -block.control[t]
     levels[0] = block.transition[0] @ block.initial
-    whole, between = _state_constraints(block, free, response)
-    constraints = [
-        rows for at_end, inner in zip(whole, between, strict=True) for rows in (at_end, *inner)
-    ]
+
+    constraints = []
+    for each in _state_constraints(block, free, response):
+        constraints += [each.end, *each.within]
     return _lifted(block, free, response, constraints, equal.reshape(-1, total), levels.ravel())
+
+
+class _PeriodConstraints(NamedTuple):
+    """Constraints on the states at the end of a period, and at each of the times within it."""
+
+    end: _Rows
+    within: list[_Rows]
 
 
 def _state_constraints(
     block: StateBlock, free: Floats, response: Floats
-) -> tuple[list[Constraints], list[list[Constraints]]]:
-    """Constraints on the states at the end of each period, and at the instants within each."""
-    periods = block.periods
+) -> list[_PeriodConstraints]:
+    """Return the constraints of each period on the states free[t] + response[t] v."""
     n = block.size
     m = len(block.controls)
-    whole: list[Constraints] = []
-    between: list[list[Constraints]] = []
-    for t in range(periods):
+    result = []
+    for t in range(block.periods):
         held = np.flatnonzero(np.isfinite(block.offsets[t + 1]))
         normals = block.normals[held]
         limits = block.offsets[t + 1, held] - normals @ free[t + 1]
-        whole.append((normals @ response[t + 1], limits, np.full(len(held), t + 1), held))
-        between.append([])
+        end = _Rows(normals @ response[t + 1], limits, np.full(len(held), t + 1), held)
+        result.append(_PeriodConstraints(end, []))
+        if block.between is None:
+            continue
+
         held = np.flatnonzero(np.isfinite(block.offsets[t]))
         normals = block.normals[held]
         thrust = np.eye(m, response.shape[2], t * m)
-        for inner in () if block.between is None else block.between[t]:
+        for inner in block.between[t]:
             limits = block.offsets[t, held] - normals @ inner[:, :n] @ free[t]
             rows = normals @ (inner[:, :n] @ response[t] + inner[:, n:] @ thrust)
-            between[t].append((rows, limits, np.full(len(held), t + 1), held))
-    return whole, between
+            result[t].within.append(_Rows(rows, limits, np.full(len(held), t + 1), held))
+    return result
 
 
 def _lifted(
     block: StateBlock,
     free: Floats,
     response: Floats,
-    constraints: list[Constraints],
+    constraints: list[_Rows],
     equal: Floats,
     levels: Floats,
 ) -> Lifted:
@@ -177,48 +201,56 @@ def _lifted(
     unit = np.eye(width, response.shape[2])
     if not block.ball:
         hard = np.full(2 * width, -1)
-        constraints = [*constraints, (np.vstack([unit, -unit]), np.ones(2 * width), hard, hard)]
-    rows, limits, moments, labels = (
-        np.concatenate(parts) for parts in zip(*constraints, strict=True)
-    )
-    ball = len(block.controls) if block.ball else 0
+        bounds = _Rows(np.vstack([unit, -unit]), np.ones(2 * width), hard, hard)
+        constraints = [*constraints, bounds]
     return Lifted(
-        free, response, np.zeros(width), unit, rows, limits, moments, labels, equal, levels, ball
+        free=free,
+        response=response,
+        control_free=np.zeros(width),
+        control_response=unit,
+        rows=np.concatenate([each.rows for each in constraints]),
+        limits=np.concatenate([each.limits for each in constraints]),
+        moments=np.concatenate([each.moments for each in constraints]),
+        labels=np.concatenate([each.labels for each in constraints]),
+        equal=equal,
+        levels=levels,
+        ball=len(block.controls) if block.ball else 0,
     )
 
 
 def joined(parts: Sequence[Lifted], controls: Sequence[Places], periods: int, total: int) -> Lifted:
-    """Return several blocks as one set, with controls in the order of the problem and states in
-    that of the blocks.
+    """Return the product of the sets of several blocks, with controls in the order of the problem.
 
     `controls` are the indices of each block's controls among the `total` controls of the problem;
-    other controls are zero.
+    other controls are zero. States are in the order of the blocks.
     """
     order = [t * total + int(j) for places in controls for t in range(periods) for j in places]
     control_free = np.zeros(periods * total)
-    control_response = np.zeros((periods * total, sum(p.size for p in parts)))
+    control_response = np.zeros((periods * total, sum(part.size for part in parts)))
     control_free[order] = np.concatenate([part.control_free for part in parts])
     control_response[order] = block_diag(*[part.control_response for part in parts])
     return Lifted(
-        np.hstack([part.free for part in parts]),
-        np.array([block_diag(*[part.response[t] for part in parts]) for t in range(periods + 1)]),
-        control_free,
-        control_response,
-        block_diag(*[part.rows for part in parts]),
-        np.concatenate([part.limits for part in parts]),
-        np.concatenate([part.moments for part in parts]),
-        np.concatenate([part.labels for part in parts]),
-        block_diag(*[part.equal for part in parts]),
-        np.concatenate([part.levels for part in parts]),
-        max(part.ball for part in parts),
+        free=np.hstack([part.free for part in parts]),
+        response=np.array(
+            [block_diag(*[part.response[t] for part in parts]) for t in range(periods + 1)]
+        ),
+        control_free=control_free,
+        control_response=control_response,
+        rows=block_diag(*[part.rows for part in parts]),
+        limits=np.concatenate([part.limits for part in parts]),
+        moments=np.concatenate([part.moments for part in parts]),
+        labels=np.concatenate([part.labels for part in parts]),
+        equal=block_diag(*[part.equal for part in parts]),
+        levels=np.concatenate([part.levels for part in parts]),
+        ball=max(part.ball for part in parts),
     )
 
 
 class _ThrustInAxes(NamedTuple):
-    """The thrust of a period, along the directions in which it depends on v and across them.
+    """The thrust of a period in the directions in which it depends on v, and in the others.
 
-    Along them it is `free` + `response` v, of shapes (k,) and (k, p); across them it is constant,
-    of length `constant`.
+    In the former it is `free` + `response` v, of shapes (k,) and (k, p); in the latter it is
+    constant, of length `constant`.
     """
 
     free: Floats
@@ -227,12 +259,11 @@ class _ThrustInAxes(NamedTuple):
 
 
 def _in_own_axes(fixed: Floats, turned: Floats, unit: float = 1.0) -> _ThrustInAxes:
-    """Return the thrust fixed + turned v, of shapes (m,) and (m, p), along and across the
-    directions in which it moves.
+    """Return the thrust fixed + turned v, of shapes (m,) and (m, p), by directions.
 
-    Its bound is `unit`. A cone that also has the directions in which the thrust is constant is the
-    same set, but the interior-point method loses digits in it: gaps were 1e-7 in place of 1e-9, and
-    rounding decided what was refused.
+    Its bound is `unit`. A cone that also contains the directions in which the thrust is constant is
+    the same set, but the interior-point method loses digits: gaps were 1e-7 in place of 1e-9, and
+    rounding decided which programs were refused.
     """
     axes, movements, _ = np.linalg.svd(turned, full_matrices=False)
     moving = movements > _STILL * unit
@@ -244,18 +275,18 @@ def _in_own_axes(fixed: Floats, turned: Floats, unit: float = 1.0) -> _ThrustInA
 
 
 def with_thrust(program: ConeProgram, lifted: Lifted, *, deep: bool = False) -> ConeProgram:
-    """Add |u(t)| <= 1 to a program whose first variables are those of the set; for thrust in a box
-    add nothing.
+    """Add |u(t)| <= 1 to a program, and return it; a program for thrust in a box is not changed.
 
-    If `deep`, the last variable of the program is the radius of a ball that must also be inside.
+    The first variables of the program are the variables of the set. If `deep`, the last variable is
+    the radius of a ball that must also be inside.
     """
     if not (lifted.ball and lifted.size):
         return program
     frees = lifted.control_free.reshape(-1, lifted.ball)
     responses = lifted.control_response.reshape(-1, lifted.ball, lifted.size)
     for fixed, turned in zip(frees, responses, strict=True):
+        # A thrust that does not depend on v is within its bound already.
         if np.linalg.norm(turned) <= _STILL:
-            # A thrust that does not depend on v is within its bound already.
             continue
         thrust = _in_own_axes(fixed, turned)
         if deep:
@@ -263,8 +294,9 @@ def with_thrust(program: ConeProgram, lifted: Lifted, *, deep: bool = False) -> 
             top[-1] = -np.linalg.norm(turned, ord=2)
             _bound_norm(program, thrust, top, 1.0)
         else:
-            room = np.sqrt(max((1.0 - thrust.constant) * (1.0 + thrust.constant), 0.0))
-            program.bound(thrust.response, thrust.free, np.zeros(len(program.cost)), float(room))
+            constant = thrust.constant
+            room = float(np.sqrt(max((1.0 - constant) * (1.0 + constant), 0.0)))
+            program.bound(thrust.response, thrust.free, np.zeros(len(program.cost)), room)
     return program
 
 
@@ -281,12 +313,11 @@ def _bound_norm(
 
 
 def min_relaxation(lifted: Lifted) -> tuple[float, Floats]:
-    """Return the minimum relaxation of all rows on states and of the equations with a feasible
-    point, and that point.
+    """Return the minimum relaxation of the constraints for a feasible point, and this point.
 
-    It is at least -1, where the search stops, and not positive if the set is not empty. Bounds on
-    controls are not relaxed. The relaxation of equations is not negative; without equations a
-    negative relaxation is a margin.
+    All rows on states and all equations are relaxed, but not the bounds on controls. The relaxation
+    is at least -1, where the search stops, and not positive if the set is not empty. The relaxation
+    of equations is not negative; without equations a negative relaxation is a margin.
     """
     soft = lifted.moments >= 0
     misfit = -np.ones((len(lifted.equal), 1))
@@ -300,15 +331,14 @@ def min_relaxation(lifted: Lifted) -> tuple[float, Floats]:
             -cost,
         ]
     )
-    limits = np.concatenate(
-        [lifted.limits, lifted.levels, -lifted.levels, [0.0 if len(lifted.equal) else 1.0]]
-    )
+    max_margin = 0.0 if len(lifted.equal) else 1.0
+    limits = np.concatenate([lifted.limits, lifted.levels, -lifted.levels, [max_margin]])
     point = _solution(ConeProgram(cost).keep(rows, limits), lifted)
     return float(point[-1]), point[:-1]
 
 
 def quadratic(lifted: Lifted, matrix: Floats, vector: Floats) -> Floats:
-    """Minimise v . matrix v / 2 + vector . v, convex, over a set of controls without equations."""
+    """Minimise v . matrix v / 2 + vector . v, which is convex, over a set without equations."""
     if not lifted.size:
         return np.zeros(0)
     program = ConeProgram(vector, matrix).keep(lifted.rows, lifted.limits)
@@ -316,8 +346,9 @@ def quadratic(lifted: Lifted, matrix: Floats, vector: Floats) -> Floats:
 
 
 def min_sum_of_norms(lifted: Lifted, scale: Floats, group: int) -> Floats:
-    """Minimise the sum over the periods of the norms of the `group` controls of a period; `scale`
-    is their units.
+    """Minimise the sum over the periods of the norm of the `group` controls of a period.
+
+    `scale`, shape (T m,), contains the units of the controls.
     """
     periods = len(lifted.control_free) // group
     tops = np.hstack([np.zeros((periods, lifted.size)), np.eye(periods)])
@@ -328,17 +359,18 @@ def min_sum_of_norms(lifted: Lifted, scale: Floats, group: int) -> Floats:
 def min_peak(lifted: Lifted, scale: Floats, group: int) -> tuple[float, Floats]:
     """Return the minimum common bound of all controls, and controls that attain it.
 
-    It is a bound of each component, or for thrust in a ball of the norm of the `group` controls of
-    a period; `scale` contains the units of the controls.
+    It bounds each component, or for thrust in a ball the norm of the `group` controls of a period.
+    `scale`, shape (T m,), contains the units of the controls.
     """
     cost = np.concatenate([np.zeros(lifted.size), [1.0]])
+    program = ConeProgram(cost).keep(lifted.rows, lifted.limits)
     if lifted.ball:
-        program = with_thrust(ConeProgram(cost).keep(lifted.rows, lifted.limits), lifted)
+        with_thrust(program, lifted)
         tops = np.repeat(cost[None, :], len(lifted.control_free) // group, axis=0)
         point = _with_norms_below(program, lifted, scale, tops).solve().point
     else:
-        program = ConeProgram(cost).keep(lifted.rows, lifted.limits)
-        point = program.keep(*_absolute(lifted, scale, np.ones((len(scale), 1)))).vertex()
+        program.keep(*_absolute(lifted, scale, np.ones((len(scale), 1))))
+        point = program.vertex()
     return float(point[-1]), point[:-1]
 
 
@@ -354,8 +386,7 @@ def min_l1(lifted: Lifted, scale: Floats) -> Floats:
 
 
 def deep_point(lifted: Lifted) -> tuple[Floats, float]:
-    """Return a point far from the boundary of a set with thrust in a ball, and the radius of a ball
-    inside around it.
+    """Return the centre and the radius of a large ball inside a set with thrust in a ball.
 
     The effect of the radius on the thrust of a period is bounded by the norm of its response: the
     ball is inside, but may not be the largest.
@@ -373,18 +404,20 @@ def deep_point(lifted: Lifted) -> tuple[Floats, float]:
 
 
 def _solution(program: ConeProgram, lifted: Lifted) -> Floats:
-    return with_thrust(program, lifted).solve().point if lifted.ball else program.vertex()
+    if lifted.ball:
+        return with_thrust(program, lifted).solve().point
+    return program.vertex()
 
 
 def _absolute(lifted: Lifted, scale: Floats, tops: Floats) -> tuple[Floats, Floats]:
-    """Rows for |controls| <= tops w, in the units of the controls, w being the variables after
-    those of the set.
+    """Rows and limits of |controls| <= tops w, in the units of the controls.
+
+    The variables w are after the variables of the set.
     """
     turned = scale[:, None] * lifted.control_response
     fixed = scale * lifted.control_free
-    return np.vstack([np.hstack([turned, -tops]), np.hstack([-turned, -tops])]), np.concatenate(
-        [-fixed, fixed]
-    )
+    rows = np.vstack([np.hstack([turned, -tops]), np.hstack([-turned, -tops])])
+    return rows, np.concatenate([-fixed, fixed])
 
 
 def _with_norms_below(
@@ -415,9 +448,7 @@ class Maximiser:
             self._solver = self._program.solver()
 
     def maximise(self, cost: Floats, max_gap: float = MAX_GAP) -> Floats:
-        """Return a maximiser of a linear function, both of shape (p,), with at most this duality
-        gap.
-        """
+        """Return a maximiser of a linear function, both of shape (p,), to a duality gap."""
         return self._solved(cost, max_gap).point
 
     def maximise_all(self, costs: Floats) -> Floats:
@@ -425,11 +456,11 @@ class Maximiser:
         return np.array([self.maximise(cost) for cost in costs]).reshape(costs.shape)
 
     def maximise_sharply(self, cost: Floats) -> Floats:
-        """Return a maximiser that is on its active rows to rounding; for thrust in a ball, to the
-        program's tolerance.
+        """Return a maximiser that is on its active rows to rounding.
 
         The solution takes the shortest step onto the rows whose multipliers are above their slacks:
-        one more least-squares problem.
+        one more least-squares problem. For thrust in a ball it stays as it is, on the rows to the
+        program's tolerance.
         """
         lifted = self._lifted
         optimum = self._solved(cost)
@@ -438,9 +469,9 @@ class Maximiser:
         active = optimum.multipliers > lifted.limits - lifted.rows @ optimum.point
         held = np.vstack([lifted.equal, lifted.rows[active]])
         missing = np.concatenate([lifted.levels, lifted.limits[active]]) - held @ optimum.point
-        moved = optimum.point + np.linalg.lstsq(held, missing, rcond=1e-12)[0]
-        kept = float((lifted.limits - lifted.rows @ moved).min(initial=0.0)) > -_BROKEN
-        return moved if kept else optimum.point
+        moved = optimum.point + np.linalg.lstsq(held, missing, rcond=_SHARP_RANK)[0]
+        violation = -float((lifted.limits - lifted.rows @ moved).min(initial=0.0))
+        return moved if violation < _MAX_SHARP_VIOLATION else optimum.point
 
     def _with_cost(self, cost: Floats) -> ConeProgram:
         lifted = self._lifted
@@ -453,7 +484,9 @@ class Maximiser:
         if not self._lifted.size:
             return Optimum(np.zeros(0), np.zeros(len(self._lifted.rows)))
         size = float(np.abs(cost).max())
-        down = -cost / (size if size > 0.0 else 1.0)
+        if size == 0.0:
+            size = 1.0
+        down = -cost / size
         self._solver.update(q=down)
         solution = self._solver.solve()
         try:

@@ -14,25 +14,29 @@ from infoset.rendezvous.reachability.selection import minimum_energy
 from infoset.rendezvous.reachability.solve import OptimalControls, optimal_controls
 
 Truth = Callable[[int, Floats, Floats], Floats]
-"""A function of the period, the true state and the control that returns the true state one period
-later.
-"""
+"""A function (period, true state, control) that returns the true state one period later."""
 Observer = Callable[[int, Floats], Floats]
-"""A function of the period and the true state that returns the estimated state."""
+"""A function (period, true state) that returns the estimated state."""
 
 _MORE = 1.001
+"""Factor of a relaxation above the smallest sufficient one, which could fail by rounding. Chosen:
+0.1 % of a relaxation is not noticed."""
 _MIN_RELAXATION = 1e-9
+"""Minimum increase of a relaxation, as a fraction of the bounds: the violation of a constraint that
+is accepted (`conic.MAX_VIOLATION`)."""
 _MAX_RELAXATION = 1e3
+"""Maximum relaxation, as a fraction of the bounds: at a state a thousand bounds away the simulation
+has failed."""
 
 
 @dataclass(frozen=True, eq=False)
 class ClosedLoopFlight:
-    """Simulation in closed loop: true states, shape (T + 1, n), and the controls applied, shape (T,
-    m).
+    """Simulation in closed loop.
 
-    `expected_misses`, shape (T,), are the minimum terminal norms of the plans, in the units of the
-    states. `relaxations`, shape (T,), are the fractions by which constraints on states were relaxed
-    for each plan; otherwise 0.
+    `states`, shape (T + 1, n), are the true states, and `controls`, shape (T, m), the controls
+    applied. `expected_misses`, shape (T,), are the minimum terminal norms of the plans, in the
+    units of the states. `relaxations`, shape (T,), are the fractions by which constraints on states
+    were relaxed for each plan, mostly 0.
     """
 
     states: Floats
@@ -53,64 +57,79 @@ def replan(
     *,
     relative: bool = False,
 ) -> ClosedLoopFlight:
-    """Simulate a problem in closed loop: in every period apply the first control of the optimal
-    plan of minimum energy.
+    """Simulate a problem in closed loop.
 
-    `truth` returns the true state one period later from the period, the true state and the control;
-    `observe` returns the estimated state from the period and the true state, and is None for exact
-    estimates. If a plan cannot reach zero, for example in the last period, it minimises the norm of
-    the states in the units of the problem, or divided by their bounds if `relative`.
+    Every period applies the first control of the optimal plan of minimum energy from the estimated
+    state. `observe` is None for exact estimates. If a plan cannot reach zero, for example in the
+    last period, it minimises the norm of the states in the units of the problem, or divided by
+    their bounds if `relative`.
 
-    T optima and T quadratic programs. If no control satisfies the constraints from a state, all of
-    them are relaxed by the minimum sufficient fraction.
+    A simulation solves T optima and T quadratic programs. If no control satisfies the constraints
+    from a state, all constraints on states are relaxed by the minimum sufficient fraction.
     """
-    state = problem.initial
-    steps = []
+    states = [problem.initial]
+    controls = []
+    misses = []
+    relaxations = []
     for t in range(problem.periods):
+        state = states[-1]
         estimated = state if observe is None else observe(t, state)
         optimal, relaxation = _plan(problem, t, estimated, relative)
         control = minimum_energy(optimal)[0]
-        state = truth(t, state, control)
-        steps.append((state, control, optimal.miss, relaxation))
-    states, controls, misses, relaxations = (
-        np.array(column) for column in zip(*steps, strict=True)
+        states.append(truth(t, state, control))
+        controls.append(control)
+        misses.append(optimal.miss)
+        relaxations.append(relaxation)
+    return ClosedLoopFlight(
+        np.vstack(states), np.array(controls), np.array(misses), np.array(relaxations)
     )
-    return ClosedLoopFlight(np.vstack([problem.initial, states]), controls, misses, relaxations)
 
 
 def relaxed(problem: ReachabilityProblem, fraction: float) -> ReachabilityProblem:
-    """Return a problem with every constraint on states relaxed by a fraction of the bounds on
-    states.
-    """
-    offsets = None if problem.offsets is None else problem.offsets + fraction * _sizes(problem)
+    """Return a problem with all constraints on states relaxed by a fraction of the bounds."""
+    offsets = problem.offsets
+    if offsets is not None:
+        offsets = offsets + fraction * _sizes(problem)
     return replace(problem, state_bounds=problem.state_bounds * (1.0 + fraction), offsets=offsets)
 
 
 def _sizes(problem: ReachabilityProblem) -> Floats:
+    """Sizes of the further constraints, in which they are relaxed."""
     return np.asarray(np.linalg.norm(problem.further[0] * problem.state_bounds, axis=1))
 
 
 def _plan(
     problem: ReachabilityProblem, start: int, estimated: Floats, relative: bool
 ) -> tuple[OptimalControls, float]:
+    """Return the optimal controls from a period on, and the relaxation that they needed."""
     fraction = 0.0
     while True:
         wider = relaxed(problem, fraction) if fraction else problem
         try:
             return optimal_controls(wider.rest(start, estimated), relative=relative), fraction
         except InadmissibleStartError as error:
-            missing = max(excess for _, excess in error.broken) / min(
-                [*problem.state_bounds, *_sizes(problem)]
-            )
-            normals, offsets = problem.further
-            beyond = ((normals @ estimated - offsets[start]) / _sizes(problem)).max(initial=-np.inf)
-            worst = max(
-                float((np.abs(estimated) / problem.state_bounds).max()) - 1.0, float(beyond)
-            )
-            fraction = max(2.0 * fraction, min(missing, worst) * _MORE, _MIN_RELAXATION)
+            needed = _relaxation_for_start(problem, start, estimated, error)
+            fraction = max(2.0 * fraction, needed * _MORE, _MIN_RELAXATION)
         except EmptyTubeError as error:
             fraction = (fraction + error.relaxation * (1.0 + fraction)) * _MORE + _MIN_RELAXATION
         if fraction > _MAX_RELAXATION:
             raise ArithmeticError(
                 f"no plan from period {start}: the state is far outside the constraints"
             )
+
+
+def _relaxation_for_start(
+    problem: ReachabilityProblem, start: int, estimated: Floats, error: InadmissibleStartError
+) -> float:
+    """Return a relaxation with which an estimated state is probably admissible.
+
+    It is the smaller of two estimates: from the violations in `error`, which are for the relaxed
+    problem, and from the constraints of the problem at the state.
+    """
+    smallest_size = min([*problem.state_bounds, *_sizes(problem)])
+    missing = max(excess for _, excess in error.broken) / smallest_size
+
+    normals, offsets = problem.further
+    beyond_bounds = float((np.abs(estimated) / problem.state_bounds).max()) - 1.0
+    excess = (normals @ estimated - offsets[start]) / _sizes(problem)
+    return min(missing, max(beyond_bounds, float(excess.max(initial=-np.inf))))

@@ -1,6 +1,4 @@
-"""Linear, quadratic and second-order cone programs, whose solutions are checked by duality before
-they are returned.
-"""
+"""Linear, quadratic and second-order cone programs, whose solutions are checked by duality."""
 
 from __future__ import annotations
 
@@ -16,16 +14,23 @@ from scipy.sparse import csc_matrix, issparse, vstack
 from infoset.geometry.polytope import HIGHS
 from infoset.rendezvous._arrays import Floats
 
-MAX_VIOLATION, MAX_GAP, CONE_TOLERANCE = 1e-9, 1e-8, 1e-7
-"""The maximum violation of a constraint, and the maximum duality gap, of a solution, relative. The
-third is both in a program with cones, where the solver does not always do better."""
-_TOLERANCE = 1e-10
+MAX_VIOLATION = 1e-9
+"""Maximum violation of a constraint by a solution, relative to the bounds: ten times the tolerance
+of the solvers."""
+MAX_GAP = 1e-8
+"""Maximum duality gap of a solution, relative: the misses and costs of a report are printed with
+fewer digits."""
+CONE_TOLERANCE = 1e-7
+"""Maximum violation and duality gap in a program with cones, where the solver does not always reach
+the other two."""
+_SOLVER_TOLERANCE = 1e-10
+"""Tolerance at which Clarabel stops, relative: a tenth of `MAX_VIOLATION`."""
+_SIZE_FACTOR = 2.0
+"""Size of a solution beside the size of the point found, in the lower bound by weak duality."""
 
 
 class SolverSettings(NamedTuple):
-    """How Clarabel solves its linear systems: their regularisation, and whether the rows of cones
-    are rescaled.
-    """
+    """Settings of Clarabel's linear systems: regularisation, and rescaling of the rows of cones."""
 
     regularisation: float
     rescales_cones: bool
@@ -34,11 +39,11 @@ class SolverSettings(NamedTuple):
 ATTEMPTS = (SolverSettings(3e-8, False), SolverSettings(1e-8, False), SolverSettings(3e-8, True))
 """Settings that are tried in turn until a solution passes the check.
 
-Rounding, and so the machine, decides in which programs with cones the last iterations fail; each
-setting fails in others. Of 300 random problems, half of them at the edge of feasibility, the first
-alone leaves up to three without a solution and all together one. With rescaling, the solver's
-default, some gaps are 3e-2 in place of 1e-7: rows are in units of their limits already. Programs
-without cones are always rescaled."""
+Rounding, and so the machine, decides in which programs with cones the last iterations fail, and
+each setting fails in other programs. Of 300 random problems, half of them at the edge of
+feasibility, the first setting alone leaves up to three without a solution, and all settings leave
+one. With rescaling, the solver's default, some gaps are 3e-2 in place of 1e-7, because rows are in
+units of their limits already. Programs without cones are always rescaled."""
 
 
 class NoSolutionError(ArithmeticError):
@@ -47,31 +52,47 @@ class NoSolutionError(ArithmeticError):
 
 @dataclass(frozen=True, eq=False)
 class Optimum:
-    """A solution of a program: the point, and the multipliers of its inequality rows (none
-    negative).
-    """
+    """A solution of a program: a point, and the multipliers of the inequality rows, at least 0."""
 
     point: Floats
     multipliers: Floats
 
 
+class SolutionErrors(NamedTuple):
+    """Violation of the constraints by a point, and its duality gap; both relative."""
+
+    violation: float
+    gap: float
+
+
+class _Constraint(NamedTuple):
+    """Slacks ends - rows v in a cone.
+
+    `kind` is "rows" for slacks that are not negative, "equations" for zero, and "cone" for a
+    second-order cone.
+    """
+
+    kind: str
+    rows: Floats
+    ends: Floats
+    cone: object
+
+
 class ConeProgram:
     """Minimise v . matrix v / 2 + cost . v over rows, equations and second-order cones.
 
-    `cost` has shape (p,); `matrix`, shape (p, p), is positive semidefinite, and zero where it is
-    None. Rows with fewer than p columns do not depend on the last variables.
+    `cost` has shape (p,); `matrix`, shape (p, p), is positive semidefinite, and None for zero. Rows
+    with fewer than p columns do not depend on the last variables.
     """
 
     def __init__(self, cost: Floats, matrix: Floats | None = None) -> None:
         self.cost = cost
         self._matrix = csc_matrix((len(cost), len(cost))) if matrix is None else csc_matrix(matrix)
-        self._added: list[tuple[str, Floats, Floats, object]] = []
+        self._added: list[_Constraint] = []
         self._whole: tuple[Floats, Floats] | None = None
 
     def keep(self, rows: Floats, limits: Floats) -> ConeProgram:
-        """Add rows v <= limits; the rows of a program that is only checked may be a sparse
-        array.
-        """
+        """Add rows v <= limits; rows may be a sparse array if the program is only checked."""
         return self._add("rows", rows, limits, clarabel.NonnegativeConeT(len(limits)))
 
     def meet(self, rows: Floats, levels: Floats) -> ConeProgram:
@@ -83,27 +104,29 @@ class ConeProgram:
     ) -> ConeProgram:
         """Add |free + response v| <= top . v + height."""
         block = np.vstack([-top[None, :], -self._widened(response)])
-        return self._add(
-            "cone", block, np.concatenate([[height], free]), clarabel.SecondOrderConeT(len(block))
-        )
+        ends = np.concatenate([[height], free])
+        return self._add("cone", block, ends, clarabel.SecondOrderConeT(len(block)))
 
     @property
     def _has_cones(self) -> bool:
-        return any(kind == "cone" for kind, *_ in self._added)
+        return any(each.kind == "cone" for each in self._added)
 
-    def _add(self, kind: str, block: Floats, ends: Floats, cone: object) -> ConeProgram:
+    def _add(self, kind: str, rows: Floats, ends: Floats, cone: object) -> ConeProgram:
         if len(ends):
-            self._added.append((kind, self._widened(block), ends, cone))
+            self._added.append(_Constraint(kind, self._widened(rows), ends, cone))
             self._whole = None
         return self
 
     def _widened(self, rows: Floats) -> Floats:
         missing = len(self.cost) - rows.shape[1]
-        return np.hstack([rows, np.zeros((len(rows), missing))]) if missing else rows
+        if not missing:
+            return rows
+        return np.hstack([rows, np.zeros((len(rows), missing))])
 
     def solve(self) -> Optimum:
-        """Return a solution, by an interior-point method (Clarabel); raise `NoSolutionError` as
-        `checked` does.
+        """Return a solution by an interior-point method (Clarabel).
+
+        Raise `NoSolutionError` as `checked` does.
         """
         for settings in ATTEMPTS[:-1]:
             try:
@@ -124,15 +147,15 @@ class ConeProgram:
         sizes[sizes == 0.0] = 1.0
         rows = rows / sizes[:, None]
         limits = limits / sizes
-        equations = {"A_eq": equal, "b_eq": levels} if len(equal) else {}
         optimum = linprog(
             self.cost,
             A_ub=rows,
             b_ub=limits,
+            A_eq=equal if len(equal) else None,
+            b_eq=levels if len(equal) else None,
             bounds=(None, None),
             method="highs",
             options=HIGHS,
-            **equations,
         )
         if optimum.status != 0:
             raise NoSolutionError(f"a linear program was not solved: {optimum.message}")
@@ -147,10 +170,11 @@ class ConeProgram:
         cost: Floats | None = None,
         max_gap: float = MAX_GAP,
     ) -> Optimum:
-        """Return an answer of a solver as a solution: see `violation_and_gap` for the arguments.
+        """Return an answer of a solver as a solution, if it passes the check.
 
-        Raise `NoSolutionError` if a constraint is violated by more than 1e-9, or the duality gap is
-        over `max_gap`. In a program with cones both may be 1e-7.
+        The arguments are described in `violation_and_gap`. Raise `NoSolutionError` if a constraint
+        is violated by more than 1e-9, or the duality gap is over `max_gap`. In a program with cones
+        both may be 1e-7.
         """
         max_violation = MAX_VIOLATION
         if self._has_cones:
@@ -158,7 +182,8 @@ class ConeProgram:
             max_gap = max(CONE_TOLERANCE, max_gap)
         violation, gap = self.violation_and_gap(point, multipliers, cost)
         if violation <= max_violation and gap > max_gap:
-            gap = self.violation_and_gap(point, self._balanced(point, multipliers, cost), cost)[1]
+            balanced = self._balanced(point, multipliers, cost)
+            gap = self.violation_and_gap(point, balanced, cost).gap
         if not (violation <= max_violation and gap <= max_gap):
             raise NoSolutionError(
                 f"a convex program was not solved to {max_gap:g}: relative gap {gap:.2g}, "
@@ -168,9 +193,7 @@ class ConeProgram:
         return Optimum(point, np.maximum(np.concatenate([np.zeros(0), *parts]), 0.0))
 
     def answer(self, chosen: SolverSettings = ATTEMPTS[0]) -> tuple[Floats, Floats]:
-        """Return the solver's point, and its multipliers of all constraints in their order,
-        unchecked.
-        """
+        """Return the point and the multipliers of all constraints from the solver, unchecked."""
         solution = self.solver(chosen).solve()
         return np.array(solution.x), np.array(solution.z)
 
@@ -179,25 +202,25 @@ class ConeProgram:
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.presolve_enable = False
-        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = _TOLERANCE
+        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = _SOLVER_TOLERANCE
         settings.static_regularization_constant = chosen.regularisation
         settings.equilibrate_enable = chosen.rescales_cones or not self._has_cones
         settings.max_threads = 1
         upper = csc_matrix(np.triu(self._matrix.toarray())) if self._matrix.nnz else self._matrix
         rows, ends = self._all()
-        cones = [cone for *_, cone in self._added]
+        cones = [each.cone for each in self._added]
         return clarabel.DefaultSolver(upper, self.cost, csc_matrix(rows), ends, cones, settings)
 
     def violation_and_gap(
         self, point: Floats, multipliers: Floats, cost: Floats | None = None
-    ) -> tuple[float, float]:
-        """Return the violation of the constraints at a point, and its duality gap; both relative.
+    ) -> SolutionErrors:
+        """Return the violation of the constraints at a point, and its duality gap.
 
         Multipliers, of all constraints in their order, are moved into the dual cone first. A `cost`
-        is used in place of the program's. The gap is relative to the value, or to the change of the
-        value that the allowed violation can cause. By weak duality no solution y is below - v .
-        matrix v / 2 - multipliers . limits - |residual| . |y|; y is assumed to be at most twice as
-        large as the point.
+        replaces the cost of the program. The gap is relative to the value, or to the change of the
+        value that the allowed violation can cause. By weak duality the value at a solution y is at
+        least - v . matrix v / 2 - multipliers . limits - |residual| . |y|; y is assumed to be at
+        most twice as large as the point.
         """
         linear = self.cost if cost is None else cost
         rows, ends = self._all()
@@ -217,35 +240,39 @@ class ConeProgram:
                 part[0] = max(part[0], float(np.linalg.norm(part[1:])))
             dual.append(part)
         held = np.concatenate(dual)
+
         turned = self._matrix @ point
         curved = 0.5 * float(point @ turned)
         residual = np.asarray(turned + linear + rows.T @ held, dtype=np.float64)
-        size = 2.0 * max(1.0, float(np.abs(point).max(initial=0.0)))
+        size = _SIZE_FACTOR * max(1.0, float(np.abs(point).max(initial=0.0)))
         value = curved + float(linear @ point)
         bound = -curved - float(held @ ends) - size * float(np.abs(residual).sum())
         scale = max(1.0, abs(value), MAX_VIOLATION / MAX_GAP * float(np.abs(held).sum()))
-        return violation, abs(value - bound) / scale
+        return SolutionErrors(violation, abs(value - bound) / scale)
 
     def _balanced(self, point: Floats, multipliers: Floats, cost: Floats | None) -> Floats:
-        """Return the multipliers with the smallest change that cancels the residual of the
-        conditions of optimality.
+        """Return multipliers without a residual of the conditions of optimality, changed least.
 
-        Only multipliers of free sign and those of active rows change. The residual counts times the
-        size of the variables, so that one of the solver's tolerance can exceed the maximum gap; the
-        change of the multipliers costs much less.
+        Multipliers of free sign and of active rows change. The gap contains the residual times the
+        size of the variables, so that a residual of the solver's tolerance can exceed the maximum
+        gap; the change of the multipliers costs much less.
         """
+        linear = self.cost if cost is None else cost
         rows, ends = self._all()
         free = []
         for (kind, slack), (_, part) in zip(
             self.parts(ends - rows @ point), self.parts(multipliers), strict=True
         ):
-            free.append(
-                part > slack if kind == "rows" else np.arange(len(part)) >= (kind == "cone")
-            )
+            if kind == "rows":
+                free.append(part > slack)
+            else:
+                first_free = 1 if kind == "cone" else 0
+                free.append(np.arange(len(part)) >= first_free)
         moving = np.concatenate(free)
+
         held = np.where(moving, multipliers, np.maximum(multipliers, 0.0))
         if moving.any():
-            residual = self._matrix @ point + (self.cost if cost is None else cost) + rows.T @ held
+            residual = self._matrix @ point + linear + rows.T @ held
             held[moving] -= np.linalg.lstsq(rows[moving].T, residual, rcond=None)[0]
         return np.asarray(held)
 
@@ -255,18 +282,18 @@ class ConeProgram:
         return self._whole
 
     def _stacked(self, wanted: str | None = None) -> tuple[Floats, Floats]:
-        chosen = [(block, ends) for kind, block, ends, _ in self._added if wanted in (None, kind)]
-        blocks = [np.zeros((0, len(self.cost))), *(block for block, _ in chosen)]
-        rows = (
-            vstack(blocks, format="csr")
-            if any(issparse(block) for block in blocks)
-            else np.vstack(blocks)
-        )
-        return rows, np.concatenate([np.zeros(0), *(ends for _, ends in chosen)])
+        """Rows and ends of the constraints of a kind, or of all constraints."""
+        chosen = [each for each in self._added if wanted in (None, each.kind)]
+        blocks = [np.zeros((0, len(self.cost))), *(each.rows for each in chosen)]
+        ends = np.concatenate([np.zeros(0), *(each.ends for each in chosen)])
+        if any(issparse(block) for block in blocks):
+            return vstack(blocks, format="csr"), ends
+        return np.vstack(blocks), ends
 
     def parts(self, values: Floats) -> Iterator[tuple[str, Floats]]:
-        """Yield the values of each constraint added, with its kind."""
+        """Yield the kind of each constraint, in the order added, and its part of some values."""
         start = 0
-        for kind, _, ends, _ in self._added:
-            yield kind, values[start : start + len(ends)]
-            start += len(ends)
+        for each in self._added:
+            end = start + len(each.ends)
+            yield each.kind, values[start:end]
+            start = end

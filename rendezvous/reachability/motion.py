@@ -18,11 +18,14 @@ from infoset.rendezvous.relative_motion import (
 )
 
 _RELATIVE = 1e-12
+"""Relative error of a step of the integrator, near the smallest that DOP853 accepts in doubles."""
 _ABSOLUTE = 1e-9
+"""Absolute error of a step of the integrator, m and m/s: it acts only near zero, below the printed
+digits of a miss."""
 
 
 class MotionModel(Enum):
-    """Linear model: A constant, with its value at t = 0, or A(t) of the elliptic orbit."""
+    """Matrix of the linear model: A(0) at all times (frozen), or A(t) of the elliptic orbit."""
 
     FROZEN = "frozen"
     TIME_VARYING = "time-varying"
@@ -44,10 +47,9 @@ def discretised(
     """Return A(t) and B(t) of x(t + 1) = A(t) x(t) + B(t) u(t), exact for controls held over a
     period.
 
-    A(t), shape (periods, 6, 6), is of states in m and m/s of the `motion`; B(t), shape (periods, 6,
-    3), is in m and m/s for a unit control, of acceleration `acceleration_m_s2`.
-
-    Equation (3).
+    Equation (3) of Shorikov and Goranov (2021). States are in m and m/s. A(t), shape (periods, 6,
+    6), and B(t), shape (periods, 6, 3), are matrices of the `motion`; a unit control is an
+    acceleration of `acceleration_m_s2`.
     """
     starts = period_s * np.arange(periods)
     segment = motion.segment(starts, starts + period_s)
@@ -57,26 +59,23 @@ def discretised(
 def between_periods(
     motion: HeldMotion, periods: int, period_s: float, acceleration_m_s2: float, instants: int
 ) -> Floats:
-    """Return the matrices of states within the periods, x = matrix (x(t), u(t)), shape (periods,
-    instants, 6, 9).
+    """Return the matrices of states within periods, as functions of (x(t), u(t)).
 
-    `motion`, `periods`, `period_s` and `acceleration_m_s2` are those of `discretised`; `instants`
-    are evenly spaced within a period.
+    `motion`, `periods`, `period_s` and `acceleration_m_s2` are as in `discretised`; `instants` is
+    the number of evenly spaced times within each period. The shape is (periods, instants, 6, 9).
     """
     starts = period_s * np.arange(periods)[:, None]
-    segment = motion.segment(
-        starts, starts + period_s * np.arange(1, instants + 1) / (instants + 1)
-    )
+    since_start = period_s * np.arange(1, instants + 1) / (instants + 1)
+    segment = motion.segment(starts, starts + since_start)
     return np.concatenate([segment.transition, acceleration_m_s2 * segment.held], axis=-1)
 
 
 @dataclass(frozen=True)
 class NonlinearMotion:
-    """Relative motion in a central field, in Hill's axes: x radially outward, y along the motion, z
-    completes.
+    """Relative motion in a central field, in Hill's axes (see `relative_motion`).
 
     Equations (1) of Shorikov and Goranov (2021), whose x is -y here and whose y is x, with w^2 r^4
-    / p = mu; DOP853 to 1e-12. The passive craft is on the `orbit`.
+    / p = mu, integrated by DOP853 to 1e-12. The passive craft is on the `orbit`.
     """
 
     orbit: EllipticOrbit
@@ -103,16 +102,19 @@ class NonlinearMotion:
         k2 = self.orbit.semi_latus_rate_rad_s
         parameter = self.semi_major_axis_m * (1.0 - e * e)
         gravity = k2 * k2 * parameter**3
+        if times[-1] == start_s:
+            return np.repeat(initial[:, None, :], len(times), axis=1)
 
         def slope(_time: float, flat: Floats) -> Floats:
+            """Rates of (true anomaly, states of all paths, by component)."""
             anomaly = flat[0]
-            state = flat[1:].reshape(6, count)
+            x, y, z, vx, vy, vz = flat[1:].reshape(6, count)
             rho = 1.0 + e * np.cos(anomaly)
             r = parameter / rho
             w = k2 * rho * rho
             w_dot = -2.0 * k2 * k2 * e * np.sin(anomaly) * rho**3
-            x, y, z, vx, vy, vz = state
             pull = gravity / ((r + x) ** 2 + y * y + z * z) ** 1.5
+
             result = np.empty(1 + 6 * count)
             result[0] = w
             rates = result[1:].reshape(6, count)
@@ -125,8 +127,6 @@ class NonlinearMotion:
             return result
 
         begin = np.concatenate([[float(self.orbit.true_anomaly(start_s))], initial.T.ravel()])
-        if times[-1] == start_s:
-            return np.repeat(initial[:, None, :], len(times), axis=1)
         solution = solve_ivp(
             slope,
             (start_s, times[-1]),
@@ -143,11 +143,12 @@ class NonlinearMotion:
     def fly(
         self, start: ArrayLike, accelerations: ArrayLike, period_s: float, points: int = 1
     ) -> Floats:
-        """Return the states of craft that hold an acceleration during each period, shape (k, T
-        points + 1, 6).
+        """Return the states of craft that hold an acceleration during each period.
 
         All start in the state `start`, shape (6,), at t = 0; `accelerations` have shape (k, T, 3),
-        in m/s^2; `points` instants of each period are returned. Errors are those of `paths`.
+        in m/s^2. The result, shape (k, T points + 1, 6), contains the start and `points` evenly
+        spaced times of each period, the last one at its end. `ArithmeticError` is raised as in
+        `paths`.
         """
         push = np.asarray(accelerations, dtype=float)
         state = np.broadcast_to(np.asarray(start, dtype=float), (len(push), 6))

@@ -20,27 +20,47 @@ from infoset.rendezvous.reachability.conic import (
 from infoset.rendezvous.reachability.problem import StateBlock
 from infoset.rendezvous.reachability.relative_interior import null_space_basis, relative_interior
 
-_REACHED = 1e-9
-"""Constraints that are broken by less than this, relative to their sizes, count as kept."""
+_KEPT = 1e-9
+"""Violation of a constraint, relative to its size, up to which it counts as satisfied: the maximum
+violation that `MAX_VIOLATION` allows a solution."""
+_ACTIVE = 1e-9
+"""Multiplier, relative to the largest one, above which its row is tight for every optimal control.
+Chosen: optimal controls do not change from 1e-10 to 1e-8 in published and random problems."""
 _PRESSED = 1e-7
+"""Pressure on the bound of a thrust in a ball, relative to the largest multiplier, above which the
+thrust is the same in every optimal control: the error of multipliers in a program with cones
+(`CONE_TOLERANCE`)."""
 _CLOSE = 1e-12
-"""Relative gap between the norm and its lower bound at which the search stops."""
-_ZERO, _ABSOLUTE = 1e-11, 1e-12
-"""Norms below the first part of what the controls can do count as zero, unless their lower bound is
-above rounding; the second is the maximum gap where it is more than the relative one."""
+"""Relative gap between the norm and its lower bound at which the search stops: the maximum gap of a
+small norm (`_ABSOLUTE`)."""
+_ZERO = 1e-11
+"""Norm, relative to the effect of the controls, below which it counts as zero, unless its lower
+bound is above rounding: ten times the gap of a small norm (`_ABSOLUTE`)."""
+_ABSOLUTE = 1e-12
+"""Maximum gap between a small norm and its lower bound, relative to the effect of the controls; the
+thorough tests compare with forty digits at this precision."""
+_ROUNDINGS = 8.0
+"""Roundings of the sum of absolute terms that the error of a lower bound may have."""
 _ULP = float(np.finfo(float).eps)
 _RANK = 1e-13
+"""Relative singular value below which equations count as dependent. Chosen: optimal controls do not
+change from 1e-14 to 1e-11 in published and random problems."""
 _ROUNDS = (*ATTEMPTS, *ATTEMPTS[:2])
 """Settings of the solver in the rounds of the search; most searches end after the first."""
 _REACH = 1e4
+"""Maximum change of a control in a round, in units of the norm found. Constraints that are farther
+away are left out of the program. Chosen: from 1e3 to
+1e5 results change by 1e-7 at most, the tolerance of the programs."""
+_MAX_NAMES = 4
+"""Maximum number of conflicting constraints that a message names."""
 
 
 class EmptyTubeError(ValueError):
     """No control satisfies the constraints.
 
-    `time` is the first time t such that the constraints up to t cannot all be kept, and `names`
-    lists those that conflict there. `relaxation` is the minimum relaxation of all constraints on
-    states, as a fraction of their bounds, with which all can be satisfied.
+    `time` is the first time t such that no control satisfies all constraints up to t, and `names`
+    lists constraints that conflict there. `relaxation` is the minimum relaxation of all constraints
+    on states, as a fraction of their bounds, with which all can be satisfied.
     """
 
     def __init__(self, time: int, relaxation: float, names: tuple[str, ...]) -> None:
@@ -55,12 +75,12 @@ class EmptyTubeError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class BlockOptimum:
-    """The minimum terminal norm of a `block`, which is relaxed by rounding where needed.
+    """The minimum terminal norm of a `block`, whose constraints may be relaxed by rounding.
 
-    `terminal`, shape (n,), is the terminal state of minimum norm, which is unique, scaled; exactly
-    zero where that is `reached`. `optimal` contains all optimal controls, in coordinates z of their
-    affine hull; thrust in a ball remains a constraint. `centre`, shape (d,), is a point far from
-    its boundary, in its coordinates.
+    `terminal`, shape (n,), is the terminal state of minimum norm, divided by the bounds. It is
+    unique, and exactly zero if zero is `reached`. `optimal` contains all optimal controls, in
+    coordinates z of their affine hull; thrust in a ball remains a constraint. `centre`, shape (d,),
+    is a point z far from the boundary of this set.
     """
 
     block: StateBlock
@@ -91,32 +111,42 @@ def block_optimum(block: StateBlock, *, relative: bool = False) -> BlockOptimum:
     minimum = min_norm(lifted, np.ones(block.size) if relative else block.scale / block.scale.max())
     # The solution itself must not be outside by rounding.
     lifted = replace(lifted, limits=np.maximum(lifted.limits, lifted.rows @ minimum.point))
-    gaps = lifted.limits - lifted.rows @ minimum.point
-    most = max(
-        float(minimum.multipliers.max(initial=0.0)),
-        float(np.abs(minimum.pressures).max(initial=0.0)),
-    )
-    held = (minimum.multipliers > gaps) & (minimum.multipliers > _REACHED * most)
-    fixed = np.zeros(len(lifted.control_free), dtype=bool)
-    if lifted.ball:  # on the sphere the thrust of a period is unique
-        pressed = np.linalg.norm(minimum.pressures.reshape(-1, lifted.ball), axis=1)
-        fixed = np.repeat(pressed > max(_PRESSED * most, 1e-300), lifted.ball)
-    across = np.vstack([lifted.rows[held], lifted.control_response[fixed]])
-    terminal = (
-        np.zeros(block.size)
-        if minimum.reached
-        else lifted.free[-1] + lifted.response[-1] @ minimum.point
-    )
-    face = lifted.where(lifted.response[-1], terminal - lifted.free[-1]).where(
-        across, across @ minimum.point
-    )
+
+    terminal = np.zeros(block.size)
+    if not minimum.reached:
+        terminal = lifted.free[-1] + lifted.response[-1] @ minimum.point
+    across = _same_for_all(lifted, minimum)
+    face = lifted.where(lifted.response[-1], terminal - lifted.free[-1])
+    face = face.where(across, across @ minimum.point)
+
     if lifted.ball:
         optimal = face.within(minimum.point, null_space_basis(face.equal))
-        optimal = optimal.only(np.flatnonzero(np.linalg.norm(optimal.rows, axis=1) > _REACHED))
-        return BlockOptimum(block, terminal, minimum.reached, optimal, deep_point(optimal)[0])
+        # Rows that do not depend on z have no direction.
+        optimal = optimal.only(np.flatnonzero(np.linalg.norm(optimal.rows, axis=1) > _KEPT))
+        centre, _ = deep_point(optimal)
+        return BlockOptimum(block, terminal, minimum.reached, optimal, centre)
     hull = relative_interior(face.rows, face.limits, face.equal, face.levels, minimum.point)
     optimal = face.within(hull.point, hull.basis).only(hull.kept)
     return BlockOptimum(block, terminal, minimum.reached, optimal, hull.centre)
+
+
+def _same_for_all(lifted: Lifted, minimum: MinimumNorm) -> Floats:
+    """Rows of the linear functions of v that have one value for all optimal controls.
+
+    They are the constraints with positive multipliers, and for thrust in a ball the thrusts that a
+    bound presses on: on the sphere such a thrust is unique.
+    """
+    gaps = lifted.limits - lifted.rows @ minimum.point
+    largest = max(
+        float(minimum.multipliers.max(initial=0.0)),
+        float(np.abs(minimum.pressures).max(initial=0.0)),
+    )
+    held = (minimum.multipliers > gaps) & (minimum.multipliers > _ACTIVE * largest)
+    fixed = np.zeros(len(lifted.control_free), dtype=bool)
+    if lifted.ball:
+        pressed = np.linalg.norm(minimum.pressures.reshape(-1, lifted.ball), axis=1)
+        fixed = np.repeat(pressed > max(_PRESSED * largest, 1e-300), lifted.ball)
+    return np.vstack([lifted.rows[held], lifted.control_response[fixed]])
 
 
 def block_reaches_zero(block: StateBlock) -> bool:
@@ -124,8 +154,8 @@ def block_reaches_zero(block: StateBlock) -> bool:
 
     `NoSolutionError` is raised if neither such a control nor a positive lower bound was found.
     """
-    relaxation = min_relaxation(lift(block))[0]
-    if relaxation > _REACHED:
+    relaxation, _ = min_relaxation(lift(block))
+    if relaxation > _KEPT:
         return False
     search = _OptimumSearch(lift(_relaxed(block, relaxation)), np.ones(block.size))
     search.solve()
@@ -133,45 +163,47 @@ def block_reaches_zero(block: StateBlock) -> bool:
 
 
 def admissible(block: StateBlock) -> StateBlock:
-    """Return a block whose constraints can be satisfied: the block itself, or one relaxed by
-    rounding.
+    """Return a block whose constraints can be satisfied: the block itself, or relaxed by rounding.
 
-    If no control satisfies the constraints by 1e-9 of their sizes, all of them are relaxed until
-    one does. Raise `EmptyTubeError` if the relaxation is more than 1e-9. The first time at which
-    constraints conflict is found by bisection, with a linear program per step.
+    If no control satisfies all constraints with a margin of 1e-9 of their sizes, the constraints
+    are relaxed until one does. Raise `EmptyTubeError` if constraints must be relaxed by more than
+    1e-9 to be feasible. The first time at which constraints conflict is found by bisection, with a
+    linear program per step.
     """
     lifted = lift(block)
-    relaxation = min_relaxation(lifted)[0]
-    if relaxation <= _REACHED:
+    relaxation, _ = min_relaxation(lifted)
+    if relaxation <= _KEPT:
         return _relaxed(block, relaxation)
 
     def conflicts(time: int) -> bool:
-        return min_relaxation(lifted.until(time))[0] > _REACHED
+        return min_relaxation(lifted.until(time))[0] > _KEPT
 
     first = 1 + bisect_left(range(1, block.periods), True, key=conflicts)
     _, point = min_relaxation(lifted.until(first))
     gaps = lifted.limits - lifted.rows @ point
-    tight = (gaps < _REACHED) & (lifted.moments >= 0) & (lifted.moments <= first)
+    tight = (gaps < _KEPT) & (lifted.moments >= 0) & (lifted.moments <= first)
     names = dict.fromkeys(
         f"{block.names[label]} at t = {moment}"
         for label, moment in zip(lifted.labels[tight], lifted.moments[tight], strict=True)
     )
-    raise EmptyTubeError(first, relaxation, tuple(names)[:4])
+    raise EmptyTubeError(first, relaxation, tuple(names)[:_MAX_NAMES])
 
 
 def _relaxed(block: StateBlock, relaxation: float) -> StateBlock:
-    margin = relaxation + _REACHED
-    return replace(block, offsets=block.offsets + margin) if margin > 0.0 else block
+    margin = relaxation + _KEPT
+    if margin <= 0.0:
+        return block
+    return replace(block, offsets=block.offsets + margin)
 
 
 @dataclass(frozen=True, eq=False)
 class MinimumNorm:
     """The controls of minimum terminal norm.
 
-    `point`, shape (p,), contains the controls, divided by their bounds; `reached` says that the
-    norm is zero to rounding. `multipliers`, shape (r,), are those of the rows, a box included: the
-    derivative of the norm by a limit, sign reversed. `pressures`, shape (p,), is the derivative of
-    the norm, without its constraints' part, by each control: the bounds on controls balance it.
+    `point`, shape (p,), contains the controls, divided by their bounds; `reached` is true if the
+    norm is zero to rounding. `multipliers`, shape (r,), of all rows, are the negative derivatives
+    of the norm by the limits. `pressures`, shape (p,), is the derivative by each control of the
+    norm plus the rows on states times their multipliers: the bounds on controls balance it.
     """
 
     point: Floats
@@ -184,19 +216,21 @@ def min_norm(lifted: Lifted, weights: Floats) -> MinimumNorm:
     """Minimise |weights x(T)| over all controls of a block, a set without equations; weights, shape
     (n,), are positive.
 
-    Raise `NoSolutionError` if the norm found is not within 1e-8 of its lower bound, or 1e-12 of
-    what the controls can do, or the controls violate a constraint by more than 1e-9.
+    Raise `NoSolutionError` if the norm found exceeds its lower bound by more than 1e-8, relative,
+    and by more than 1e-12 of the effect of the controls, or if the controls violate a constraint by
+    more than 1e-9.
 
     The cone program minimises t with |weights x(T)| <= t, not the square of the norm, whose
     multipliers vanish with it. A solver finds t to its tolerance times the size of the states; the
     program is therefore solved again about its own solution, in units of the norm found, until both
     bounds meet (iterative refinement).
 
-    The lower bound is that of weak duality. For any direction d with |d| <= 1 and any multipliers l
-    >= 0 of the constraints on states, |y| >= d . y, and d . y is not below d . free - l . limits -
-    the norm of R' d + rows' l that is dual to the bound on the controls: a bound whether or not d
-    and l are optimal. They are first moved to where R' d + rows' l vanishes for each control that
-    is not at its bound, so that the error of the bound is of the order of the square of theirs.
+    The lower bound comes from weak duality. For any direction d with |d| <= 1 and any multipliers l
+    >= 0 of the constraints on states, |y| >= d . y, and d . y is at least d . free - l . limits -
+    the norm of R' d + rows' l that is dual to the bound on the controls. It is a bound whether or
+    not d and l are optimal. Before, d and l are moved to where R' d + rows' l vanishes for each
+    control that is not at its bound, so that the error of the bound is of the order of the square
+    of their errors.
     """
     search = _OptimumSearch(lifted, weights)
     search.solve()
@@ -204,7 +238,12 @@ def min_norm(lifted: Lifted, weights: Floats) -> MinimumNorm:
 
 
 class _OptimumSearch:
-    """Search for a point of minimum norm, with the best point and the best lower bound so far."""
+    """Search for a point of minimum norm, with the best point and the best lower bound so far.
+
+    `_free` + `_response` v is the weighted terminal state, and `_reach` a bound of its norm.
+    `_soft` marks the rows on states, and `_lengths` are the changes of the rows by controls of size
+    one.
+    """
 
     def __init__(self, lifted: Lifted, weights: Floats) -> None:
         self._lifted = lifted
@@ -221,6 +260,9 @@ class _OptimumSearch:
         self._direction = np.zeros(len(self._free))
         self._multipliers = np.zeros(len(lifted.rows))
 
+    # `_point`, `value`, `violation` and `_merit` are written by `_offer_point` only, `_bound`,
+    # `_error`, `_direction` and `_multipliers` by `_offer_bound` only.
+
     @property
     def above_zero(self) -> bool:
         """Whether the lower bound proves that zero is not reached."""
@@ -234,7 +276,9 @@ class _OptimumSearch:
     @property
     def _gap(self) -> float:
         """The gap between the norm and its lower bound, beyond rounding."""
-        return 0.0 if self.at_zero else abs(self.value - max(self._bound, 0.0)) - self._error
+        if self.at_zero:
+            return 0.0
+        return abs(self.value - max(self._bound, 0.0)) - self._error
 
     def solve(self) -> None:
         """Solve the cone program, and again about its own solution until the gap is small."""
@@ -257,23 +301,22 @@ class _OptimumSearch:
                 f"the minimum terminal norm was not solved to {MAX_GAP:g}: relative gap "
                 f"{self._gap / self.value:.2g}, constraints violated by {self.violation:.2g}"
             )
-        residual = self._residual(self._direction, self._multipliers)
+        # If zero is inside the set of terminal states, no constraint is active.
         if self.at_zero and self._bound < -_ZERO * self._reach:
-            # Zero is inside the set reached: no constraint is active.
             return MinimumNorm(
                 self._point, True, np.zeros(len(self._multipliers)), np.zeros(self._lifted.size)
             )
+
+        residual = self._residual(self._direction, self._multipliers)
         multipliers = self._multipliers.copy()
+        # The bounds of a box balance the residual.
         if not self._lifted.ball and self._lifted.size:
-            # The rows of a box, which hold a control at its bound.
             hard = np.flatnonzero(~self._soft)
             multipliers[hard] = np.maximum(-self._lifted.rows[hard] @ residual, 0.0)
         return MinimumNorm(self._point, self.at_zero, multipliers, residual)
 
     def _improve(self, scale: float, settings: SolverSettings) -> None:
-        """Solve the cone program about the point, in units of `scale`, and offer its point and
-        multipliers.
-        """
+        """Solve the cone program about the point, in units of `scale`, and offer its solution."""
         program, kept = self._program(self._point, scale)
         inner, dual = program.answer(settings)
         if not (np.isfinite(inner).all() and np.isfinite(dual).all()):
@@ -285,8 +328,8 @@ class _OptimumSearch:
         point = self._point + scale * inner[:-1]
         self._offer_point(point)
         self._offer_bound(direction, multipliers)
-        # A bound is active where its multiplier is above its slack, both in the units of the
-        # program.
+
+        # A constraint is active if its multiplier is above its slack, in units of the program.
         active = np.flatnonzero(
             self._soft & (multipliers > (self._lifted.limits - self._lifted.rows @ point) / scale)
         )
@@ -295,7 +338,8 @@ class _OptimumSearch:
             > (1.0 - self._norms(point)) / scale
         )
         self._offer_bound(*self._sharpened(direction, multipliers, active, held))
-        # The solution itself, to rounding, if these bounds are those that are active.
+
+        # This is the solution to rounding if the active constraints are the right ones.
         polished = self._polished(point, active, held)
         self._offer_point(polished)
         state = self._free + self._response @ polished
@@ -304,9 +348,9 @@ class _OptimumSearch:
             self._offer_bound(*self._sharpened(state / norm, multipliers, active, held))
 
     def _program(self, start: Floats, scale: float) -> tuple[ConeProgram, Places]:
-        """The cone program in v = start + scale z, without the constraints that z cannot reach."""
+        """The cone program in v = start + scale z, and the rows in it: those that z can reach."""
         lifted = self._lifted
-        size = self._lifted.size
+        size = lifted.size
         slack = (lifted.limits - lifted.rows @ start) / scale
         kept = np.flatnonzero(slack < _REACH * self._lengths)
         cost = np.zeros(size + 1)
@@ -321,15 +365,15 @@ class _OptimumSearch:
         return program, kept
 
     def _bound_thrust(self, program: ConeProgram, start: Floats, scale: float) -> None:
-        """|start + scale z| <= 1 as |z|^2 <= 2 w with an affine w, which is accurate for any
-        scale.
-        """
+        """Add |start + scale z| <= 1 as |z|^2 <= 2 w with an affine w, accurate for any scale."""
         group = self._lifted.ball
         for first in range(0, self._lifted.size, group):
             mine = slice(first, first + group)
             room = 0.5 * (1.0 - float(start[mine] @ start[mine])) / scale
-            if room > group * _REACH + scale * group * _REACH**2:
+            is_out_of_reach = room > group * _REACH + scale * group * _REACH**2
+            if is_out_of_reach:
                 continue
+
             size = max(1.0, room)
             top = np.zeros(self._lifted.size + 1)
             top[mine] = -start[mine] / size
@@ -338,41 +382,39 @@ class _OptimumSearch:
             block[group] = np.sqrt(0.5) * top
             free = np.zeros(group + 1)
             free[group] = np.sqrt(0.5) * (room / size - 1.0)
-            program.bound(
-                block, free, np.sqrt(0.5) * top, float(np.sqrt(0.5) * (room / size + 1.0))
-            )
+            height = float(np.sqrt(0.5) * (room / size + 1.0))
+            program.bound(block, free, np.sqrt(0.5) * top, height)
 
     def _residual(self, direction: Floats, multipliers: Floats) -> Floats:
         """R' d + rows' l."""
         return np.asarray(self._response.T @ direction + self._lifted.rows.T @ multipliers)
 
     def _offer_bound(self, direction: Floats, multipliers: Floats) -> None:
+        """Use the lower bound of a direction and multipliers if it is the largest so far."""
         length = float(np.linalg.norm(direction))
         if length == 0.0:
             return
         direction = direction / length
         multipliers = np.where(self._soft, np.maximum(multipliers, 0.0), 0.0) / length
         pressed = self._norms(self._residual(direction, multipliers))
-        bound = float(direction @ self._free - multipliers @ self._lifted.limits) - float(
-            pressed.sum()
-        )
+        value = float(direction @ self._free - multipliers @ self._lifted.limits)
+        bound = value - float(pressed.sum())
         if bound > self._bound:
-            turned = np.abs(direction)
-            held = np.abs(self._lifted.rows).T @ multipliers
-            parts = turned @ np.abs(self._free) + multipliers @ np.abs(self._lifted.limits)
-            self._error = (
-                8.0
-                * _ULP
-                * float(parts + (np.abs(self._response).T @ turned + held).sum() + self._reach)
-            )
             self._bound = bound
+            self._error = self._rounding_of_bound(direction, multipliers)
             self._direction = direction
             self._multipliers = multipliers
 
+    def _rounding_of_bound(self, direction: Floats, multipliers: Floats) -> float:
+        """The rounding of a lower bound, from the absolute values of its terms."""
+        turned = np.abs(direction)
+        held = np.abs(self._lifted.rows).T @ multipliers
+        parts = turned @ np.abs(self._free) + multipliers @ np.abs(self._lifted.limits)
+        pressed = (np.abs(self._response).T @ turned + held).sum()
+        return _ROUNDINGS * _ULP * float(parts + pressed + self._reach)
+
     def _offer_point(self, point: Floats) -> None:
-        """Use a point of smaller norm; a violation of constraints is added, times what it can
-        gain.
-        """
+        """Use a point if its norm, plus the gain by its violation, is the smallest so far."""
         outside = float((self._lifted.rows @ point - self._lifted.limits).max(initial=0.0))
         if self._lifted.ball:
             outside = max(outside, float(self._norms(point).max()) - 1.0)
@@ -387,7 +429,11 @@ class _OptimumSearch:
     def _sharpened(
         self, direction: Floats, multipliers: Floats, active: Places, held: Flags
     ) -> tuple[Floats, Floats]:
-        """Move multipliers to where controls that are not at their bounds are stationary."""
+        """Move a direction and multipliers to where controls not at their bounds are stationary.
+
+        `active` are the indices of active rows on states; `held` marks the groups of controls at
+        their bounds: the thrusts of the periods in a ball, the components in a box.
+        """
         moving = np.repeat(~held, self._lifted.ball or 1)
         system = np.hstack(
             [self._response[:, moving].T, self._lifted.rows[np.ix_(active, moving)].T]
@@ -399,8 +445,9 @@ class _OptimumSearch:
         return both[: len(direction)], sharp
 
     def _polished(self, point: Floats, active: Places, held: Flags) -> Floats:
-        """Return the controls of minimum norm on the active rows, with those at their bounds fixed
-        there.
+        """Return the controls of minimum norm on the active rows, with held controls at bounds.
+
+        `active` and `held` are as in `_sharpened`.
         """
         lifted = self._lifted
         moving = np.repeat(~held, lifted.ball or 1)
@@ -420,4 +467,5 @@ class _OptimumSearch:
         return polished
 
     def _norms(self, controls: Floats) -> Floats:
+        """Norms of the groups of controls that have a common bound."""
         return np.asarray(np.linalg.norm(controls.reshape(-1, self._lifted.ball or 1), axis=1))

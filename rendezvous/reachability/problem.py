@@ -1,6 +1,4 @@
-"""Terminal control of a linear system in discrete time under constraints, and the independent
-blocks of a problem.
-"""
+"""Terminal control of a linear system in discrete time, and the independent blocks of a problem."""
 
 from __future__ import annotations
 
@@ -16,25 +14,25 @@ from scipy.sparse.csgraph import connected_components
 from infoset.rendezvous._arrays import Floats, Places
 
 MAX_PERIODS = 256
+"""Maximum number of periods in a file. Chosen: for three controls the dense constraints of a problem
+then take about 30 MB."""
 _MAX_GROWTH = 1e10
-"""Growth of a deviation, relative to the bounds, from which rounding exceeds about 1e-9 of the
-bounds.
-"""
+"""Maximum growth of a deviation, relative to the bounds: its rounding, 1e-16 of it, is then 1e-6 of
+the bounds."""
+_START_ROUNDING = 1e-12
+"""Rounding of a constraint at the initial state, relative to the size of its terms: a start on its
+boundary, as with an apex at the origin, is admissible."""
 
 
 class ThrustShape(Enum):
-    """Meaning of the bounds on a control: of each component (box), or of its Euclidean norm
-    (ball).
-    """
+    """Meaning of the bounds on a control: for each component (box) or its Euclidean norm (ball)."""
 
     BOX = "box"
     BALL = "ball"
 
 
 class InadmissibleStartError(ValueError):
-    """The initial state violates constraints; `broken` contains their names, each with its
-    violation.
-    """
+    """The initial state violates constraints; `broken` contains their names and violations."""
 
     def __init__(self, broken: tuple[tuple[str, float], ...]) -> None:
         listed = ", ".join(f"{name} by {excess:.6g}" for name, excess in broken)
@@ -44,8 +42,7 @@ class InadmissibleStartError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class ReachabilityProblem:
-    """Minimise |x(T)| for x(t+1) = A(t) x(t) + B(t) u(t) from x(0), and find all minimising
-    controls.
+    """Minimise |x(T)| for x(t + 1) = A(t) x(t) + B(t) u(t) from x(0), and find all minimisers.
 
     Parameters
     ----------
@@ -56,9 +53,11 @@ class ReachabilityProblem:
     initial : ndarray, shape (n,)
         The state at t = 0.
     state_bounds : ndarray, shape (n,)
-        |x_i(t)| <= state_bounds_i for t = 0..T, all positive; they are also the sizes that states are compared with.
+        |x_i(t)| <= state_bounds_i for t = 0..T, all positive. They are also the sizes to which
+        deviations of states are relative.
     control_bounds : ndarray, shape (m,)
-        |u_j| <= control_bounds_j for a box; for a ball the Euclidean norm is bounded and all must be equal.
+        |u_j| <= control_bounds_j for a box; for a ball they bound the Euclidean norm and must be
+        equal.
     thrust : ThrustShape
         Meaning of `control_bounds`.
     normals : ndarray, shape (k, n)
@@ -118,7 +117,7 @@ class ReachabilityProblem:
         broken = [(self.state_name(i), float(over[i])) for i in np.flatnonzero(over > 0.0).tolist()]
         normals, offsets = self.further
         excess = normals @ self.initial - offsets[0]
-        slack = 1e-12 * np.abs(normals) @ self.state_bounds
+        slack = _START_ROUNDING * np.abs(normals) @ self.state_bounds
         broken += [
             (self.name_of(k), float(excess[k])) for k in np.flatnonzero(excess > slack).tolist()
         ]
@@ -127,11 +126,9 @@ class ReachabilityProblem:
 
     def name_of(self, constraint: int) -> str:
         """Return the name of a `constraint` beyond the bounds, by its index."""
-        return (
-            self.constraint_names[constraint]
-            if self.constraint_names
-            else f"constraint {constraint + 1}"
-        )
+        if not self.constraint_names:
+            return f"constraint {constraint + 1}"
+        return self.constraint_names[constraint]
 
     def state_name(self, state: int) -> str:
         """Return the name of a `state`, by its index."""
@@ -150,6 +147,7 @@ class ReachabilityProblem:
 
         Together they contain all states, and all controls that affect a state.
         """
+        # A graph of states and controls with an edge from i to j if a change of j affects i.
         n = self.states
         m = self.controls
         linked = np.zeros((n + m, n + m), dtype=bool)
@@ -162,6 +160,7 @@ class ReachabilityProblem:
             linked[acting[0], acting] = True
         if self.thrust is ThrustShape.BALL:
             linked[n, n:] = True
+
         labels = connected_components(csr_array(linked), directed=False)[1]
         order = list(dict.fromkeys(labels[:n].tolist()))
         return tuple(_block(self, np.flatnonzero(labels == label)) for label in order)
@@ -190,18 +189,19 @@ class ReachabilityProblem:
         return np.stack(states, axis=-2)
 
     def excess(self, controls: ArrayLike) -> Floats:
-        """Return the maximum violation of a constraint by `controls`, shape (..., T, m), relative
-        to the bounds.
+        """Return the maximum violation of a constraint by `controls`, shape (..., T, m).
 
-        It is at most 0 if all constraints are satisfied.
+        It is relative to the bounds, and at most 0 if all constraints are satisfied.
         """
         thrust = np.asarray(controls, dtype=float)
         if self.thrust is ThrustShape.BALL:
             worst = np.linalg.norm(thrust, axis=-1).max(axis=-1) / self.control_bounds[0] - 1.0
         else:
             worst = (np.abs(thrust) / self.control_bounds).max(axis=(-1, -2)) - 1.0
+
         states = self.run(thrust)
         worst = np.maximum(worst, self._state_excess(states, np.arange(self.periods + 1)))
+
         if self.between is not None:
             both = np.concatenate([states[..., :-1, :], thrust], axis=-1)
             inner = np.einsum("tsij,...tj->...tsi", self.between, both)
@@ -212,8 +212,9 @@ class ReachabilityProblem:
         return np.asarray(worst)
 
     def _state_excess(self, states: Floats, times: Places) -> Floats:
-        """Worst over the last two axes (time, state); a constraint holds between t and t + 1 where
-        it does at t.
+        """Maximum violation over the last two axes (time, state) by states at or after `times`.
+
+        Within the period from t to t + 1 the constraints of time t apply.
         """
         worst = (np.abs(states) / self.state_bounds).max(axis=(-1, -2)) - 1.0
         normals, offsets = self.further
@@ -225,8 +226,7 @@ class ReachabilityProblem:
         return self._part(0, periods, self.initial)
 
     def rest(self, start: int, state: ArrayLike) -> ReachabilityProblem:
-        """Return the problem that begins at time `start`, from 0 to T - 1, in a `state`, shape
-        (n,).
+        """Return the problem that begins at time `start`, from 0 to T - 1, in a `state`, (n,).
 
         `InadmissibleStartError` is raised if the state violates a constraint.
         """
@@ -248,9 +248,9 @@ class StateBlock:
     """An independent part of a problem, with states and controls divided by their bounds.
 
     `states` and `controls` are indices in the problem, and `scale`, shape (n,), the bounds on the
-    states in their own units. `normals`, of unit length, `offsets` and `names` are those of all
-    constraints on states, the bounds first, of shapes (k, n), (T + 1, k) and (k,). If `ball`,
-    |u(t)| <= 1 in the Euclidean norm; otherwise for each component.
+    states in their own units. The constraints on states, with the bounds first, are `normals` x(t)
+    <= `offsets`(t), with normals of unit length, and have `names`, of shapes (k, n), (T + 1, k) and
+    (k,). If `ball`, |u(t)| <= 1 in the Euclidean norm; otherwise for each component.
     """
 
     states: Places
@@ -276,7 +276,7 @@ class StateBlock:
         return len(self.states)
 
     def first(self, periods: int) -> StateBlock:
-        """Return the block that ends after the first periods."""
+        """Return the block that ends after the first `periods`."""
         return replace(
             self,
             transition=self.transition[:periods],
@@ -287,28 +287,33 @@ class StateBlock:
 
 
 def _block(problem: ReachabilityProblem, members: Places) -> StateBlock:
+    """Return the block of some members: indices of states, and of controls after all states."""
     n = problem.states
     states = members[members < n]
     controls = members[members >= n] - n
     scale = problem.state_bounds[states]
     reach = problem.control_bounds[controls]
+
     square = np.ix_(states, states)
     oblong = np.ix_(states, controls)
-    transition = (
-        np.array([matrix[square] for matrix in problem.transition]) / scale[:, None] * scale
-    )
-    control = np.array([matrix[oblong] for matrix in problem.control]) / scale[:, None] * reach
+    transition = np.array([matrix[square] for matrix in problem.transition])
+    transition = transition / scale[:, None] * scale
+    control = np.array([matrix[oblong] for matrix in problem.control])
+    control = control / scale[:, None] * reach
+    between = None
+    if problem.between is not None:
+        inner = problem.between[:, :, states][:, :, :, members]
+        between = inner / scale[:, None] * np.concatenate([scale, reach])
+
     unit = np.eye(len(states))
+    bounds = np.ones((problem.periods + 1, 2 * len(states)))
     normals, offsets = problem.further
     mine = np.flatnonzero(np.abs(normals[:, states]).max(axis=1, initial=0.0) > 0.0)
     rows = normals[np.ix_(mine, states)] * scale
     lengths = np.linalg.norm(rows, axis=1)
     names = [f"the bound on {problem.state_name(i)}" for i in states.tolist()] * 2
     names += [problem.name_of(k) for k in mine.tolist()]
-    between = None
-    if problem.between is not None:
-        inner = problem.between[:, :, states][:, :, :, members]
-        between = inner / scale[:, None] * np.concatenate([scale, reach])
+
     return StateBlock(
         states,
         controls,
@@ -317,7 +322,7 @@ def _block(problem: ReachabilityProblem, members: Places) -> StateBlock:
         control,
         problem.initial[states] / scale,
         np.vstack([unit, -unit, rows / lengths[:, None]]),
-        np.hstack([np.ones((problem.periods + 1, 2 * len(states))), offsets[:, mine] / lengths]),
+        np.hstack([bounds, offsets[:, mine] / lengths]),
         tuple(names),
         problem.thrust is ThrustShape.BALL,
         between,

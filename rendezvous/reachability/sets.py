@@ -1,6 +1,4 @@
-"""Forward sets and the tube of a problem: exact polytopes, or programs over the admissible
-controls.
-"""
+"""Forward sets and the tube of a problem: exact polytopes, or programs over admissible controls."""
 
 from __future__ import annotations
 
@@ -15,23 +13,29 @@ from infoset.rendezvous._arrays import Floats
 from infoset.rendezvous.reachability.admissible import Lifted, Maximiser, lift, lift_with_states
 from infoset.rendezvous.reachability.conic import MAX_GAP
 from infoset.rendezvous.reachability.optimum import BlockOptimum
-from infoset.rendezvous.reachability.problem import ReachabilityProblem
+from infoset.rendezvous.reachability.problem import ReachabilityProblem, StateBlock
 
 MAX_VERTICES = 1000
-"""Vertices of an exact set: a step with so many takes seconds."""
+"""Maximum number of vertices of an exact set: a step with so many takes seconds."""
 _MAX_DIMENSIONS = 8
-"""Dimensions of a set of optimal controls whose vertices are computed."""
+"""Maximum dimension of a set of optimal controls whose vertices are computed: six periods of the (x,
+y) block have 12 controls, and four terminal equations. Sets of more dimensions have too many."""
 _FEW_CONTROLS = 24
+"""Number of controls up to which dense programs over controls alone are faster than sparse ones
+over controls and states. Chosen: both have the same solutions."""
 _AT_BOUND = 1.0 - 1e-10
+"""Part of its bound from which a state of the tube counts as at its bound, so that no program is
+solved: ten times below `solve.AGREEMENT`, to which the bounds of sets are checked."""
 _SHARP = 1e-7
+"""Tolerance of a projection up to which its vertices are moved onto their active rows: the duality
+gaps of the programs, at most 1e-8, are not small beside a smaller tolerance."""
 _GAP = 1e-3
-"""Maximum duality gap of the programs of a projection, as a part of its tolerance."""
+"""Maximum duality gap of the programs of a projection, as a part of its tolerance: it does not
+affect the vertices at the precision of a figure."""
 
 
 class SetKind(Enum):
-    """Set of states at a time: those on paths of admissible controls (forward), or of optimal
-    controls (tube).
-    """
+    """States at a time on paths of admissible controls (forward), or of optimal controls (tube)."""
 
     FORWARD = "forward"
     TUBE = "tube"
@@ -47,7 +51,7 @@ class ThinSetError(ArithmeticError):
 
 @dataclass(frozen=True)
 class VertexCounts:
-    """Size and dimension of a polytope; `facets` are those of all blocks."""
+    """Size and dimension of a polytope, the product of one polytope per block."""
 
     vertices: int
     facets: int
@@ -56,60 +60,55 @@ class VertexCounts:
 
 @dataclass(frozen=True, eq=False)
 class ReachableSets:
-    """Sets of states at t = 0..T, in the units of the problem; `parts` are those of each block of
-    the problem.
+    """Sets of states at t = 0..T, in the units of the problem.
+
+    A set is the product of the sets of the blocks, in `parts`.
     """
 
     problem: ReachabilityProblem
     parts: tuple[BlockSets, ...]
 
     def bounds(self, kind: SetKind) -> Floats:
-        """Return the minimum and maximum value of each state at each time, shape (T + 1, n, 2), of
-        sets of a `kind`.
-        """
+        """Return the minimum and maximum of each state in the sets of a `kind`, (T + 1, n, 2)."""
         result = np.zeros((self.problem.periods + 1, self.problem.states, 2))
         for block, part in zip(self.problem.blocks, self.parts, strict=True):
             result[:, block.states] = part.bounds(kind) * block.scale[:, None]
         return result
 
     def counts(self, kind: SetKind, time: int) -> VertexCounts | None:
-        """Return the counts of the set of a `kind` at a `time`; None if its vertices are not
-        known.
-        """
-        sets = [
-            polytope for part in self.parts if (polytope := part.polytope(kind, time)) is not None
-        ]
-        if len(sets) < len(self.parts):
-            return None
-        return VertexCounts(
-            int(np.prod([len(polytope.vertices) for polytope in sets])),
-            sum(len(polytope.normals) for polytope in sets),
-            sum(polytope.dimension for polytope in sets),
-        )
+        """Return the counts of the set of a `kind` at a `time`; None if vertices are not known."""
+        vertices = 1
+        facets = 0
+        dimension = 0
+        for part in self.parts:
+            polytope = part.polytope(kind, time)
+            if polytope is None:
+                return None
+            vertices *= len(polytope.vertices)
+            facets += len(polytope.normals)
+            dimension += polytope.dimension
+        return VertexCounts(vertices, facets, dimension)
 
     def projection(
         self, kind: SetKind, time: int, axes: Sequence[int], tolerance: float = 1e-9
     ) -> Floats:
-        """Return the vertices of the projection of a set on two or three states, shape (v,
-        len(axes)), in no order.
+        """Return the vertices of the projection of a set on some states, shape (v, len(axes)).
 
-        `axes` are indices of states, `time` is from 0 to T, and `tolerance` is the relative error
-        of the projection of a set that is represented by programs.
+        `axes` are indices of two or three states, `time` is from 0 to T, and `tolerance` is the
+        relative error of the projection of a set that is represented by programs. The vertices are
+        in no order.
         """
         order: list[int] = []
         points = []
         for block, part in zip(self.problem.blocks, self.parts, strict=True):
-            mine = [
-                int(np.flatnonzero(block.states == axis)[0])
-                for axis in axes
-                if axis in block.states
-            ]
-            if not mine:
+            states = block.states.tolist()
+            places = [states.index(axis) for axis in axes if axis in states]
+            if not places:
                 continue
-            order += [int(block.states[index]) for index in mine]
-            points.append(
-                part.projection(kind, time, np.eye(block.size)[mine], tolerance) * block.scale[mine]
-            )
+            rows = np.eye(block.size)[places]
+            scaled = part.projection(kind, time, rows, tolerance)
+            points.append(scaled * block.scale[places])
+            order += [states[place] for place in places]
         return combined(points)[:, [order.index(axis) for axis in axes]]
 
 
@@ -123,8 +122,9 @@ def combined(parts: Sequence[Floats]) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class ExactSets:
-    """Sets of a block with all vertices and facets, for thrust in a box and constraints at whole
-    periods only.
+    """Sets of a block with all vertices and facets, for thrust in a box.
+
+    Constraints apply at whole periods only.
     """
 
     forward: tuple[Polytope, ...]
@@ -132,10 +132,11 @@ class ExactSets:
 
     def polytope(self, kind: SetKind, time: int) -> Polytope:
         """Return the set itself."""
-        return (self.forward if kind is SetKind.FORWARD else self.tube)[time]
+        sets = self.forward if kind is SetKind.FORWARD else self.tube
+        return sets[time]
 
     def bounds(self, kind: SetKind) -> Floats:
-        """Return the minimum and maximum value of each state at each time, shape (T + 1, n, 2)."""
+        """Return the minimum and maximum of each state at each time, shape (T + 1, n, 2)."""
         boxes = [self.polytope(kind, time).bounding_box() for time in range(len(self.forward))]
         return np.array([np.stack(box, axis=-1) for box in boxes])
 
@@ -147,11 +148,6 @@ class ExactSets:
 def exact_sets(optimum: BlockOptimum) -> ExactSets:
     """Compute the sets of a block with their vertices and facets.
 
-    Shorikov and Goranov (2021): G+(t + 1) = (A G+(t) + B U) cut by X. The states of the tube X_e(t)
-    are those of G+(t) with A x + B u in X_e(t + 1) for some u: A x is in X_e(t + 1) - B U, whose
-    half-spaces need no inverse of A. Where zero is not reached the tube is a face of G+ that
-    rounding would lose; it is then the image of the optimal controls.
-
     Raises
     ------
     TooManyVerticesError
@@ -159,31 +155,49 @@ def exact_sets(optimum: BlockOptimum) -> ExactSets:
     ThinSetError
         If a set is so thin that rounding leaves nothing of it.
     """
-    block = optimum.block
     try:
-        forward = [Polytope.from_vertices(block.initial[None, :])]
-        for t in range(block.periods):
-            reached = _with_thrust(forward[-1].linear_map(block.transition[t]), block.control[t])
-            forward.append(reached.cut(block.normals, upper=block.offsets[t + 1]).needed())
-        if not optimum.reached:
-            if not optimum.optimal.size:
-                return ExactSets(
-                    tuple(forward),
-                    tuple(Polytope.from_vertices(x[None]) for x in optimum.optimal.free),
-                )
-            controls = optimal_polytope(optimum)
-            maps = zip(optimum.optimal.response, optimum.optimal.free, strict=True)
-            return ExactSets(
-                tuple(forward),
-                tuple(controls.affine_map(response, free) for response, free in maps),
-            )
-        tube = [Polytope.from_vertices(np.zeros((1, block.size)))]
-        for t in range(block.periods - 1, 0, -1):
-            rows, limits = _with_thrust(tube[0], block.control[t]).constraints()
-            tube.insert(0, forward[t].cut(rows @ block.transition[t], upper=limits).needed())
-        return ExactSets(tuple(forward), (forward[0], *tube))
+        forward = _forward_sets(optimum.block)
+        if optimum.reached:
+            return ExactSets(forward, _tube_to_zero(optimum.block, forward))
+        return ExactSets(forward, _image_of_controls(optimum))
     except EmptyPolytopeError as error:  # the programs show that it is not empty
         raise ThinSetError("a set is too thin: it is empty by rounding") from error
+
+
+def _forward_sets(block: StateBlock) -> tuple[Polytope, ...]:
+    """Shorikov and Goranov (2021): G+(t + 1) = (A G+(t) + B U) cut by the constraints."""
+    sets = [Polytope.from_vertices(block.initial[None, :])]
+    for t in range(block.periods):
+        reached = _with_thrust(sets[-1].linear_map(block.transition[t]), block.control[t])
+        sets.append(reached.cut(block.normals, upper=block.offsets[t + 1]).needed())
+    return tuple(sets)
+
+
+def _tube_to_zero(block: StateBlock, forward: tuple[Polytope, ...]) -> tuple[Polytope, ...]:
+    """The states x of G+(t) with A x + B u in the tube at t + 1 for some u, back from zero.
+
+    A x is in the tube minus B U, whose half-spaces need no inverse of A.
+    """
+    tube = [Polytope.from_vertices(np.zeros((1, block.size)))]
+    for t in range(block.periods - 1, 0, -1):
+        rows, limits = _with_thrust(tube[0], block.control[t]).constraints()
+        tube.insert(0, forward[t].cut(rows @ block.transition[t], upper=limits).needed())
+    return (forward[0], *tube)
+
+
+def _image_of_controls(optimum: BlockOptimum) -> tuple[Polytope, ...]:
+    """The tube as the image of the optimal controls.
+
+    Where zero is not reached the tube is a face of G+, which rounding would lose.
+    """
+    optimal = optimum.optimal
+    if not optimal.size:
+        return tuple(Polytope.from_vertices(state[None]) for state in optimal.free)
+    controls = optimal_polytope(optimum)
+    return tuple(
+        controls.affine_map(response, free)
+        for response, free in zip(optimal.response, optimal.free, strict=True)
+    )
 
 
 def _with_thrust(states: Polytope, control: Floats) -> Polytope:
@@ -196,8 +210,7 @@ def _with_thrust(states: Polytope, control: Floats) -> Polytope:
 
 
 def optimal_polytope(optimum: BlockOptimum) -> Polytope:
-    """Return the set of optimal controls of a block, in its coordinates z, of which there is at
-    least one.
+    """Return the set of optimal controls of a block in its coordinates z, at least one.
 
     Raises
     ------
@@ -235,34 +248,42 @@ class LiftedSets:
         self._known: dict[tuple[SetKind, int], tuple[Lifted, Maximiser]] = {}
 
     def bounds(self, kind: SetKind) -> Floats:
-        """Return the minimum and maximum value of each state at each time, shape (T + 1, n, 2)."""
-        size = self._optimum.block.size
-        periods = self._optimum.block.periods
-        result = np.zeros((periods + 1, size, 2))
-        result[0] = self._optimum.block.initial[:, None]
+        """Return the minimum and maximum of each state at each time, shape (T + 1, n, 2)."""
         if kind is SetKind.FORWARD:
-            for t in range(1, periods + 1):
-                lifted, program = self._set(kind, t)
-                response = lifted.response[t]
+            return self._forward_bounds()
+        return self._tube_bounds()
+
+    def _forward_bounds(self) -> Floats:
+        block = self._optimum.block
+        result = np.zeros((block.periods + 1, block.size, 2))
+        result[0] = block.initial[:, None]
+        for t in range(1, block.periods + 1):
+            lifted, program = self._set(SetKind.FORWARD, t)
+            response = lifted.response[t]
+            for side, sign in enumerate((-1.0, 1.0)):
+                points = program.maximise_all(sign * response)
+                result[t, :, side] = lifted.free[t] + np.einsum("ip,ip->i", response, points)
+        return result
+
+    def _tube_bounds(self) -> Floats:
+        """A state that is at its bound on the path of an optimal control needs no program."""
+        block = self._optimum.block
+        lifted, program = self._set(SetKind.TUBE, block.periods)
+        # Maxima of -x and of x over the paths found so far.
+        best = np.full((block.periods + 1, block.size, 2), -np.inf)
+        for t in sorted(range(1, block.periods), key=_by_power_of_two):
+            for i in range(block.size):
                 for side, sign in enumerate((-1.0, 1.0)):
-                    points = program.maximise_all(sign * response)
-                    result[t, :, side] = lifted.free[t] + np.einsum("ip,ip->i", response, points)
-            return result
-        # If a state on the path of an optimal control is at its bound, no program is needed.
-        lifted, program = self._set(kind, periods)
-        best = np.full((periods + 1, size, 2), -np.inf)
-        # Multiples of the maximum powers of two first: any first part of the times is evenly
-        # spread.
-        for t in sorted(range(1, periods), key=lambda t: (-(t & -t), t)):
-            for i in range(size):
-                for side, sign in enumerate((-1.0, 1.0)):
-                    if best[t, i, side] < _AT_BOUND:
-                        point = program.maximise(sign * lifted.response[t, i])
-                        states = lifted.free + lifted.response @ point
-                        best[t, i, side] = sign * states[t, i]
-                        np.maximum(best, np.stack([-states, states], axis=-1), out=best)
-        result[1:, :, 0], result[1:, :, 1] = -best[1:, :, 0], best[1:, :, 1]
-        result[periods] = self._optimum.terminal[:, None]
+                    if best[t, i, side] >= _AT_BOUND:
+                        continue
+                    point = program.maximise(sign * lifted.response[t, i])
+                    states = lifted.free + lifted.response @ point
+                    best[t, i, side] = sign * states[t, i]
+                    np.maximum(best, np.stack([-states, states], axis=-1), out=best)
+
+        result = np.stack([-best[..., 0], best[..., 1]], axis=-1)
+        result[0] = block.initial[:, None]
+        result[block.periods] = self._optimum.terminal[:, None]
         return result
 
     def projection(self, kind: SetKind, time: int, rows: Floats, tolerance: float = 1e-9) -> Floats:
@@ -276,10 +297,10 @@ class LiftedSets:
         def furthest(direction: Floats) -> Floats:
             cost = direction @ response
             if tolerance > _SHARP:
-                return np.asarray(
-                    free + response @ program.maximise(cost, max(MAX_GAP, _GAP * tolerance))
-                )
-            return np.asarray(free + response @ program.maximise_sharply(cost))
+                point = program.maximise(cost, max(MAX_GAP, _GAP * tolerance))
+            else:
+                point = program.maximise_sharply(cost)
+            return np.asarray(free + response @ point)
 
         return polytope_from_support(furthest, len(rows), tolerance).vertices
 
@@ -288,20 +309,33 @@ class LiftedSets:
         return None
 
     def _set(self, kind: SetKind, time: int) -> tuple[Lifted, Maximiser]:
-        key = kind, 0 if kind is SetKind.TUBE else time
+        """The controls whose states at `time` are the set; all times of the tube share them."""
+        key = (kind, 0) if kind is SetKind.TUBE else (kind, time)
         if key not in self._known:
             if kind is SetKind.TUBE:
                 lifted = optimal_set(self._optimum)
             else:
-                block = self._optimum.block.first(max(time, 1))
-                few = block.periods * len(block.controls) <= _FEW_CONTROLS
-                lifted = lift(block) if few else lift_with_states(block)
+                lifted = self._admissible_until(time)
             self._known[key] = lifted, Maximiser(lifted)
         return self._known[key]
 
+    def _admissible_until(self, time: int) -> Lifted:
+        block = self._optimum.block.first(max(time, 1))
+        if block.periods * len(block.controls) <= _FEW_CONTROLS:
+            return lift(block)
+        return lift_with_states(block)
+
+
+def _by_power_of_two(time: int) -> tuple[int, int]:
+    """Key of an order that starts with multiples of the largest power of two.
+
+    The first times of the order are evenly spread, so their paths soon reach most bounds.
+    """
+    return -(time & -time), time
+
 
 BlockSets = ExactSets | LiftedSets
-"""Sets of states of a block, at t = 0..T, scaled."""
+"""Sets of states of a block at t = 0..T, divided by the bounds on states."""
 
 
 def optimal_set(optimum: BlockOptimum) -> Lifted:

@@ -1,6 +1,4 @@
-"""Solution of a problem: the minimum terminal norm, all controls that attain it, and the sets of
-states.
-"""
+"""Solution of a problem: minimum terminal norm, all controls that attain it, and sets of states."""
 
 from __future__ import annotations
 
@@ -27,16 +25,21 @@ from infoset.rendezvous.reachability.sets import (
     optimal_set,
 )
 
-MAX_STATES, MAX_EXACT_PERIODS = 4, 16
-"""Maximum number of states of a block, and of periods, for which the exact route is tried."""
+MAX_STATES = 4
+"""Maximum number of states of a block for which the exact route is tried: the (x, y) block of
+relative motion has four. Hulls of six coupled states took seconds and rounding decided some."""
+MAX_EXACT_PERIODS = 16
+"""Maximum number of periods for which the exact route is tried. Chosen: more
+periods give more vertices than are of use."""
 AGREEMENT = 1e-9
-"""Maximum difference between the bounds of both routes, relative to the bounds on states."""
+"""Maximum difference between the bounds of both routes, relative to the bounds on states: the
+violation of a constraint that the programs may have (`conic.MAX_VIOLATION`)."""
+_STILL = 1e-12
+"""Change of a control over the set, as a part of its bound, below which it is rounding."""
 
 
 class Route(Enum):
-    """Representation of sets of states: all vertices and facets, or programs over the admissible
-    controls.
-    """
+    """Representation of sets: vertices and facets (exact), or programs over controls (lifted)."""
 
     EXACT = "exact"
     LIFTED = "lifted"
@@ -44,8 +47,9 @@ class Route(Enum):
 
 @dataclass(frozen=True, eq=False)
 class OptimalControls:
-    """{u: |x(T)| is minimal and all constraints kept}, from the blocks: a polytope for thrust in a
-    box.
+    """The set {u: |x(T)| is minimal and u satisfies all constraints}, from the blocks.
+
+    It is a polytope for thrust in a box.
     """
 
     problem: ReachabilityProblem
@@ -82,20 +86,17 @@ class OptimalControls:
         return float(np.linalg.norm([part.miss for part in self.blocks]))
 
     def at(self, point: Floats) -> Floats:
-        """Return the controls, shape (..., T, m), of a `point` z of the set, shape (...,
-        dimension).
-        """
+        """Return the controls, shape (..., T, m), of a `point` z, shape (..., dimension)."""
         scaled = self.space.control_free + np.asarray(point) @ self.space.control_response.T
-        return np.asarray(
-            (scaled * self.scale).reshape(*np.shape(point)[:-1], self.problem.periods, -1)
-        )
+        shape = (*np.shape(point)[:-1], self.problem.periods, -1)
+        return np.asarray((scaled * self.scale).reshape(shape))
 
     def excess(self, controls: ArrayLike) -> Floats:
-        """Return the deviation of `controls`, shape (..., T, m), from the set, relative to the
-        bounds; shape (...).
+        """Return the deviation of `controls`, shape (..., T, m), from the set, shape (...).
 
-        It is the maximum violation of a constraint, or the distance of the terminal state from the
-        optimal one; for members of the set it is at most rounding.
+        It is the larger of the maximum violation of a constraint and the distance of the terminal
+        state from the optimal one, relative to the bounds. For members of the set it is at most
+        rounding.
         """
         thrust = np.asarray(controls, dtype=float)
         best = np.zeros(self.problem.states)
@@ -106,34 +107,31 @@ class OptimalControls:
         return np.asarray(np.maximum(self.problem.excess(thrust), away))
 
     def ranges(self) -> Floats:
-        """Return the minimum and maximum of each control over the set, shape (T, m, 2), by 2 T m
-        linear programs.
+        """Return the minimum and maximum of each control over the set, shape (T, m, 2).
+
+        They are found by 2 T m linear programs.
         """
         periods = self.problem.periods
         result = np.zeros((periods, self.problem.controls, 2))
         for part in self.blocks:
             lifted = optimal_set(part)
             costs = np.vstack([-lifted.control_response, lifted.control_response])
-            moving = np.abs(costs).max(axis=1, initial=0.0) > 1e-12
+            moving = np.abs(costs).max(axis=1, initial=0.0) > _STILL
+            points = Maximiser(lifted).maximise_all(costs[moving])
             best = np.zeros(len(costs))
-            best[moving] = np.einsum(
-                "kp,kp->k", costs[moving], Maximiser(lifted).maximise_all(costs[moving])
-            )
-            count = len(lifted.control_free)
-            ends = np.stack(
-                [lifted.control_free - best[:count], lifted.control_free + best[count:]], axis=-1
-            )
+            best[moving] = np.einsum("kp,kp->k", costs[moving], points)
+            down, up = np.split(best, 2)
+            ends = np.stack([lifted.control_free - down, lifted.control_free + up], axis=-1)
             result[:, part.block.controls] = ends.reshape(periods, -1, 2)
         return result * self.problem.control_bounds[:, None]
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The solution of a problem: all controls of minimum terminal norm, and the forward sets and
-    the tube.
+    """The solution of a problem: all controls of minimum terminal norm, forward sets and the tube.
 
-    The `route` is EXACT if the vertices and facets of all blocks are known; `reason` explains its
-    choice.
+    The `route` is EXACT if the vertices and facets of all blocks are known; `reason` explains the
+    choice of the route.
     """
 
     problem: ReachabilityProblem
@@ -144,21 +142,20 @@ class Solution:
 
 
 def optimal_controls(problem: ReachabilityProblem, *, relative: bool = False) -> OptimalControls:
-    """Return all controls of minimum terminal norm; see `block_optimum` for `relative` and
-    errors.
+    """Return all controls of minimum terminal norm.
+
+    `relative` and the errors that are raised are described in `block_optimum`.
     """
-    return OptimalControls(
-        problem, tuple(block_optimum(block, relative=relative) for block in problem.blocks)
-    )
+    optima = [block_optimum(block, relative=relative) for block in problem.blocks]
+    return OptimalControls(problem, tuple(optima))
 
 
 def solve(problem: ReachabilityProblem) -> Solution:
-    """Compute the minimum terminal norm, all controls that attain it, and the forward sets and
-    tube.
+    """Compute the minimum terminal norm, all optimal controls, the forward sets and the tube.
 
     The route is exact if blocks and their number of periods are small, thrust is in a box,
-    constraints apply at whole periods only, and rounding does not decide; otherwise it is the
-    lifted one. `EmptyTubeError` is raised if no control keeps the constraints.
+    constraints apply at whole periods only, and rounding does not decide; otherwise it is lifted.
+    `EmptyTubeError` is raised if no control satisfies the constraints.
     """
     optimal = optimal_controls(problem)
     lifted = tuple(LiftedSets(optimum) for optimum in optimal.blocks)
@@ -170,13 +167,14 @@ def solve(problem: ReachabilityProblem) -> Solution:
         except (TooManyVerticesError, ThinSetError) as error:
             reason = str(error)
         else:
-            why = f"blocks of {', '.join(str(block.size) for block in problem.blocks)} states"
-            return Solution(problem, optimal, ReachableSets(problem, exact), Route.EXACT, why)
+            sizes = ", ".join(str(block.size) for block in problem.blocks)
+            sets = ReachableSets(problem, exact)
+            return Solution(problem, optimal, sets, Route.EXACT, f"blocks of {sizes} states")
     return Solution(problem, optimal, ReachableSets(problem, lifted), Route.LIFTED, reason)
 
 
 def _need_agreement(exact: tuple[BlockSets, ...], lifted: tuple[BlockSets, ...]) -> None:
-    """Raise an error if the bounds of exact sets differ from those computed by programs."""
+    """Raise `ThinSetError` if the bounds of exact sets differ from the results of programs."""
     for one, other in zip(exact, lifted, strict=True):
         for kind in SetKind:
             apart = float(np.abs(one.bounds(kind) - other.bounds(kind)).max())
@@ -202,8 +200,7 @@ def _refusal(problem: ReachabilityProblem) -> str:
 
 
 def min_periods(problem: ReachabilityProblem) -> int | None:
-    """Return the minimum number of periods in which zero can be reached, or None if those of the
-    `problem` are too few.
+    """Return the minimum number of periods in which zero can be reached, at most T, or None.
 
     If the zero state satisfies all constraints, it can be held, and the minimum number is computed
     by bisection; otherwise all numbers are tried. Each block and number needs a linear program.
@@ -212,10 +209,10 @@ def min_periods(problem: ReachabilityProblem) -> int | None:
     def reached(periods: int) -> bool:
         return all(block_reaches_zero(block.first(periods)) for block in problem.blocks)
 
-    if not all((block.offsets >= 0.0).all() for block in problem.blocks):
-        return next(
-            (periods for periods in range(1, problem.periods + 1) if reached(periods)), None
-        )
+    can_stay_at_zero = all((block.offsets >= 0.0).all() for block in problem.blocks)
+    if not can_stay_at_zero:
+        numbers = range(1, problem.periods + 1)
+        return next((periods for periods in numbers if reached(periods)), None)
     if not reached(problem.periods):
         return None
     return 1 + bisect_left(range(1, problem.periods), True, key=reached)
