@@ -1,4 +1,4 @@
-"""Steps of Dormand and Prince's method of order 8 for any right-hand side: compiled, with SciPy's
+"""Compiled steps of Dormand and Prince's method of order 8, for any right-hand side, with SciPy's
 coefficients.
 """
 
@@ -14,28 +14,36 @@ from infoset.rendezvous._arrays import Floats
 from infoset.rendezvous._compile import allocation_free
 
 STAGES = 12
+"""Evaluations of the right-hand side in a step of the method."""
 _NODES = np.ascontiguousarray(DOP853.C[:STAGES])
+"""Times of the stages, as parts of the step."""
 _WEIGHTS = np.vstack([DOP853.A[:STAGES, :STAGES], DOP853.B])
 """Coefficients of the stages, one row per stage, and of the step."""
 _THIRD = np.ascontiguousarray(DOP853.E3[:STAGES])
 _FIFTH = np.ascontiguousarray(DOP853.E5[:STAGES])
+"""Coefficients of the embedded error estimates of orders 3 and 5."""
+_THIRD_ORDER_SHARE = 0.01
+"""Weight of the estimate of order 3 beside that of order 5, as in DOP853."""
 
 
 def step_of(
     rates: Callable[[float, Floats, Floats, Any, Floats, Floats], None],
 ) -> Callable[..., None]:
-    """Compile one step for a compiled right-hand side `rates(t, y, z, parameters, dy, dz)` that
-    fills dy and dz.
+    """Compile a step for the right-hand side `rates(t, y, z, parameters, dy, dz)`.
+
+    `rates` is compiled, and fills dy and dz. The state has two parts: y, shape (n,), whose error
+    `error_of_step` estimates, and z, shape (rows, columns).
 
     The result is a compiled `step(t, h, first, y, z, parameters, ky, kz, y_next, z_next)`. It fills
-    the stages from `first` on, ky (12, n) and kz (12, rows, columns), and the state at t + h, which
-    shares no memory with y, (n,), and z, (rows, columns). `first` is 1 where t and y are those of
-    the call before. The state is y + h sum_k b_k k_k, whose error `error_of_step` estimates, and z
-    + (h b_1) k_1 + (h b_2) k_2 ...
+    the slopes of the stages from `first` on, ky, shape (12, n), and kz, shape (12, rows, columns),
+    and the state at t + h in y_next and z_next, which share no memory with y and z. `first` is 1 if
+    ky[0] and kz[0] are known, from a call with the same t, y and z.
+
+    The state is y + h (b_1 k_1 + b_2 k_2 + ...) and z + (h b_1) k_1 + (h b_2) k_2 + ...
     """
 
     @allocation_free
-    def step(
+    def step(  # noqa: PLR0913, RUF100 - state, slopes and result in two parts each
         t: float,
         h: float,
         first: int,
@@ -53,20 +61,14 @@ def step_of(
         for stage in range(first, STAGES + 1):
             for i in range(len(y)):
                 y_next[i] = 0.0
-            for k in range(stage):
-                weight = _WEIGHTS[stage, k]
-                if weight != 0.0:
-                    for i in range(len(y)):
-                        y_next[i] += weight * ky[k, i]
+            add_slopes(_WEIGHTS[stage], 1.0, ky, stage, y_next)
             for i in range(len(y)):
                 y_next[i] = y[i] + h * y_next[i]
+
             for i in range(len(flat)):
                 flat_next[i] = flat[i]
-            for k in range(stage):
-                weight = h * _WEIGHTS[stage, k]
-                if weight != 0.0:
-                    for i in range(len(flat)):
-                        flat_next[i] += weight * flat_slopes[k, i]
+            add_slopes(_WEIGHTS[stage], h, flat_slopes, stage, flat_next)
+
             # The only call of the right-hand side: each call is compiled separately.
             if stage < STAGES:
                 rates(t + _NODES[stage] * h, y_next, z_next, parameters, ky[stage], kz[stage])
@@ -75,19 +77,31 @@ def step_of(
 
 
 @allocation_free
+def add_slopes(weights: Floats, factor: float, slopes: Floats, count: int, total: Floats) -> None:
+    """Add the first `count` slopes to a total, shape (n,), each times its weight and a factor."""
+    for k in range(count):
+        weight = factor * weights[k]
+        if weight != 0.0:
+            for i in range(len(total)):
+                total[i] += weight * slopes[k, i]
+
+
+@allocation_free
 def error_of_step(y: Floats, y_next: Floats, ky: Floats, tolerance: float, h: float) -> float:
-    """Return the error of a step in y over the tolerance, relative and absolute (Hairer, Norsett
-    and Wanner, II.10).
+    """Return the error of a step in y, divided by the tolerance, which is relative and absolute.
+
+    Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, section II.10.
     """
     third = fifth = 0.0
     for i in range(len(y)):
         scale = tolerance * (1.0 + max(abs(y[i]), abs(y_next[i])))
-        e3 = e5 = 0.0
+        third_error = fifth_error = 0.0
         for k in range(STAGES):
-            e3 += _THIRD[k] * ky[k, i]
-            e5 += _FIFTH[k] * ky[k, i]
-        third += (e3 / scale) ** 2
-        fifth += (e5 / scale) ** 2
+            third_error += _THIRD[k] * ky[k, i]
+            fifth_error += _FIFTH[k] * ky[k, i]
+        third += (third_error / scale) ** 2
+        fifth += (fifth_error / scale) ** 2
+
     if third == 0.0 and fifth == 0.0:
         return 0.0
-    return float(h * fifth / np.sqrt((fifth + 0.01 * third) * len(y)))
+    return float(h * fifth / np.sqrt((fifth + _THIRD_ORDER_SHARE * third) * len(y)))
