@@ -1,6 +1,4 @@
-"""Motion about a circular orbit (Hill, Clohessy and Wiltshire), in closed forms that keep their
-digits.
-"""
+"""Motion about a circular orbit (Hill, Clohessy and Wiltshire), in accurate closed forms."""
 
 from __future__ import annotations
 
@@ -15,7 +13,11 @@ from infoset.rendezvous._compile import compiled
 from infoset.rendezvous.relative_motion.linear_motion import LinearMotion, Segment, even_breaks
 
 SERIES_BELOW_RAD = 1.0
+"""Angle below which theta - sin(theta) is computed by its series: beyond, the difference loses at
+most three bits, and the next term of the series, theta^21 / 21!, is below 2e-19 of the sum."""
 QUADRATURE_BELOW_RAD = 2.0
+"""Angle below which Gramians are computed by Gauss and Legendre's rule: the closed forms cancel
+below, and the rule of 12 nodes is exact to rounding. Tests compare both sides with 50 digits."""
 NODES, WEIGHTS = (rule.astype(np.float64) for rule in np.polynomial.legendre.leggauss(12))
 
 
@@ -23,7 +25,7 @@ NODES, WEIGHTS = (rule.astype(np.float64) for rule in np.polynomial.legendre.leg
 class ClohessyWiltshire(LinearMotion):
     """Relative motion about a circular orbit, whose mean motion n is `rate_rad_s`.
 
-    Barseghyan and Stepanyan (2008), (1.8), X[T, t] and (2.3), corrected and in Hill's axes. A
+    Barseghyan and Stepanyan (2008): (1.8), X[T, t], and (2.3) with corrections, in Hill's axes. A
     transition takes about 0.1 microseconds, a Gramian at most 1.
     """
 
@@ -32,14 +34,17 @@ class ClohessyWiltshire(LinearMotion):
     stationary = True
 
     def dynamics(self, time_s: ArrayLike) -> Floats:
-        """A, the same at all times, shape (..., 6, 6): x'' = 3 n^2 x + 2 n y', y'' = -2 n x', z'' =
-        -n^2 z.
+        """A, which is constant, for times of any shape: shape (..., 6, 6).
+
+        x'' = 3 n^2 x + 2 n y', y'' = -2 n x', z'' = -n^2 z.
         """
         n = self.rate_rad_s
         matrix = np.zeros((*np.shape(time_s), 6, 6))
         matrix[..., 0, 3] = matrix[..., 1, 4] = matrix[..., 2, 5] = 1.0
-        matrix[..., 3, 0], matrix[..., 3, 4] = 3.0 * n * n, 2.0 * n
-        matrix[..., 4, 3], matrix[..., 5, 2] = -2.0 * n, -n * n
+        matrix[..., 3, 0] = 3.0 * n * n
+        matrix[..., 3, 4] = 2.0 * n
+        matrix[..., 4, 3] = -2.0 * n
+        matrix[..., 5, 2] = -n * n
         return matrix
 
     def transition(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
@@ -52,8 +57,8 @@ class ClohessyWiltshire(LinearMotion):
     def gramian(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Gramian, shape (..., 6, 6); end >= start.
 
-        Below two radians, where the closed forms cancel, by Gauss and Legendre's rule, beyond by
-        the closed forms. Each entry is within 1e-14 of its size up to 50 radians.
+        Up to two radians, where the closed forms cancel, Gauss and Legendre's rule is used. Each
+        entry has a relative error below 1e-14 up to 50 radians.
         """
         durations = np.asarray(end_s, dtype=np.float64) - np.asarray(start_s, dtype=np.float64)
         matrices = np.zeros((durations.size, 6, 6))
@@ -65,17 +70,16 @@ class ClohessyWiltshire(LinearMotion):
         return Segment(self.transition(start_s, end_s), self.gramian(start_s, end_s))
 
     def breaks(self, start_s: float, end_s: float) -> Floats:
-        """Times from start to end, inclusive, a radian apart at most."""
+        """Evenly spaced times from start to end, inclusive, at most a radian apart."""
         return even_breaks(start_s, end_s, self.rate_rad_s * (end_s - start_s))
 
 
 @compiled
 def angle_less_sine(theta: float) -> float:
-    """Return theta - sin(theta) to full relative accuracy: nine terms of the series up to one
-    radian.
-    """
+    """Return theta - sin(theta) to full relative accuracy."""
     if abs(theta) >= SERIES_BELOW_RAD:
         return theta - math.sin(theta)
+    # Nine terms of theta^3 / 3! - theta^5 / 5! + ..., in nested form.
     squared = theta * theta
     tail = 1.0
     for order in range(19, 3, -2):
@@ -85,10 +89,11 @@ def angle_less_sine(theta: float) -> float:
 
 @compiled
 def fill_effect(theta: float, effect: Floats) -> None:
-    """Fill Phi B for unit rate, shape (6, 3), whose other entries are zero."""
+    """Fill Phi B for unit rate, shape (6, 3), which is zero before."""
     sine = math.sin(theta)
     half = math.sin(0.5 * theta)
     versine = 2.0 * half * half
+
     effect[0, 0] = effect[2, 2] = sine
     effect[0, 1] = 2.0 * versine
     effect[1, 0] = -2.0 * versine
@@ -101,7 +106,7 @@ def fill_effect(theta: float, effect: Floats) -> None:
 
 @compiled
 def fill_transitions(rate: float, durations: Floats, matrices: Floats) -> None:
-    """Fill Phi of durations, shape (k, 6, 6), whose other entries are zero."""
+    """Fill the transition matrices of durations, shape (k, 6, 6), which are zero before."""
     for row in range(len(durations)):
         theta = rate * durations[row]
         matrix = matrices[row]
@@ -109,6 +114,7 @@ def fill_transitions(rate: float, durations: Floats, matrices: Floats) -> None:
         for first in range(3):
             for second in range(3, 6):
                 matrix[first, second] /= rate
+
         sine = math.sin(theta)
         half = math.sin(0.5 * theta)
         versine = 2.0 * half * half
@@ -125,7 +131,7 @@ def fill_transitions(rate: float, durations: Floats, matrices: Floats) -> None:
 def fill_gramians(
     rate: float, durations: Floats, nodes: Floats, weights: Floats, matrices: Floats
 ) -> None:
-    """Fill Gramians of durations, shape (k, 6, 6), whose other entries are zero."""
+    """Fill the Gramians of durations, shape (k, 6, 6), which are zero before."""
     effect = np.zeros((6, 3))
     for row in range(len(durations)):
         theta = rate * durations[row]
@@ -134,11 +140,14 @@ def fill_gramians(
             _integrate(theta, nodes, weights, effect, matrix)
         else:
             _close(theta, matrix)
-        # These two entries cancel under the integral.
+
+        # The terms of these two integrals cancel.
         half = math.sin(0.5 * theta)
         lag = angle_less_sine(theta)
         matrix[0, 1] = -3.0 * lag * lag
         matrix[3, 4] = -12.0 * half**4
+
+        # From unit rate: positions are divided by the rate, and the time of the integral once more.
         for first in range(6):
             for second in range(first, 6):
                 velocities = (first >= 3) + (second >= 3)
@@ -150,9 +159,7 @@ def fill_gramians(
 def _integrate(
     theta: float, nodes: Floats, weights: Floats, effect: Floats, matrix: Floats
 ) -> None:
-    """Fill the upper triangle for unit rate by Gauss and Legendre's rule: no entry cancels but
-    two.
-    """
+    """Add the upper triangle for unit rate, by Gauss and Legendre's rule: two entries cancel."""
     half = 0.5 * theta
     for node in range(len(nodes)):
         fill_effect(half * (1.0 + nodes[node]), effect)
@@ -166,14 +173,13 @@ def _integrate(
 
 @compiled
 def _close(theta: float, matrix: Floats) -> None:
-    """Fill the upper triangle for unit rate in closed form: (2.3) of the paper with q11 and q44
-    corrected.
-    """
+    """Fill the upper triangle for unit rate in closed form: (2.3) with q11 and q44 corrected."""
     sine = math.sin(theta)
     cosine = math.cos(theta)
     sine2 = math.sin(2.0 * theta)
     versine = 1.0 - cosine
     climb = 4.0 * sine - 3.0 * theta
+
     matrix[0, 0] = 6.5 * theta - 8.0 * sine + 0.75 * sine2
     matrix[0, 3] = 0.5 * (sine * sine + 4.0 * versine * versine)
     matrix[0, 4] = -(11.0 * theta - 14.0 * sine + 1.5 * sine2)

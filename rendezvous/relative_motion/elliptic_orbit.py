@@ -9,13 +9,16 @@ from numpy.typing import ArrayLike
 
 from infoset.rendezvous._arrays import Floats
 
-_MAX_STEPS = 60
+_MAX_KEPLER_STEPS = 60
+"""Maximum number of Newton's steps. They decrease to the root, and near e = 1 the last steps may
+only alternate by rounding: then E is exact to rounding too."""
+_ANOMALY_ROUNDING = 4e-16
+"""Newton step, relative to 1 + E, at which E is exact to rounding: two roundings of a double."""
 
 
 @dataclass(frozen=True)
 class EllipticOrbit:
-    """An elliptic reference orbit: mean motion n, eccentricity 0 <= e < 1, and true anomaly at t =
-    0.
+    """An elliptic reference orbit: mean motion, eccentricity, and true anomaly at t = 0.
 
     Raises
     ------
@@ -45,9 +48,7 @@ class EllipticOrbit:
         gravitational_parameter_m3_s2: float,
         true_anomaly_rad: float = 0.0,
     ) -> EllipticOrbit:
-        """Return the orbit of a semi-major axis and an eccentricity; `true_anomaly_rad` is that at
-        t = 0.
-        """
+        """Return the orbit of a semi-major axis, with its true anomaly at t = 0."""
         rate = float(np.sqrt(gravitational_parameter_m3_s2 / semi_major_axis_m**3))
         return cls(rate, eccentricity, true_anomaly_rad)
 
@@ -63,33 +64,23 @@ class EllipticOrbit:
     def eccentric_anomaly(self, time_s: ArrayLike) -> Floats:
         """Return the eccentric anomaly at times, rad; it increases without bound."""
         start = self._eccentric_of_true(self.true_anomaly_rad)
-        mean = (
-            start
-            - self.eccentricity * np.sin(start)
-            + self.mean_motion_rad_s * np.asarray(time_s, dtype=np.float64)
-        )
+        times = np.asarray(time_s, dtype=np.float64)
+        mean = start - self.eccentricity * np.sin(start) + self.mean_motion_rad_s * times
         return eccentric_of_mean(mean, self.eccentricity)
 
     def time_of_eccentric(self, eccentric_rad: Floats) -> Floats:
-        """Return the times of eccentric anomalies, s: Kepler's equation, the inverse of
-        `eccentric_anomaly`.
-        """
+        """Return the times of eccentric anomalies, s, by Kepler's equation."""
         start = self._eccentric_of_true(self.true_anomaly_rad)
         e = self.eccentricity
-        return np.asarray(
-            (eccentric_rad - start - e * (np.sin(eccentric_rad) - np.sin(start)))
-            / self.mean_motion_rad_s
-        )
+        mean = eccentric_rad - start - e * (np.sin(eccentric_rad) - np.sin(start))
+        return np.asarray(mean / self.mean_motion_rad_s)
 
     def true_anomaly(self, time_s: ArrayLike) -> Floats:
         """Return the true anomaly at times, rad; it increases without bound."""
         eccentric = self.eccentric_anomaly(time_s)
-        e = self.eccentricity
-        fraction = e / (1.0 + np.sqrt(1.0 - e * e))
-        return np.asarray(
-            eccentric
-            + 2.0 * np.arctan2(fraction * np.sin(eccentric), 1.0 - fraction * np.cos(eccentric))
-        )
+        fraction = self._anomaly_fraction
+        sine = fraction * np.sin(eccentric)
+        return np.asarray(eccentric + 2.0 * np.arctan2(sine, 1.0 - fraction * np.cos(eccentric)))
 
     def dynamics(self, time_s: ArrayLike) -> Floats:
         """Return A(t), shape (..., 6, 6), of states in m and m/s in Hill's axes.
@@ -104,42 +95,47 @@ class EllipticOrbit:
         w = k2 * rho**2
         w_dot = -2.0 * k2**2 * e * np.sin(anomaly) * rho**3
         gravity = k2**2 * rho**3
+
         matrix = np.zeros((*anomaly.shape, 6, 6))
         matrix[..., 0, 3] = matrix[..., 1, 4] = matrix[..., 2, 5] = 1.0
-        matrix[..., 3, 0], matrix[..., 3, 1], matrix[..., 3, 4] = (
-            w**2 + 2.0 * gravity,
-            w_dot,
-            2.0 * w,
-        )
-        matrix[..., 4, 0], matrix[..., 4, 1], matrix[..., 4, 3] = -w_dot, w**2 - gravity, -2.0 * w
+        matrix[..., 3, 0] = w**2 + 2.0 * gravity
+        matrix[..., 3, 1] = w_dot
+        matrix[..., 3, 4] = 2.0 * w
+        matrix[..., 4, 0] = -w_dot
+        matrix[..., 4, 1] = w**2 - gravity
+        matrix[..., 4, 3] = -2.0 * w
         matrix[..., 5, 2] = -gravity
         return matrix
 
-    def _eccentric_of_true(self, true_rad: float) -> float:
+    @property
+    def _anomaly_fraction(self) -> float:
+        """Tangent of half the angle whose sine is e: e / (1 + sqrt(1 - e^2))."""
         e = self.eccentricity
-        fraction = e / (1.0 + np.sqrt(1.0 - e * e))
-        return float(
-            true_rad
-            - 2.0 * np.arctan2(fraction * np.sin(true_rad), 1.0 + fraction * np.cos(true_rad))
-        )
+        return float(e / (1.0 + np.sqrt(1.0 - e * e)))
+
+    def _eccentric_of_true(self, true_rad: float) -> float:
+        fraction = self._anomaly_fraction
+        sine = fraction * np.sin(true_rad)
+        return float(true_rad - 2.0 * np.arctan2(sine, 1.0 + fraction * np.cos(true_rad)))
 
 
 def eccentric_of_mean(mean_rad: ArrayLike, eccentricity: ArrayLike) -> Floats:
     """Solve Kepler's equation E - e sin E = M for E, rad; E increases with M without bound.
 
-    Newton's method from above, where the function is convex: it decreases to the root and cannot
-    overshoot.
+    Newton's method from a bound above the root in [0, pi], where the function is convex: it
+    decreases to the root and cannot overshoot.
     """
     mean = np.asarray(mean_rad, dtype=np.float64)
     e = np.asarray(eccentricity, dtype=np.float64)
     turns = 2.0 * np.pi * np.round(mean / (2.0 * np.pi))
     sign = np.where(mean < turns, -1.0, 1.0)
     rest = np.abs(mean - turns)
+
     eccentric = np.minimum(np.minimum(rest + e, rest / (1.0 - e)), np.pi)
-    for _ in range(_MAX_STEPS):
+    for _ in range(_MAX_KEPLER_STEPS):
         excess = eccentric - e * np.sin(eccentric) - rest
         step = excess / (1.0 - e * np.cos(eccentric))
         eccentric = np.maximum(eccentric - step, 0.0)
-        if np.all(np.abs(step) <= 4e-16 * (1.0 + eccentric)):
+        if np.all(np.abs(step) <= _ANOMALY_ROUNDING * (1.0 + eccentric)):
             break
     return np.asarray(turns + sign * eccentric)

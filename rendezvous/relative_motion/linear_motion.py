@@ -12,13 +12,14 @@ from numpy.typing import ArrayLike
 from infoset.rendezvous._arrays import Floats
 
 MAX_PANELS = 200_000
+"""Maximum number of panels of an interval, 30 000 revolutions: more are probably wrong units."""
 
 
 @dataclass(frozen=True)
 class Segment:
     """Motion between two times: x(end) = transition x(start) + the effect of the control.
 
-    `transition` and `gramian`, shape (..., 6, 6), are those of states in m and m/s.
+    `transition` and `gramian` have shape (..., 6, 6), for states in m and m/s.
     """
 
     transition: Floats
@@ -27,8 +28,9 @@ class Segment:
 
 @dataclass(frozen=True)
 class HeldSegment(Segment):
-    """Motion between two times, with the effect at the end of a unit control held from the start,
-    shape (..., 6, 3).
+    """Motion between two times with the effect of a constant control.
+
+    `held`, shape (..., 6, 3), is the effect at the end of a unit control.
     """
 
     held: Floats
@@ -54,18 +56,14 @@ class LinearMotion(ABC):
 
     @abstractmethod
     def breaks(self, start_s: float, end_s: float) -> Floats:
-        """Times from start to end, inclusive, between which the motion turns by about a radian at
-        most.
-        """
+        """Times from start to end, inclusive; between two the motion turns by about a radian."""
 
     def transition(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Phi(end, start), shape (..., 6, 6); the end may be before the start."""
         return self.segment(start_s, end_s).transition
 
     def gramian(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-        """Gramian, int Phi(end, t) B B' Phi(end, t)' dt from start to end, shape (..., 6, 6); end
-        >= start.
-        """
+        """Gramian int Phi(end, t) B B' Phi(end, t)' dt, shape (..., 6, 6); end >= start."""
         return self.segment(start_s, end_s).gramian
 
 
@@ -78,8 +76,9 @@ class HeldMotion(LinearMotion):
 
 
 def state_scales(durations: Floats) -> Floats:
-    """Return (T, T, T, 1, 1, 1) of each interval, shape (..., 6), from durations in s; T = 1 s for
-    an empty one.
+    """Return the scale (T, T, T, 1, 1, 1) of states, shape (..., 6), for durations T in s.
+
+    T is 1 s for an empty interval.
     """
     scale = np.ones((*durations.shape, 6))
     scale[..., :3] = np.where(durations == 0.0, 1.0, np.abs(durations))[..., None]
@@ -87,19 +86,16 @@ def state_scales(durations: Floats) -> Floats:
 
 
 def even_breaks(start_s: float, end_s: float, radians: float) -> Floats:
-    """Return times, s, of panels of equal length and at most one radian, for a motion that turns by
-    `radians` in all.
+    """Return the ends, s, of equal panels of at most one radian.
 
-    Raise `ValueError` if there are more than 200 000 panels.
+    The motion turns by `radians` in all. Raise `ValueError` if there are more than 200 000 panels.
     """
     need_panels(start_s, end_s, radians)
     return np.linspace(start_s, end_s, max(1, int(np.ceil(radians))) + 1)
 
 
 def need_panels(start_s: float, end_s: float, radians: float) -> None:
-    """Raise `ValueError` if a motion that turns by `radians` between two times has more than 200
-    000 panels.
-    """
+    """Raise `ValueError` if a motion turns by more than 200 000 radians between two times."""
     if not radians <= MAX_PANELS:
         raise ValueError(
             f"the motion turns by {radians:.3g} rad from {start_s:g} s to {end_s:g} s; at most "

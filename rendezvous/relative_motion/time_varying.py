@@ -15,10 +15,19 @@ from infoset.rendezvous.relative_motion.linear_motion import HeldMotion, HeldSeg
 OfTime = Callable[[Floats], Floats]
 
 NODES = 8
+"""Gauss points of a panel: collocation of order 16, exact to rounding on panels of a radian."""
 AGREEMENT = 2e-13
-ROUNDING = 1e-8
+"""Relative difference of two solutions at which the finer one is exact to rounding."""
+ROUNDING_BELOW = 1e-8
+"""Relative difference from which on a difference that no longer decreases is rounding, as with
+A(t) of large elements, and not slow convergence."""
+_NOT_DECREASING = 0.1
+"""Ratio of two differences above which they no longer decrease: doubled panels reduce the error by
+2^16, and the ratio is then 1.5e-5."""
 MAX_PANELS = 4096
+"""Maximum number of panels of a solution: 48 x 48 systems of 80 MB in all."""
 MAX_BREAKS = 200_000
+"""Maximum number of panels between breaks, as `linear_motion.MAX_PANELS`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,9 +35,9 @@ class TimeVaryingMotion(HeldMotion):
     """x' = A(t) x + B u; `matrix_at` returns A of times of shape (k,), s: shape (k, 6, 6).
 
     The adjoint Psi' = -A' Psi, Psi(end) = 1, is collocated backwards at 8 Gauss points a panel
-    (order 16); Phi(end, t)
-    = Psi(t)' at the nodes gives the Gramian and the held control as sums of positive weights. Panels are doubled until
-    two solutions agree to 2e-13, or differ by rounding only. A panel is a 48 x 48 system.
+    (order 16). Phi(end, t) = Psi(t)' at the nodes gives the Gramian and the effect of a held
+    control as sums with positive weights. Panels are doubled until two solutions agree to 2e-13, or
+    differ by rounding only. A panel is a 48 x 48 system.
     """
 
     matrix_at: OfTime
@@ -36,13 +45,13 @@ class TimeVaryingMotion(HeldMotion):
     def dynamics(self, time_s: ArrayLike) -> Floats:
         """A(t), shape (..., 6, 6)."""
         times = np.asarray(time_s, dtype=np.float64)
-        return np.asarray(self.matrix_at(times.ravel()), dtype=np.float64).reshape(
-            *times.shape, 6, 6
-        )
+        matrices = np.asarray(self.matrix_at(times.ravel()), dtype=np.float64)
+        return matrices.reshape(*times.shape, 6, 6)
 
     def segment(self, start_s: ArrayLike, end_s: ArrayLike) -> HeldSegment:
-        """Transition, Gramian and the effect of a held control together; end >= start, except for
-        the transition.
+        """Transition, Gramian and the effect of a held control together.
+
+        The transition is also valid if the end is before the start.
 
         Raises
         ------
@@ -54,14 +63,16 @@ class TimeVaryingMotion(HeldMotion):
         )
         solution = _refined(self.dynamics, starts.ravel(), ends.ravel())
         return HeldSegment(
-            *(part.reshape(*starts.shape, *part.shape[1:]) for part in vars(solution).values())
+            solution.transition.reshape(*starts.shape, 6, 6),
+            solution.gramian.reshape(*starts.shape, 6, 6),
+            solution.held.reshape(*starts.shape, 6, 3),
         )
 
     def breaks(self, start_s: float, end_s: float) -> Floats:
-        """Times from start to end, inclusive, a radian of the fastest motion seen in between apart
-        at most.
+        """Times from start to end, inclusive; between two the motion turns by a radian at most.
 
-        Panels are halved where A at their Gauss points turns by more than a radian over them.
+        Panels are halved if A at one of their Gauss points turns by more than a radian over the
+        panel.
 
         Raises
         ------
@@ -78,9 +89,8 @@ class TimeVaryingMotion(HeldMotion):
                     f"A(t) turns too often from {start_s:g} s to {end_s:g} s; check the units"
                 )
             times = starts[:, None] + (ends - starts)[:, None] * nodes
-            long = (_rates(self.dynamics(times)).max(axis=1) * (ends - starts) > 1.0) & (
-                ends > starts
-            )
+            radians = _rates(self.dynamics(times)).max(axis=1) * (ends - starts)
+            long = (radians > 1.0) & (ends > starts)
             settled.append(ends[~long])
             middles = 0.5 * (starts[long] + ends[long])
             starts = np.concatenate([starts[long], middles])
@@ -89,22 +99,21 @@ class TimeVaryingMotion(HeldMotion):
 
 
 def _refined(dynamics: OfTime, starts: Floats, ends: Floats) -> HeldSegment:
-    """Double the panels until two solutions agree, or differ by rounding only; many intervals in
-    parts.
+    """Double the panels until two solutions agree, or differ by rounding only.
+
+    Many intervals are solved in two parts, to bound the memory.
     """
     panels = _first_panels(dynamics, starts, ends)
     if len(starts) > 1 and panels * len(starts) > MAX_PANELS:
         half = len(starts) // 2
-        parts = [
-            _refined(dynamics, starts[part], ends[part])
-            for part in (slice(None, half), slice(half, None))
-        ]
+        first = _refined(dynamics, starts[:half], ends[:half])
+        second = _refined(dynamics, starts[half:], ends[half:])
         return HeldSegment(
-            *(
-                np.concatenate(arrays)
-                for arrays in zip(*(vars(part).values() for part in parts), strict=True)
-            )
+            np.concatenate([first.transition, second.transition]),
+            np.concatenate([first.gramian, second.gramian]),
+            np.concatenate([first.held, second.held]),
         )
+
     coarse = _collocated(dynamics, starts, ends, panels)
     apart = np.inf
     while 2 * panels <= MAX_PANELS:
@@ -112,7 +121,8 @@ def _refined(dynamics: OfTime, starts: Floats, ends: Floats) -> HeldSegment:
         fine = _collocated(dynamics, starts, ends, panels)
         before = apart
         apart = _difference(coarse, fine, ends - starts)
-        if apart <= AGREEMENT or (apart <= ROUNDING and apart > 0.1 * before):
+        is_rounding = apart <= ROUNDING_BELOW and apart > _NOT_DECREASING * before
+        if apart <= AGREEMENT or is_rounding:
             return fine
         coarse = fine
     raise ValueError(
@@ -142,9 +152,7 @@ def _rates(matrices: Floats) -> Floats:
 
 @lru_cache(maxsize=1)
 def _gauss_collocation() -> tuple[Floats, Floats, Floats]:
-    """Nodes and weights on [0, 1], and the integrals of the Lagrange polynomials from 0 to each
-    node.
-    """
+    """Nodes and weights on [0, 1], and integrals of Lagrange polynomials from 0 to each node."""
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
     values = np.polynomial.legendre.legvander(nodes, NODES - 1)
     integrals = np.polynomial.legendre.legval(
@@ -154,18 +162,18 @@ def _gauss_collocation() -> tuple[Floats, Floats, Floats]:
 
 
 def _collocated(dynamics: OfTime, starts: Floats, ends: Floats, panels: int) -> HeldSegment:
-    """Solve on equal panels, from the end to the start; states are divided by (T, T, T, 1, 1,
-    1).
-    """
+    """Solve on equal panels from the end to the start, in states divided by (T, T, T, 1, 1, 1)."""
     nodes, weights, integrals = _gauss_collocation()
     durations = ends - starts
     positions = (np.arange(panels)[:, None] + nodes) / panels
     places = ends[:, None, None] - durations[:, None, None] * positions
     steps = durations[:, None, None] * np.ones_like(positions) / panels
     spans = weights * steps
+
     scale = state_scales(durations)
     ratio = (scale[:, None, :] / scale[:, :, None])[:, None, None]
     adjoint = np.swapaxes(dynamics(places) * ratio, -1, -2) * steps[..., None, None]
+
     # (1 - h a_jk A_k') Psi_k = 1, for the 8 nodes of each panel at once.
     system = -np.einsum("jk,npkab->npjakb", integrals, adjoint).reshape(
         len(durations), panels, 6 * NODES, 6 * NODES
@@ -174,6 +182,8 @@ def _collocated(dynamics: OfTime, starts: Floats, ends: Floats, panels: int) -> 
     right = np.broadcast_to(np.tile(np.eye(6), (NODES, 1)), (len(durations), panels, 6 * NODES, 6))
     psi = np.linalg.solve(system, right).reshape(len(durations), panels, NODES, 6, 6)
     last = np.eye(6) + np.einsum("k,npkab->npab", weights, adjoint @ psi)
+
+    # Sums over the panels; `power` is the transition from the end of a panel to the end.
     effect = np.swapaxes(psi[..., 3:, :], -1, -2)  # Phi B; velocities are not scaled
     power = np.broadcast_to(np.eye(6), (len(durations), 6, 6))
     gramian = np.zeros((len(durations), 6, 6))
@@ -183,6 +193,7 @@ def _collocated(dynamics: OfTime, starts: Floats, ends: Floats, panels: int) -> 
         gramian = gramian + np.einsum("nk,nkai,nkbi->nab", spans[:, panel], turned, turned)
         held = held + np.einsum("nk,nkai->nai", spans[:, panel], turned)
         power = power @ np.swapaxes(last[:, panel], -1, -2)
+
     outer = scale[:, :, None] * scale[:, None, :]
     return HeldSegment(
         power * (scale[:, :, None] / scale[:, None, :]),
@@ -192,8 +203,9 @@ def _collocated(dynamics: OfTime, starts: Floats, ends: Floats, panels: int) -> 
 
 
 def _difference(first: HeldSegment, second: HeldSegment, durations: Floats) -> float:
-    """Maximum difference of two solutions, relative to each part, in states divided by (T, T, T, 1,
-    1, 1).
+    """Maximum difference of two solutions, relative to each of their matrices.
+
+    States are divided by (T, T, T, 1, 1, 1).
     """
     if not len(durations):
         return 0.0

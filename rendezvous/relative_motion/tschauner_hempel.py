@@ -24,21 +24,19 @@ from infoset.rendezvous.relative_motion.yamanaka_ankersen import (
 )
 
 MAX_ECCENTRICITY = 1.0 - 1e-6
-"""A time has 16 digits of a revolution, and the motion at perigee takes the share (1 - e)^(3/2) of
-it.
+"""Maximum eccentricity: the motion at perigee takes the share (1 - e)^(3/2) = 1e-9 of a revolution,
+and a time has 16 digits of a revolution.
 """
 LONGEST_PANEL_RAD = 1.0
-"""Longest panel of eccentric anomaly where the poles of the motion are farther away."""
-NODES, WEIGHTS = (rule.astype(np.float64) for rule in np.polynomial.legendre.leggauss(16))
-"""Gauss and Legendre's rule of a panel. The nearest pole is at least the panel's length d away from
-its middle: the half-axes of the ellipse through it, whose foci are the ends of the panel, have a
-sum of (2 + sqrt(5)) d / 2, so that the error decreases as 4.24^(-2 n), which is 9e-21 for 16 nodes.
-With 12, 9e-16, the order of the pole is seen."""
+"""Maximum panel of eccentric anomaly if the poles of the motion are farther away: a panel of a
+radian contains no more than a sixth of a period of the sines and cosines in the integrand.
+"""
 
 
 class _Intervals(NamedTuple):
-    """n intervals: the shape of the arrays of times, starts, E at the starts, what passes of it,
-    and durations.
+    """n intervals between two times, from arrays of times of a `shape`.
+
+    `starts_rad` are the eccentric anomalies E at the starts, and `passed_rad` the changes of E.
     """
 
     shape: tuple[int, ...]
@@ -101,7 +99,13 @@ class TschaunerHempel(HeldMotion):
         gramians = np.zeros((count, 6, 6))
         helds = np.zeros((count, 6, 3))
         fill_integrals(
-            self._ellipse, *intervals[2:], self._panel_rad, NODES, WEIGHTS, gramians, helds
+            self._ellipse,
+            intervals.starts_rad,
+            intervals.passed_rad,
+            intervals.durations_s,
+            self._panel_rad,
+            gramians,
+            helds,
         )
         return HeldSegment(
             self._transitions(intervals),
@@ -136,18 +140,26 @@ class TschaunerHempel(HeldMotion):
 
     def _transitions(self, intervals: _Intervals) -> Floats:
         matrices = np.zeros((len(intervals.durations_s), 6, 6))
-        fill_transitions(self._ellipse, *intervals[2:], matrices)
+        fill_transitions(
+            self._ellipse,
+            intervals.starts_rad,
+            intervals.passed_rad,
+            intervals.durations_s,
+            matrices,
+        )
         return matrices.reshape(*intervals.shape, 6, 6)
 
     @property
     def _ellipse(self) -> Ellipse:
         n = self.orbit.mean_motion_rad_s
         e = self.orbit.eccentricity
-        # 1 - e^2 would lose the digits that 1 - e has.
+        # Computed as 1 - e^2 it would lose digits near e = 1.
         root = math.sqrt((1.0 - e) * (1.0 + e))
         return Ellipse(n, e, root, n / root**3)
 
     @property
     def _panel_rad(self) -> float:
         e = self.orbit.eccentricity
-        return LONGEST_PANEL_RAD if e < 0.6 else min(LONGEST_PANEL_RAD, math.acosh(1.0 / e))
+        if e == 0.0:  # no poles
+            return LONGEST_PANEL_RAD
+        return min(LONGEST_PANEL_RAD, math.acosh(1.0 / e))

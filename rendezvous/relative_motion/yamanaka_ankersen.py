@@ -1,5 +1,4 @@
-"""Yamanaka and Ankersen's transition of motion about an elliptic orbit, in a form that keeps its
-digits: compiled.
+"""Compiled kernels of Yamanaka and Ankersen's transition of motion about an elliptic orbit.
 
 Tschauner and Hempel's variables are x = rho r and x' = dx / d nu with the true anomaly nu and rho =
 1 + e cos nu:
@@ -8,9 +7,9 @@ Tschauner and Hempel's variables are x = rho r and x' = dx / d nu with the true 
 
 The motion has six constants, linear in the state (equation (82)), of which the state at any other
 place is a linear function (84). The secular part contains k^2 (t - t_0), with t_0 the start of the
-interval. Here the *change* of the state is computed, from changes of sin nu, cos nu and rho that
+interval. The kernels compute the *change* of the state, from changes of sin nu, cos nu and rho that
 are products with the sine of half the change of nu: over a short interval the large terms of (84)
-would cancel.
+would cancel, and digits would be lost.
 
 References
 ----------
@@ -30,9 +29,16 @@ from infoset.rendezvous._compile import allocation_free, compiled
 from infoset.rendezvous.relative_motion.clohessy_wiltshire import angle_less_sine
 
 KEPLER_STEPS = 2
-"""Newton's steps for the anomaly between two times, from a guess that has the rounding of both
-anomalies. The first one leaves the square of that error; the second one matters only near the
-greatest eccentricity."""
+"""Newton's steps for the anomaly between two times, from a guess with the rounding of both
+anomalies. The first step leaves the square of this error; the second one matters only near the
+maximum eccentricity."""
+NODES, WEIGHTS = (rule.astype(np.float64) for rule in np.polynomial.legendre.leggauss(16))
+"""Gauss and Legendre's rule of a panel, on [-1, 1].
+
+The nearest pole of the motion is at least the panel's length d away from the panel's middle. The
+half-axes of the ellipse through the pole, whose foci are the ends of the panel, have a sum of (2 +
+sqrt(5)) d / 2, so the error decreases as 4.24^(-2 n): 9e-21 for n = 16 nodes. With 12 nodes, 9e-16,
+the order of the pole is noticeable."""
 
 
 class Ellipse(NamedTuple):
@@ -45,9 +51,7 @@ class Ellipse(NamedTuple):
 
 
 class Place(NamedTuple):
-    """A place on the orbit: E, r / a = 1 - e cos E, and sine and cosine of half the true
-    anomaly.
-    """
+    """A place on the orbit: E, r / a = 1 - e cos E, sine and cosine of half the true anomaly."""
 
     eccentric_rad: float
     distance: float
@@ -56,10 +60,11 @@ class Place(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """Motion from a place to another one.
+    """Motion from one place to another.
 
-    sin nu, cos nu and rho at the first place, by how much the sine and the cosine change, sine and
-    cosine of the change of nu, and the secular k^2 (t - t_0).
+    `sine`, `cosine` and `rho` are sin nu, cos nu and rho at the first place; `sine_change` and
+    `cosine_change` the changes of sin nu and cos nu; `turn_sine` and `turn_cosine` the sine and the
+    cosine of the change of nu; `secular` is k^2 (t - t_0).
     """
 
     sine: float
@@ -76,11 +81,10 @@ class Leg(NamedTuple):
 def fill_transitions(
     ellipse: Ellipse, starts_rad: Floats, guesses_rad: Floats, durations_s: Floats, matrices: Floats
 ) -> None:
-    """Fill Phi, shape (k, 6, 6), whose other entries are zero, of intervals from eccentric
-    anomalies E.
+    """Fill transition matrices, shape (k, 6, 6), which are zero before.
 
-    `guesses_rad` are guesses of the anomalies that pass in the durations, exact but for the
-    rounding of E.
+    The intervals start at eccentric anomalies E, `starts_rad`. `guesses_rad` are the changes of E
+    in the durations, exact except for the rounding of E.
     """
     for row in range(len(durations_s)):
         mean_rad = ellipse.mean_motion_rad_s * durations_s[row]
@@ -104,15 +108,13 @@ def fill_integrals(
     guesses_rad: Floats,
     durations_s: Floats,
     panel_rad: float,
-    nodes: Floats,
-    weights: Floats,
     gramians: Floats,
     helds: Floats,
 ) -> None:
-    """Add Gramians, shape (k, 6, 6), and effects of held controls, shape (k, 6, 3), to zeros.
+    """Fill Gramians, shape (k, 6, 6), and effects of held controls, shape (k, 6, 3).
 
-    The rule of `nodes` on [-1, 1] and `weights` is applied to panels of eccentric anomaly of at
-    most `panel_rad`.
+    Both are zero before. The intervals are as in `fill_transitions`. The rule is applied to panels
+    of eccentric anomaly of at most `panel_rad`.
     """
     effect = np.zeros((6, 3))
     for row in range(len(durations_s)):
@@ -123,15 +125,15 @@ def fill_integrals(
         half_rad = 0.5 * passed_rad / panels
 
         for panel in range(panels):
-            for node in range(len(nodes)):
-                to_go_rad = half_rad * (2 * panel + 1 + nodes[node])
+            for node in range(len(NODES)):
+                to_go_rad = half_rad * (2 * panel + 1 + NODES[node])
                 place = place_at(ellipse, end.eccentric_rad - to_go_rad)
                 mean_to_go_rad = mean_anomaly(
                     ellipse, end.eccentric_rad - 0.5 * to_go_rad, to_go_rad
                 )
                 leg = leg_between(ellipse, place, end, to_go_rad, mean_to_go_rad)
                 fill_effect(ellipse, leg, effect)
-                time_s = half_rad * weights[node] * place.distance / ellipse.mean_motion_rad_s
+                time_s = half_rad * WEIGHTS[node] * place.distance / ellipse.mean_motion_rad_s
                 add_integrand(effect, time_s, gramians[row], helds[row])
 
 
@@ -149,11 +151,11 @@ def place_at(ellipse: Ellipse, eccentric_rad: float) -> Place:
 
 @allocation_free
 def mean_anomaly(ellipse: Ellipse, middle_rad: float, passed_rad: float) -> float:
-    """Return the mean anomaly that passes with an eccentric one, from its middle: Kepler's equation
-    of a difference.
+    """Return the change of the mean anomaly for a change of the eccentric anomaly.
 
-    With h half of what passes, 2 h - 2 e cos(E) sin(h), as 2 (h - sin h) + 2 (1 - e cos E) sin(h):
-    nothing cancels if h is small.
+    Kepler's equation of a difference, with h half the change and E the anomaly at its middle: 2 h -
+    2 e cos(E) sin(h), computed as 2 (h - sin h) + 2 (1 - e cos E) sin(h), in which nothing cancels
+    if h is small.
     """
     half = 0.5 * passed_rad
     middle_sine = math.sin(0.5 * middle_rad)
@@ -163,8 +165,9 @@ def mean_anomaly(ellipse: Ellipse, middle_rad: float, passed_rad: float) -> floa
 
 @allocation_free
 def passed_anomaly(ellipse: Ellipse, start_rad: float, guess_rad: float, mean_rad: float) -> float:
-    """Return the eccentric anomaly that passes with a mean one, near a guess: its digits are those
-    of its own size.
+    """Return the change of the eccentric anomaly for a change of the mean anomaly, near a guess.
+
+    Its error is relative to the change, not to the anomalies.
     """
     passed_rad = guess_rad
     for _ in range(KEPLER_STEPS):
@@ -177,7 +180,7 @@ def passed_anomaly(ellipse: Ellipse, start_rad: float, guess_rad: float, mean_ra
 def leg_between(
     ellipse: Ellipse, start: Place, end: Place, passed_rad: float, mean_rad: float
 ) -> Leg:
-    """Return the leg between two places, between which an eccentric and a mean anomaly pass.
+    """Return the leg between two places, for the changes of the eccentric and the mean anomaly.
 
     Half the change of nu has the sine sqrt(1 - e^2) sin(dE / 2) / sqrt(d_0 d_1) with d = r / a.
     """
@@ -201,9 +204,7 @@ def leg_between(
 
 @allocation_free
 def fill_effect(ellipse: Ellipse, leg: Leg, effect: Floats) -> None:
-    """Fill Phi B, shape (6, 3), whose other entries are zero: a velocity v is x' = v / (k^2
-    rho).
-    """
+    """Fill Phi B, shape (6, 3), which is zero before: a velocity v is x' = v / (k^2 rho)."""
     rate = 1.0 / (ellipse.latus_rate_rad_s * leg.rho)
     fill_column(ellipse, leg, 0.0, 0.0, rate, 0.0, effect[:, 0])
     fill_column(ellipse, leg, 0.0, 0.0, 0.0, rate, effect[:, 1])
@@ -214,8 +215,9 @@ def fill_effect(ellipse: Ellipse, leg: Leg, effect: Floats) -> None:
 def fill_column(
     ellipse: Ellipse, leg: Leg, x: float, y: float, x_rate: float, y_rate: float, column: Floats
 ) -> None:
-    """Fill position and velocity in the orbit's plane at the end of a leg, of a scaled state at its
-    start.
+    """Fill position and velocity in the orbit's plane at the end of a leg, in a column of a matrix.
+
+    `x`, `y` and their rates are the scaled state at the start.
     """
     e = ellipse.eccentricity
     rest = ellipse.root * ellipse.root
@@ -225,7 +227,7 @@ def fill_column(
     s = rho * sine
     c = rho * cosine
 
-    # (82): the constants; that of y alone does not change the state.
+    # (82): the constants, without the constant of y, which does not change the state.
     by_s = (
         -3.0 * sine * (1.0 + e * e / rho) * x + (c - 2.0 * e) * x_rate - sine * (rho + 1.0) * y_rate
     ) / rest
@@ -260,8 +262,9 @@ def fill_column(
 
 @allocation_free
 def fill_normal(ellipse: Ellipse, leg: Leg, z: float, z_rate: float, column: Floats) -> None:
-    """Fill position and velocity across the orbit's plane at the end of a leg, of a scaled state at
-    its start.
+    """Fill position and velocity along the orbit's normal at the end of a leg, in a column.
+
+    `z` and its rate are the scaled state at the start.
     """
     z_end = z * leg.turn_cosine + z_rate * leg.turn_sine
     z_rate_end = z_rate * leg.turn_cosine - z * leg.turn_sine
@@ -273,18 +276,14 @@ def fill_normal(ellipse: Ellipse, leg: Leg, z: float, z_rate: float, column: Flo
 def fill_axis(
     ellipse: Ellipse, sine: float, rho: float, scaled: float, scaled_rate: float, parts: Floats
 ) -> None:
-    """Fill a position and its velocity, shape (2,), from scaled ones where sin nu and rho are
-    known.
-    """
+    """Fill a position and its velocity, shape (2,), from their scaled values, sin nu and rho."""
     parts[0] = scaled / rho
     parts[1] = ellipse.latus_rate_rad_s * (ellipse.eccentricity * sine * scaled + rho * scaled_rate)
 
 
 @allocation_free
 def add_integrand(effect: Floats, time_s: float, gramian: Floats, held: Floats) -> None:
-    """Add the product of a time and the integrands of the Gramian, shape (6, 6), and of the held
-    control, (6, 3).
-    """
+    """Add the integrands of the Gramian, (6, 6), and of the held control, (6, 3), times a time."""
     for first in range(6):
         for axis in range(3):
             held[first, axis] += time_s * effect[first, axis]
