@@ -1,9 +1,8 @@
-"""Minimum energy with a bound on the control, |u| <= u_max at all times, for arcs that share free
-values.
+"""Minimum energy with a bound on the control, |u| <= u_max, for arcs that share free values.
 
-An arc k is a linear motion from a given state. Its control has to have the effect e_k = d_k + L_k z
-at its end, where the free values z (a common meeting, velocities at flybys) are shared by the arcs.
-Minimised is
+An arc k is a linear motion from a given state. Its control must have the effect e_k = d_k + L_k z
+at its end, where the arcs share the free values z (a common meeting, velocities at flybys). The
+minimised cost is
 
     sum_k w_k 1/2 int |u_k|^2 dt    with |u_k(t)| <= u_max.
 
@@ -13,8 +12,9 @@ of finite dimension,
 
     D = sum_k w_k (lambda_k . d_k - int h(|s_k|) dt)    over    sum_k w_k L_k' lambda_k = 0,
 
-with h(r) = r^2 / 2 up to u_max and u_max r - u_max^2 / 2 beyond it. Every D is below the cost of
-every control, so the difference from the cost that is found proves how good it is.
+with h(r) = r^2 / 2 up to u_max and u_max r - u_max^2 / 2 beyond. Every value of D is a lower bound
+of the cost of every control, so its difference from the cost that is found bounds the error of the
+cost.
 """
 
 from __future__ import annotations
@@ -36,62 +36,63 @@ from infoset.rendezvous.relative_motion import LinearMotion
 GAP = 1e-8
 """Maximum difference of the cost from its lower bound, and maximum error of an effect, relative:
 visits are printed with nine digits."""
-_NODES, _WEIGHTS = (rule.astype(np.float64) for rule in np.polynomial.legendre.leggauss(12))
+_RULE_NODES = 12
+"""Nodes of Gauss and Legendre's rule in an interval of a quarter of a radian, as in `piecewise`."""
+_NODES, _WEIGHTS = (
+    rule.astype(np.float64) for rule in np.polynomial.legendre.leggauss(_RULE_NODES)
+)
 _PARTS = 4
-"""Parts of a panel of a radian, at whose ends and nodes it is seen whether the control reaches the
-bound.
-"""
+"""Parts of a panel of a radian at whose nodes the control is compared with the bound. Two switches
+between neighbouring nodes, at most 0.03 rad apart, are missed; intervals are then halved."""
 _EXACT = 1e-11
 """Error of the effects, relative, at which no more rounds are needed."""
 _MAX_ROUNDS = 12
-"""Rounds of new switching times; the error is squared in each. Five were enough in 285 random
-cases.
-"""
-_MAX_STEPS = 200
-"""Newton steps in a round. With them, 285 of 289 random bounds, from 3e-5 above the smallest
-possible one, relative, were solved; the other four were within 1e-4 of it."""
+"""Maximum number of rounds of new switching times; each round squares the error. Five were enough
+in 285 random cases."""
+_MAX_NEWTON_STEPS = 200
+"""Maximum number of Newton steps in a round. With it, 285 of 289 random bounds, from 3e-5 above the
+smallest possible bound, relative, were solved; the other four were within 1e-4 of it."""
 _SHORTEST = 1e-9
-"""Shortest part of a Newton step."""
+"""Minimum part of a Newton step: shorter steps change the value by its rounding only."""
 _SETTLED = 1e-13
 """Error of the effect, relative, at which a round ends: rounding of the sums."""
 _FARTHEST = 1e12
-"""Size of the efforts, relative to the goals, beyond which none is tried: they grow as the reserve
-of the bound falls, and with so small a reserve the control is not found to any digit."""
+"""Maximum size of the efforts, relative to the goals. Efforts grow as the reserve of the bound
+decreases, and with so small a reserve no digit of the control is exact."""
 _ROUNDED = 1e-11
-"""Decrease of the value by a Newton step, relative, below which it is not compared any more."""
+"""Decrease of the value by a Newton step, relative, below which values are no longer compared."""
+_ARMIJO = 0.1
+"""Part of the decrease of the linear model that a Newton step must attain (Armijo's rule)."""
 _DAMPING = 1e-13
-"""Added to the curvature, relative: it is singular if all of a control is at the bound and keeps
-its direction.
-"""
+"""Added to the curvature, relative: the curvature is singular if all of a control is at the bound
+and keeps its direction."""
 _BISECTIONS = 50
-"""They find a switching time to the rounding of times."""
+"""Bisections of a switching time: its error is then below the rounding of times."""
 _RULE_TOLERANCE = 1e-12
-"""Error of the effect in an interval, relative to that of the bound in the arc: a hundred of them
-are below `GAP`.
-"""
+"""Error of the effect in an interval, relative to the effect of the bound in the arc: the sum of a
+hundred such errors is below `GAP`."""
 _MAX_HALVINGS = 40
-"""Halvings of an interval at most: its length is then near the rounding of times."""
+"""Maximum number of halvings of an interval: its length is then near the rounding of times."""
 _RULE_ERROR = 1e-4
-"""More than the error of the rule for int |s| dt where s passes near zero: 2e-5 of it in the
-published encounter.
-"""
+"""Bound of the relative error of the rule for int |s| dt where s passes near zero: the error is
+2e-5 in the published encounter."""
 _LEAST_PARTS = 16
-"""Parts of a panel in the cone program of the smallest bound: with them it is 1e-7 exact in the
-published encounter.
-"""
+"""Parts of a panel in the cone program of the smallest bound: the bound then has a relative error
+of 1e-7 in the published encounter."""
 _CONES = 6000
-"""Number of times up to which the cone program of the smallest bound is refined; it is solved in a
-second.
-"""
+"""Number of times up to which the cone program of the smallest bound is refined: it is solved in a
+second."""
+_EXACT_INTEGRAL = 1e-9
+"""Relative error of the integral in the smallest bound, as of `integral_of_size`."""
 
 
 class BoundTooSmallError(ValueError):
-    """No control keeps the bound."""
+    """No control satisfies the bound."""
 
 
 @dataclass(frozen=True, eq=False)
 class Arc:
-    """A linear motion between two times, and what its control has to change.
+    """A linear motion between two times, and the effect that its control must have.
 
     Parameters
     ----------
@@ -100,12 +101,12 @@ class Arc:
     start_s, end_s : float
         Start and end, s.
     missing : ndarray, shape (c,)
-        d: effect of the control on the first c components at the end, m and m/s, if the free values
-        are zero.
+        d, the effect of the control on the first c components at the end, m and m/s, for free
+        values of zero.
     slope : ndarray, shape (c, f)
-        L: its change with the free values.
+        L, the change of the effect with the free values.
     weight : float
-        w > 0: weight of the energy.
+        w > 0, the weight of the energy.
     """
 
     motion: LinearMotion
@@ -116,20 +117,16 @@ class Arc:
     weight: float = 1.0
 
     def breaks(self) -> Floats:
-        """Return times from start to end between which the motion turns by about a radian at most,
-        s.
-        """
+        """Return times, s, from start to end; between two the motion turns by about a radian."""
         return self.motion.breaks(self.start_s, self.end_s)
 
     def effects(self, time_s: Floats) -> Floats:
-        """Return the effect of a unit control for a second on the first c components, shape (k, c,
-        3).
-        """
+        """Return the effect of a unit control for a second at times (k,), shape (k, c, 3)."""
         to_end = self.motion.transition(time_s, np.full(time_s.shape, self.end_s))
         return np.asarray(to_end[:, : len(self.missing), 3:])
 
     def whitener(self) -> Floats:
-        """Return L^-1 S^-1, shape (c, c), with S the units and L L' the Gramian in them.
+        """Return C^-1 S^-1, shape (c, c), with S the units and C C' the Gramian in these units.
 
         Raises
         ------
@@ -139,9 +136,8 @@ class Arc:
         count = len(self.missing)
         scale = np.ones(count)
         scale[:3] = self.end_s - self.start_s
-        gramian = self.motion.gramian(self.start_s, self.end_s)[:count, :count] / np.outer(
-            scale, scale
-        )
+        gramian = self.motion.gramian(self.start_s, self.end_s)[:count, :count]
+        gramian = gramian / np.outer(scale, scale)
         try:
             lower = np.linalg.cholesky(gramian)
         except np.linalg.LinAlgError:
@@ -154,11 +150,10 @@ class Arc:
 
 @dataclass(frozen=True, eq=False)
 class BoundedFlight:
-    """A flight of minimum energy with |u| <= `max_m_s2`: from `start_state`, with the `costate`
-    (6,) at its end.
+    """A flight of minimum energy with |u| <= `max_m_s2`.
 
-    `edges_s` are times, s, from start to end, between which the control is smooth and the rule is
-    exact.
+    It starts in `start_state`, shape (6,), and has the `costate`, shape (6,), at its end. `edges_s`
+    are times, s, from start to end, between which the control is smooth and the rule is exact.
     """
 
     motion: LinearMotion
@@ -184,14 +179,13 @@ class BoundedFlight:
         return np.linspace(self.start_s, self.end_s, count)
 
     def breaks(self) -> Floats:
-        """Return times, s, between which the control is smooth and turns by about a radian at
-        most.
-        """
+        """Return times, s, between which the control is smooth and turns by at most a radian."""
         return self.edges_s
 
     def state(self, time_s: ArrayLike) -> Floats:
-        """Return the states, m and m/s, shape (..., 6), by Gauss and Legendre's rule between breaks
-        and times.
+        """Return the states, m and m/s, shape (..., 6).
+
+        Gauss and Legendre's rule is applied between neighbours of all breaks and times.
         """
         times = np.asarray(time_s, dtype=np.float64)
         grid = np.union1d(self.edges_s, times)
@@ -211,9 +205,9 @@ class BoundedFlight:
 class BoundedOptimum(NamedTuple):
     """Minimum of the energy of all arcs.
 
-    `free`, shape (f,), are the free values, `costates` the costates (6,) at the ends of the arcs,
-    `energies` their int |u|^2 dt, m^2/s^3, and `edges_s` times, s, between which their controls are
-    smooth, both ends included.
+    `free`, shape (f,), are the free values. For each arc, `costates` contains the costate (6,) at
+    its end, `energies` int |u|^2 dt, m^2/s^3, and `edges_s` times, s, from start to end, between
+    which its control is smooth.
     """
 
     free: Floats
@@ -223,10 +217,10 @@ class BoundedOptimum(NamedTuple):
 
 
 class LeastBound(NamedTuple):
-    """The smallest bound that can be kept.
+    """The smallest bound for which controls exist.
 
-    `value_m_s2` is a lower bound of it, about 1e-6 too small, relative; `shares`, shape (n,), says
-    to what extent each arc determines it; their sum is 1.
+    `value_m_s2` is a lower bound of it, about 1e-6 too small, relative. `shares`, shape (n,), are
+    the parts of the arcs in the integral that determines it; their sum is 1.
     """
 
     value_m_s2: float
@@ -250,46 +244,39 @@ def solve_bounded(arcs: Sequence[Arc], max_m_s2: float) -> BoundedOptimum:
 
     Newton's method on the dual, in coordinates in which its curvature without the bound is the
     weight. Integrals are sums over Gauss and Legendre's nodes between the times at which a control
-    reaches the bound; these times are found again with the new costates until they settle. O(n^3)
-    for n arcs.
+    reaches the bound. These switching times are computed again with the new costates until they
+    settle. O(n^3) for n arcs.
 
     Raises
     ------
     BoundTooSmallError
-        If no control keeps the bound, or it is so close to the smallest possible one that the
-        search does not settle.
+        If no control satisfies the bound, or it is so close to the smallest possible bound that
+        the search does not settle.
     """
     whiteners = [arc.whitener() for arc in arcs]
     dual = _Dual.of(arcs, whiteners, max_m_s2)
     point = np.zeros(dual.basis.shape[1])
-    edges = [_parts_of(arc, _PARTS) for arc in arcs]
+    sampled = list(map(_sample, arcs, whiteners, [_parts_of(arc, _PARTS) for arc in arcs]))
     best = _Judged(np.zeros(0), np.zeros(0), np.inf, np.inf)
     chosen = None
     before = np.inf
     for _ in range(_MAX_ROUNDS):
-        sampled = [
-            _sample(arc, white, times)
-            for arc, white, times in zip(arcs, whiteners, edges, strict=True)
-        ]
         point = dual.minimise(sampled, point)
-        costates = [
-            _costate(white, effort)
-            for white, effort in zip(whiteners, dual.efforts(point), strict=True)
-        ]
+        costates = list(map(_costate, whiteners, dual.efforts(point)))
         edges = [
             _resolved(arc, costate, max_m_s2) for arc, costate in zip(arcs, costates, strict=True)
         ]
-        sampled = [
-            _sample(arc, white, times)
-            for arc, white, times in zip(arcs, whiteners, edges, strict=True)
-        ]
+        sampled = list(map(_sample, arcs, whiteners, edges))
+
         judged = dual.judged(sampled, point)
         if judged.violation < best.violation:
             best = judged
             chosen = BoundedOptimum(judged.free, tuple(costates), judged.energies, tuple(edges))
+        # Rounds end when the errors are rounding, or no longer decrease.
         if judged.violation <= _EXACT or judged.violation > 0.5 * before:
             break
         before = judged.violation
+
     if chosen is None or best.violation > GAP or best.gap > GAP:
         raise BoundTooSmallError(
             f"the bound of {max_m_s2:g} m/s^2 is too close to the smallest possible one: effects "
@@ -303,8 +290,8 @@ def least_bound(arcs: Sequence[Arc]) -> LeastBound:
 
     Krasovskii's problem of moments: sum lambda_k . e_k <= u_max sum int |s_k| dt for all costates,
     so each costate with sum L_k' lambda_k = 0 gives the lower bound sum lambda_k . d_k / sum int
-    |s_k| dt. A cone program (Clarabel) over the integral's sum finds the best costates; the bound
-    is theirs with the exact integral.
+    |s_k| dt. A cone program (Clarabel) with the integral as a sum finds the best costates; the
+    result is their lower bound with the exact integral.
     """
     whiteners = [arc.whitener() for arc in arcs]
     goals = [white @ arc.missing for arc, white in zip(arcs, whiteners, strict=True)]
@@ -332,15 +319,15 @@ def least_bound(arcs: Sequence[Arc]) -> LeastBound:
         ]
     )
     reached = float(np.concatenate(efforts) @ np.concatenate(goals))
-    total = float(integrals.sum()) * (1.0 + 1e-9)
+    total = float(integrals.sum()) * (1.0 + _EXACT_INTEGRAL)
     return LeastBound(max(reached / total, 0.0), integrals / integrals.sum())
 
 
 class _Samples(NamedTuple):
     """An arc at the nodes of Gauss and Legendre's rule.
 
-    `effects`, shape (k, c, 3), are the whitened effects of a unit control at the nodes; `weights`,
-    shape (k,), are those of the rule, s.
+    `effects`, shape (k, c, 3), are the whitened effects of a unit control at the nodes, and
+    `weights`, shape (k,), the weights of the rule, s.
     """
 
     effects: Floats
@@ -356,12 +343,20 @@ class _Judged(NamedTuple):
     gap: float
 
 
+class _Expansion(NamedTuple):
+    """A function of a point (p,): its value, gradient (p,) and second derivatives (p, p)."""
+
+    value: float
+    slope: Floats
+    curvature: Floats
+
+
 @dataclass(frozen=True, eq=False)
 class _Dual:
-    """The negative dual as a function of a point, shape (p,): all whitened efforts y are `basis` @
-    point.
+    """The negative dual as a function of a point, shape (p,).
 
-    The basis spans the efforts with sum w_k L_k' lambda_k = 0.
+    The whitened efforts y of all arcs are `basis` @ point; the basis spans the efforts with sum w_k
+    L_k' lambda_k = 0.
     """
 
     basis: Floats
@@ -389,22 +384,28 @@ class _Dual:
         """Return the point of the smallest value, by Newton's method with halved steps (Armijo)."""
         value, slope, curvature = self._expand(sampled, point)
         settled = _SETTLED * float(np.linalg.norm(self.basis.T @ self._weighted_goal()))
-        for _ in range(_MAX_STEPS):
+        for _ in range(_MAX_NEWTON_STEPS):
             if np.linalg.norm(slope) <= settled:
                 break
             damping = _DAMPING * max(float(np.trace(curvature)) / max(len(point), 1), 1e-300)
             step = -np.linalg.solve(curvature + damping * np.eye(len(point)), slope)
             decrease = -float(slope @ step)
             compared = decrease > _ROUNDED * abs(value)
+
             length = 1.0
             trial = self._expand(sampled, point + step)
-            while compared and trial[0] > value - 0.1 * length * decrease and length > _SHORTEST:
+            while (
+                compared
+                and trial.value > value - _ARMIJO * length * decrease
+                and length > _SHORTEST
+            ):
                 length *= 0.5
                 trial = self._expand(sampled, point + length * step)
-            if not np.isfinite(trial[0]):
+
+            if not np.isfinite(trial.value):
                 break
             # If the value changes by its rounding only, the slope has more digits.
-            if not compared and not np.linalg.norm(trial[1]) < 0.5 * np.linalg.norm(slope):
+            if not compared and not np.linalg.norm(trial.slope) < 0.5 * np.linalg.norm(slope):
                 break
             point = point + length * step
             value, slope, curvature = trial
@@ -415,17 +416,21 @@ class _Dual:
             [weight * goal for weight, goal in zip(self.weights, self.goals, strict=True)]
         )
 
-    def _expand(self, sampled: Sequence[_Samples], point: Floats) -> tuple[float, Floats, Floats]:
-        """Return the negative dual, its gradient and its matrix of second derivatives.
+    def _expand(self, sampled: Sequence[_Samples], point: Floats) -> _Expansion:
+        """Return the negative dual and its derivatives at a point.
 
         Raises
         ------
         BoundTooSmallError
-            If the point proves that no control keeps the bound.
+            If the point proves that no control satisfies the bound.
         """
         if not np.linalg.norm(point) <= _FARTHEST * np.linalg.norm(np.concatenate(self.goals)):
-            return np.inf, np.full(point.shape, np.inf), np.eye(len(point))
-        value, most, gained = 0.0, 0.0, 0.0
+            return _Expansion(np.inf, np.full(point.shape, np.inf), np.eye(len(point)))
+
+        # `gained` exceeds `most` only if no control has the effects (problem of moments).
+        value = 0.0
+        most = 0.0
+        gained = 0.0
         slopes = []
         blocks = []
         for samples, effort, goal, weight in zip(
@@ -440,14 +445,13 @@ class _Dual:
             blocks.append(weight * _curvature(samples, wanted, sizes, self.max_m_s2))
         if gained > most * (1.0 + _RULE_ERROR):
             raise BoundTooSmallError(f"no control keeps the bound of {self.max_m_s2:g} m/s^2")
+
         slope = self.basis.T @ np.concatenate(slopes)
         curvature = self.basis.T @ block_diag(*blocks) @ self.basis
-        return float(value), np.asarray(slope), np.asarray(curvature)
+        return _Expansion(float(value), np.asarray(slope), np.asarray(curvature))
 
     def judged(self, sampled: Sequence[_Samples], point: Floats) -> _Judged:
-        """Return the free values that fit the effects best, the energies, and the errors of
-        both.
-        """
+        """Return the free values that fit the effects best, the energies, and the errors."""
         energies = np.empty(len(sampled))
         lower = np.empty(len(sampled))
         reached = []
@@ -474,14 +478,16 @@ class _Dual:
 def _longest_goal(
     sampled: Sequence[_Samples], goals: Sequence[Floats], slopes: Sequence[Floats]
 ) -> list[Floats]:
-    """Efforts y of the smallest sum of int |s| dt with y . goal = 1 in all, and slopes' y = 0, by a
-    cone program.
+    """Return efforts y that minimise the sum of int |s| dt, by a cone program.
+
+    The constraints are sum y . goal = 1 and sum slopes' y = 0 over all arcs. The variables are the
+    efforts, and upper bounds of |s| at all nodes, divided by sqrt(length_s).
     """
     sizes = [len(goal) for goal in goals]
     length_s = max(float(samples.weights.sum()) for samples in sampled)
     blocks = []
     for samples, before in zip(sampled, np.cumsum([0, *sizes[:-1]]), strict=True):
-        # Rows 0, 4, ..: the heights of the cones; the others: s at the nodes.
+        # Rows 0, 4, 8, ... are the heights of the cones, and the other rows s at the nodes.
         rows = np.zeros((len(samples.weights), 4, sum(sizes)))
         rows[:, 1:, before : before + samples.effects.shape[1]] = samples.effects.transpose(0, 2, 1)
         blocks.append(csc_matrix(-np.sqrt(length_s) * rows.reshape(-1, sum(sizes))))
@@ -489,12 +495,14 @@ def _longest_goal(
     heights = csc_matrix(
         (-np.ones(count), (4 * np.arange(count), np.arange(count))), shape=(4 * count, count)
     )
+
     equations = np.concatenate([np.concatenate(goals)[None], np.concatenate(slopes).T])
     matrix = block_array([[csc_matrix(equations), None], [vstack(blocks), heights]], format="csc")
     ends = np.concatenate([[1.0], np.zeros(len(equations) - 1 + 4 * count)])
     cost = np.concatenate(
         [np.zeros(sum(sizes)), *(samples.weights / length_s for samples in sampled)]
     )
+
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.max_threads = 1
@@ -513,8 +521,9 @@ def _effect(samples: _Samples, control: Floats) -> Floats:
 
 
 def _curvature(samples: _Samples, wanted: Floats, sizes: Floats, max_m_s2: float) -> Floats:
-    """Second derivatives of int h(|s|) dt, shape (c, c): I inside the bound, u_max (I - s s' /
-    |s|^2) / |s| beyond.
+    """Second derivatives of int h(|s|) dt, shape (c, c).
+
+    The second derivative of h is I inside the bound, and u_max (I - s s' / |s|^2) / |s| beyond it.
     """
     inside = sizes <= max_m_s2
     share = np.where(inside, 1.0, max_m_s2 / np.maximum(sizes, max_m_s2))
@@ -541,7 +550,7 @@ def _rule(edges_s: Floats) -> tuple[Floats, Floats]:
 
 
 def _parts_of(arc: Arc, parts: int) -> Floats:
-    """Ends of so many parts of each panel of an arc, s."""
+    """Ends of equal parts of each panel of an arc, s."""
     breaks = arc.breaks()
     places = np.linspace(0.0, len(breaks) - 1.0, parts * (len(breaks) - 1) + 1)
     return np.asarray(np.interp(places, np.arange(len(breaks)), breaks))
@@ -555,8 +564,8 @@ def _sample(arc: Arc, white: Floats, edges_s: Floats) -> _Samples:
 def _resolved(arc: Arc, costate: Floats, max_m_s2: float) -> Floats:
     """Ends of intervals, s, on which the rule is exact for the control of a costate.
 
-    They begin with parts of panels, cut where |s| = u_max. An interval is halved until its halves
-    change the effect of the control by less than its share of `_RULE_TOLERANCE`.
+    The initial intervals are parts of panels, cut where |s| = u_max. An interval is halved until
+    its halves change the effect of the control by less than `_RULE_TOLERANCE`.
     """
 
     def wanted(times: Floats) -> Floats:
@@ -571,9 +580,9 @@ def _resolved(arc: Arc, costate: Floats, max_m_s2: float) -> Floats:
     for _ in range(_MAX_HALVINGS):
         middle = 0.5 * (low + high)
         whole = _mean(wanted, low, high, max_m_s2)
-        halves = 0.5 * (
-            _mean(wanted, low, middle, max_m_s2) + _mean(wanted, middle, high, max_m_s2)
-        )
+        first = _mean(wanted, low, middle, max_m_s2)
+        second = _mean(wanted, middle, high, max_m_s2)
+        halves = 0.5 * (first + second)
         error = np.linalg.norm(whole - halves, axis=1) * (high - low)
         rough = error > _RULE_TOLERANCE * max_m_s2 * (arc.end_s - arc.start_s)
         if not rough.any():
@@ -592,9 +601,7 @@ def _mean(wanted: Callable[[Floats], Floats], low: Floats, high: Floats, max_m_s
 
 
 def _switches(wanted: Callable[[Floats], Floats], nodes_s: Floats, max_m_s2: float) -> Floats:
-    """Times, s, at which |s| = u_max, by bisection between two nodes, one inside the bound and one
-    beyond it.
-    """
+    """Times, s, at which |s| = u_max, by bisection between nodes inside and beyond the bound."""
     beyond = np.linalg.norm(wanted(nodes_s), axis=1) > max_m_s2
     changes = np.flatnonzero(beyond[1:] != beyond[:-1])
     low = nodes_s[changes]

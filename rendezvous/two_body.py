@@ -1,6 +1,4 @@
-"""Motion under the gravity of one point: osculating elements, and coasting along any conic for many
-states at once.
-"""
+"""Motion under the gravity of one point: osculating elements, and coasting along any conic."""
 
 from __future__ import annotations
 
@@ -14,35 +12,37 @@ from numpy.typing import ArrayLike
 from infoset.rendezvous._arrays import Floats
 
 _STRAIGHT = 1e-15
-"""A motion is straight if the square of its transverse speed is below this share of that of its
-speed: rounding.
-"""
+"""Square of the transverse speed, relative to the square of the escape speed, up to which a motion
+is straight: rounding."""
 _NEARLY_PARABOLIC = 1e-5
-"""Conics whose binding is smaller have the time of a parabola to the perigee, to this relative
-error.
-"""
+"""Binding below which the time to the perigee is computed as for a parabola, with a relative error
+of the same size."""
+_RADIAL = 1e-6
+"""Perigee, relative to the semi-major axis, up to which an orbit is a fall through the centre."""
 _STUMPFF_SERIES = np.array(
     [[(-1) ** k / math.factorial(order + 2 * k) for order in (2, 3)] for k in range(10)]
 )
-"""Coefficients of Stumpff's c_2 and c_3 up to the power 9: the next term is below 1 / 22! for
+"""Coefficients of Stumpff's c_2 and c_3 up to the power 9: the next term is at most 1 / 22! for
 arguments up to 1.
 """
 _MAX_ROUNDS = 200
-"""Newton's method needs about 10 rounds, and bisection 60 for 60 bits."""
+"""Maximum number of rounds for the anomaly: Newton's method needs about 10, and bisection 60."""
+_ANOMALY_ROUNDING = 4e-16
+"""Newton step, relative to the anomaly, at which it is exact to rounding: two roundings."""
 
 
 @dataclass(frozen=True)
 class OrbitalElements:
-    """Elements of an ellipse or a hyperbola, and the true anomaly; `raan` is the right ascension of
-    the ascending node.
+    """Elements of an ellipse or a hyperbola, and the true anomaly.
 
-    The semi-major axis of a hyperbola is negative.
+    The semi-major axis of a hyperbola is negative. `raan_rad` is the right ascension of the
+    ascending node.
 
     Raises
     ------
     ValueError
-        If the semi-major axis and the eccentricity belong to neither, or the true anomaly is beyond
-        the asymptotes.
+        If the semi-major axis and the eccentricity belong to neither an ellipse nor a hyperbola, or
+        the true anomaly is beyond the asymptotes.
     """
 
     semi_major_axis_m: float
@@ -70,30 +70,33 @@ class OrbitalElements:
             )
 
     def state(self, gravitational_parameter_m3_s2: float) -> tuple[Floats, Floats]:
-        """Return position (m) and velocity (m/s), shapes (3,), in the inertial frame of the
-        elements.
-        """
+        """Return position (m) and velocity (m/s), (3,), in the inertial frame of the elements."""
         latus_rectum = self.semi_major_axis_m * (1.0 - self.eccentricity**2)
         cosine = np.cos(self.true_anomaly_rad)
         sine = np.sin(self.true_anomaly_rad)
         radius = latus_rectum / (1.0 + self.eccentricity * cosine)
         speed = np.sqrt(gravitational_parameter_m3_s2 / latus_rectum)
-        (cn, sn), (ci, si), (cp, sp) = (
-            (np.cos(angle), np.sin(angle))
-            for angle in (self.raan_rad, self.inclination_rad, self.argument_of_perigee_rad)
-        )
+
+        cn = np.cos(self.raan_rad)
+        sn = np.sin(self.raan_rad)
+        ci = np.cos(self.inclination_rad)
+        si = np.sin(self.inclination_rad)
+        cp = np.cos(self.argument_of_perigee_rad)
+        sp = np.sin(self.argument_of_perigee_rad)
         # In the plane, ahead is a quarter of a turn from the direction of the perigee.
         toward_perigee = np.array([cn * cp - sn * ci * sp, sn * cp + cn * ci * sp, si * sp])
         ahead = np.array([-cn * sp - sn * ci * cp, -sn * sp + cn * ci * cp, si * cp])
         position = radius * (cosine * toward_perigee + sine * ahead)
-        return position, speed * (-sine * toward_perigee + (self.eccentricity + cosine) * ahead)
+        velocity = speed * (-sine * toward_perigee + (self.eccentricity + cosine) * ahead)
+        return position, velocity
 
 
 def semi_major_axis_m(
     position_m: Floats, velocity_m_s: Floats, gravitational_parameter_m3_s2: float
 ) -> float:
-    """Return the osculating semi-major axis, m: negative for a hyperbola, infinite for a
-    parabola.
+    """Return the osculating semi-major axis, m.
+
+    It is negative for a hyperbola and infinite for a parabola.
     """
     inverse = (
         2.0 / np.linalg.norm(position_m)
@@ -105,13 +108,13 @@ def semi_major_axis_m(
 def perigee_m(
     position_m: Floats, velocity_m_s: Floats, gravitational_parameter_m3_s2: float
 ) -> float:
-    """Return the minimum distance from the planet's centre on the osculating orbit, m; zero for a
-    radial fall.
+    """Return the minimum distance from the planet's centre on the osculating orbit, m.
+
+    It is zero for a radial fall.
     """
-    inward = float(position_m @ velocity_m_s)
-    momentum_squared = (
-        float((position_m @ position_m) * (velocity_m_s @ velocity_m_s)) - inward * inward
-    )
+    along = float(position_m @ velocity_m_s)
+    squares = float((position_m @ position_m) * (velocity_m_s @ velocity_m_s))
+    momentum_squared = squares - along * along
     latus_rectum = max(0.0, momentum_squared) / gravitational_parameter_m3_s2
     axis = semi_major_axis_m(position_m, velocity_m_s, gravitational_parameter_m3_s2)
     return latus_rectum / (1.0 + math.sqrt(max(0.0, 1.0 - latus_rectum / axis)))
@@ -120,8 +123,9 @@ def perigee_m(
 def orbit_fault(
     position_m: Floats, velocity_m_s: Floats, mu_m3_s2: float, planet_radius_m: float
 ) -> str | None:
-    """Return why a craft cannot stay on the orbit of a state: it is no ellipse, or meets the
-    planet; None if it can.
+    """Return the reason why the orbit of a state is not a closed orbit outside the planet, or None.
+
+    The orbit is not an ellipse, or its perigee is inside the planet.
     """
     if not position_m.any():
         return "the position is the centre of the planet"
@@ -131,7 +135,7 @@ def orbit_fault(
             "the orbit is a parabola or a hyperbola: the velocity is not below the escape velocity"
         )
     perigee = perigee_m(position_m, velocity_m_s, mu_m3_s2)
-    if perigee <= 1e-6 * axis:
+    if perigee <= _RADIAL * axis:
         return "the orbit is a fall along a line through the planet's centre"
     if perigee <= planet_radius_m:
         return (
@@ -142,15 +146,16 @@ def orbit_fault(
 
 
 class _Start(NamedTuple):
-    """States in units in which their distance and the gravitational parameter are one."""
+    """States in units in which their distance and the gravitational parameter are one.
+
+    `unit_s` is the unit of time. `binding` is the distance divided by the semi-major axis: positive
+    for an ellipse, zero for a parabola, negative for a hyperbola. `outward` is the radial speed,
+    and `transverse_squared` the square of the transverse speed.
+    """
 
     unit_s: Floats
     binding: Floats
-    """Distance over semi-major axis: positive on an ellipse, zero on a parabola, negative on a
-    hyperbola.
-    """
     outward: Floats
-    """Radial speed."""
     transverse_squared: Floats
 
 
@@ -167,13 +172,14 @@ def closest_approach_m(
     start = _scaled_start(position_m, velocity_m_s, gravitational_parameter_m3_s2)
     if _to_perigee(start) * start.unit_s < duration_s:
         return perigee_m(position_m, velocity_m_s, gravitational_parameter_m3_s2)
-    # Between two perigees the distance has no minimum but the ends.
-    end = position_m
-    if math.isfinite(duration_s):
-        end = coast(
-            np.concatenate([position_m, velocity_m_s]), duration_s, gravitational_parameter_m3_s2
-        )[:3]
-    return float(min(np.linalg.norm(position_m), np.linalg.norm(end)))
+
+    # Between two perigees the distance is smallest at one of the ends.
+    start_m = float(np.linalg.norm(position_m))
+    if not math.isfinite(duration_s):
+        return start_m
+    state = np.concatenate([position_m, velocity_m_s])
+    end = coast(state, duration_s, gravitational_parameter_m3_s2)
+    return min(start_m, float(np.linalg.norm(end[:3])))
 
 
 def flight_fault(
@@ -183,8 +189,9 @@ def flight_fault(
     planet_radius_m: float,
     duration_s: float,
 ) -> str | None:
-    """Return why a craft cannot coast for a duration, along any conic: it meets the planet; None if
-    it can.
+    """Return the reason why a craft cannot coast for a duration, along any conic, or None.
+
+    It meets the planet, or starts at its centre.
     """
     if not position_m.any():
         return "the position is the centre of the planet"
@@ -198,11 +205,10 @@ def flight_fault(
 
 
 def coast(states: Floats, duration_s: ArrayLike, gravitational_parameter_m3_s2: float) -> Floats:
-    """Return `states` (r, v), shape (..., 6), about the attracting point, after coasting;
-    `duration_s` may be negative.
+    """Return `states` (r, v), shape (..., 6), about the attracting point, after coasting.
 
-    Lagrange's f and g functions of the universal anomaly, which are the same for ellipses,
-    parabolas and hyperbolas.
+    `duration_s` may be negative. The method is Lagrange's f and g functions of the universal
+    anomaly, which are the same for ellipses, parabolas and hyperbolas.
 
     Raises
     ------
@@ -249,6 +255,7 @@ def coast(states: Floats, duration_s: ArrayLike, gravitational_parameter_m3_s2: 
 def _scaled_start(
     position: Floats, velocity: Floats, gravitational_parameter_m3_s2: float
 ) -> _Start:
+    """Return states in their units; raise `ValueError` if they are at the point or not finite."""
     radius = np.linalg.norm(position, axis=-1)
     with np.errstate(divide="ignore", invalid="ignore"):
         unit_s = np.sqrt(radius**3 / gravitational_parameter_m3_s2)
@@ -263,7 +270,7 @@ def _scaled_start(
 
 
 def _to_perigee(start: _Start) -> Floats:
-    """Time to the next perigee; infinite after the only one of a parabola or a hyperbola."""
+    """Time to the next perigee; infinite after the perigee of a parabola or a hyperbola."""
     binding = start.binding
     outward = start.outward
     transverse_squared = start.transverse_squared
@@ -288,11 +295,10 @@ def _period(binding: Floats) -> Floats:
 
 
 def _universal_anomaly(binding: Floats, outward: Floats, duration: Floats) -> Floats:
-    """Solve Kepler's equation for the universal anomaly, without whole revolutions; `duration` is
-    not negative.
+    """Solve Kepler's equation for the universal anomaly, without whole revolutions.
 
-    Newton's method in a bracket, which is halved where a step leaves it: time increases with the
-    anomaly.
+    `duration` is not negative. Time increases with the anomaly; Newton's method works in a bracket,
+    which is halved if a step leaves it.
     """
     period = _period(binding)
     rest = np.mod(duration, period)
@@ -300,7 +306,11 @@ def _universal_anomaly(binding: Floats, outward: Floats, duration: Floats) -> Fl
         revolution = 2.0 * np.pi / np.sqrt(np.maximum(binding, 0.0))
     low = np.zeros_like(rest)
     high = np.where(np.isfinite(revolution), revolution, 1.0)
-    while (is_short := (binding <= 0.0) & (_time_of(high, binding, outward)[0] < rest)).any():
+    while True:
+        time, _ = _time_of(high, binding, outward)
+        is_short = (binding <= 0.0) & (time < rest)
+        if not is_short.any():
+            break
         high = np.where(is_short, 2.0 * high, high)
 
     anomaly = np.minimum(rest, high)
@@ -312,7 +322,7 @@ def _universal_anomaly(binding: Floats, outward: Floats, duration: Floats) -> Fl
             ahead = anomaly - (time - rest) / radius
         is_inside = (ahead >= low) & (ahead <= high)
         ahead = np.where(is_inside, ahead, 0.5 * (low + high))
-        is_settled = np.abs(ahead - anomaly) <= 4e-16 * anomaly
+        is_settled = np.abs(ahead - anomaly) <= _ANOMALY_ROUNDING * anomaly
         anomaly = ahead
         if is_settled.all():
             break
@@ -320,17 +330,20 @@ def _universal_anomaly(binding: Floats, outward: Floats, duration: Floats) -> Fl
 
 
 def _time_of(anomaly: Floats, binding: Floats, outward: Floats) -> tuple[Floats, Floats]:
-    """Time at a universal anomaly, and the distance there, which is its derivative."""
+    """Return the time at a universal anomaly, and the distance, which is its derivative."""
     first, second, third = _stumpff(binding * anomaly**2)
     advance = anomaly * first
     turn = anomaly**2 * second
-    return advance + outward * turn + anomaly**3 * third, 1.0 + outward * advance + (
-        1.0 - binding
-    ) * turn
+    time = advance + outward * turn + anomaly**3 * third
+    distance = 1.0 + outward * advance + (1.0 - binding) * turn
+    return time, distance
 
 
 def _stumpff(square: Floats) -> tuple[Floats, Floats, Floats]:
-    """Stumpff's functions c_1, c_2 and c_3: c_k(x) = 1 / k! - x / (k + 2)! + x^2 / (k + 4)! ..."""
+    """Stumpff's functions c_1, c_2 and c_3: c_k(x) = 1 / k! - x / (k + 2)! + x^2 / (k + 4)! ...
+
+    The series is used for abs(x) < 1, and closed forms elsewhere.
+    """
     is_near = np.abs(square) < 1.0
     near = np.where(is_near, square, 0.0)
     second_near, third_near = np.polynomial.polynomial.polyval(near, _STUMPFF_SERIES)
