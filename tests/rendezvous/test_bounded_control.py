@@ -44,7 +44,7 @@ TO_PASS = Arc(STRAIGHT, 0.0, DURATION_S, np.array([DISTANCE_M, 0.0, 0.0]), np.ze
 
 
 @pytest.mark.parametrize("bound", [0.0059, 0.005, 0.00401])
-def test_rest_to_rest_on_a_line_is_the_line_cut_to_the_bound(bound: float) -> None:
+def test_control_from_rest_to_rest_is_linear_and_cut_to_the_bound(bound: float) -> None:
     # u = a (T / 2 - t) cut to the bound, which it leaves at T / 2 +- h: d = bound (T^2 / 4 - h^2 /
     # 3).
     h = np.sqrt(3.0 * (DURATION_S**2 / 4.0 - DISTANCE_M / bound))
@@ -64,7 +64,7 @@ def test_rest_to_rest_on_a_line_is_the_line_cut_to_the_bound(bound: float) -> No
 
 
 @pytest.mark.parametrize(("arc", "least"), [(TO_REST, 4.0e-3), (TO_PASS, 2.0e-3)])
-def test_smallest_bound_on_a_line(arc: Arc, least: float) -> None:
+def test_smallest_bound_on_a_line_agrees_with_the_closed_form(arc: Arc, least: float) -> None:
     # Full thrust to the middle and full braking: 4 d / T^2; full thrust all the time: 2 d / T^2.
     found = least_bound([arc])
 
@@ -75,7 +75,7 @@ def test_smallest_bound_on_a_line(arc: Arc, least: float) -> None:
         solve_bounded([arc], 0.999 * least)
 
 
-def test_smallest_bound_of_nothing_is_zero() -> None:
+def test_smallest_bound_is_zero_if_the_effect_is_zero() -> None:
     assert least_bound([Arc(STRAIGHT, 0.0, 1.0, np.zeros(6), np.zeros((6, 0)))]).value_m_s2 == 0.0
 
 
@@ -231,17 +231,21 @@ def flown(
     return float(state[6]), float(np.abs(miss).max())
 
 
-def test_random_arcs(check_seeds: Callable[[Check, Iterable[int]], None]) -> None:
+def test_random_arcs_agree_with_cone_programs_and_an_integrator(
+    check_seeds: Callable[[Check, Iterable[int]], None],
+) -> None:
     check_seeds(check_one, range(5))
 
 
 @pytest.mark.thorough
-def test_more_random_arcs(check_seeds: Callable[[Check, Iterable[int]], None]) -> None:
+def test_more_random_arcs_agree_with_cone_programs_and_an_integrator(
+    check_seeds: Callable[[Check, Iterable[int]], None],
+) -> None:
     check_seeds(check_one, range(100, 250))
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_bound_just_above_the_smallest_one_is_solved_and_one_below_is_not(seed: int) -> None:
+def test_bound_is_solved_just_above_the_smallest_bound_and_refused_below(seed: int) -> None:
     arcs = some_arcs(seed)
     least = least_bound(arcs).value_m_s2
 
@@ -253,7 +257,7 @@ def test_bound_just_above_the_smallest_one_is_solved_and_one_below_is_not(seed: 
         solve_bounded(arcs, 0.999 * least)
 
 
-def test_smallest_bound_over_a_hundred_and_forty_revolutions() -> None:
+def test_smallest_bound_over_140_revolutions_is_near_the_peak_of_a_control() -> None:
     motion = ClohessyWiltshire(0.0011)
     duration_s = 818181.8
     n = 0.0011

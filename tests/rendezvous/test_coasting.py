@@ -120,7 +120,7 @@ def test_states_on_any_conic_are_coasted(
         )
 
 
-def test_many_states_of_all_kinds_are_coasted_at_once() -> None:
+def test_array_of_states_on_all_conics_is_coasted_as_single_states() -> None:
     states = np.array([random_state(seed, share) for seed, share in enumerate((0.5, 1.0, 2.0))])
 
     found = coast(states[:, None], np.array([-3.0, 0.0, 5.0, 7.0]), 1.0)
@@ -144,7 +144,7 @@ def test_many_states_of_all_kinds_are_coasted_at_once() -> None:
         (2.0, -5.0),  # the same, backwards
     ],
 )
-def test_a_fall_through_the_centre_is_refused(velocity: float, duration: float) -> None:
+def test_fall_through_the_centre_is_refused(velocity: float, duration: float) -> None:
     with pytest.raises(ValueError, match="a state falls straight into the attracting point"):
         coast(np.array([1.0, 0.0, 0.0, velocity, 0.0, 0.0]), duration, 1.0)
 
@@ -162,13 +162,13 @@ def test_straight_motion_that_avoids_the_centre_is_coasted(
     np.testing.assert_allclose(coast(state, duration, 1.0), exact, rtol=100.0 * EPSILON * 50.0)
 
 
-def test_a_state_at_the_centre_is_refused() -> None:
+def test_state_at_the_centre_is_refused() -> None:
     with pytest.raises(ValueError, match="a state is at the attracting point"):
         coast(np.zeros(6), 1.0, 1.0)
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_the_closest_approach_is_that_of_the_coasted_states(seed: int) -> None:
+def test_closest_approach_is_the_minimum_distance_of_coasted_states(seed: int) -> None:
     random = np.random.default_rng(seed)
     state = random_state(
         seed, float(random.choice([random.uniform(0.3, 0.99), 1.0, random.uniform(1.01, 3.0)]))
@@ -203,14 +203,14 @@ def test_the_closest_approach_is_that_of_the_coasted_states(seed: int) -> None:
         ([-1.0, 0.0, 0.0], 2.0, True),
     ],
 )
-def test_a_flight_that_meets_the_planet_is_refused(
+def test_flight_that_meets_the_planet_is_refused(
     velocity: list[float], duration: float, is_met: bool
 ) -> None:
     fault = flight_fault(np.array([1.0, 0.0, 0.0]), np.array(velocity), 1.0, 0.5, duration)
     assert (fault is not None and "the orbit meets the planet during the flight" in fault) == is_met
 
 
-def test_elements_of_a_hyperbola_are_its_state() -> None:
+def test_elements_of_a_hyperbola_give_its_energy_perigee_and_motion() -> None:
     elements = OrbitalElements(-2.0, 1.5, 0.4, 1.0, 2.0, -1.2)
     position, velocity = elements.state(1.0)
 
@@ -244,7 +244,7 @@ def test_elements_of_a_hyperbola_are_its_state() -> None:
         (-1.0, 2.0, 2.2, "a hyperbola of eccentricity 2 has true anomalies up to 120 deg"),
     ],
 )
-def test_elements_of_no_conic_are_refused(
+def test_elements_that_belong_to_no_conic_are_refused(
     axis: float, eccentricity: float, anomaly: float, message: str
 ) -> None:
     with pytest.raises(ValueError, match=message):

@@ -14,7 +14,7 @@ ANGLES = st.floats(0.0, 2.0 * math.pi)
 
 
 @given(st.floats(6.6e6, 1e9), st.floats(0.0, 0.95), st.floats(0.0, math.pi), ANGLES, ANGLES, ANGLES)
-def test_a_state_has_the_orbit_it_was_made_from(
+def test_state_of_elements_has_their_axis_perigee_and_inclination(
     axis: float,
     eccentricity: float,
     inclination: float,
@@ -34,7 +34,7 @@ def test_a_state_has_the_orbit_it_was_made_from(
     )
 
 
-def test_the_node_and_the_perigee_are_where_they_are_said_to_be() -> None:
+def test_state_at_the_ascending_node_has_the_right_ascension_of_the_node() -> None:
     orbit = OrbitalElements(
         10e6, 0.2, math.radians(30.0), math.radians(40.0), math.radians(-50.0), math.radians(50.0)
     )

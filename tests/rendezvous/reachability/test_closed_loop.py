@@ -27,7 +27,7 @@ def truth(orbit: EllipticOrbit) -> Callable[[int, Floats, Floats], Floats]:
     ("model", "relative", "plain"),
     [(MotionModel.TIME_VARYING, 0.00577, 0.000185), (MotionModel.FROZEN, 2.825, 1.266)],
 )
-def test_replanning_on_the_nonlinear_truth(
+def test_replanning_on_the_nonlinear_motion_has_the_published_misses(
     paper: Paper,
     truth: Callable[[int, Floats, Floats], Floats],
     model: MotionModel,
@@ -46,7 +46,7 @@ def test_replanning_on_the_nonlinear_truth(
     assert flight.controls.shape == (4, 3)
 
 
-def test_on_its_own_model_replanning_keeps_the_first_plan(paper: Paper) -> None:
+def test_replanning_on_the_linear_model_follows_the_first_plan(paper: Paper) -> None:
     problem = paper()
     own = replan(
         problem,
@@ -56,7 +56,7 @@ def test_on_its_own_model_replanning_keeps_the_first_plan(paper: Paper) -> None:
     assert (own.controls**2).sum() == pytest.approx(0.14323052820, abs=1e-9)
 
 
-def test_noise_is_flown_through_with_bounds_relaxed_where_they_must_be(
+def test_replanning_relaxes_bounds_if_a_state_violates_them(
     paper: Paper, truth: Callable[[int, Floats, Floats], Floats]
 ) -> None:
     generator = np.random.default_rng(3)

@@ -35,7 +35,7 @@ def test_multipliers_with_a_small_residual_prove_a_solution() -> None:
 
 
 @pytest.mark.parametrize("short", [1e-6, 1e-3, 0.5])
-def test_a_point_that_is_not_optimal_is_refused(short: float) -> None:
+def test_point_that_is_not_optimal_is_refused(short: float) -> None:
     program, point, exact = program_with_solution()
     with pytest.raises(NoSolutionError, match="relative gap"):
         program.checked((1.0 - short) * point, exact)

@@ -74,7 +74,7 @@ def assert_precise(problem: ReachabilityProblem, miss: float) -> bool:
 @pytest.mark.parametrize(
     "name", ["near_0.172", "near_0.1726", "s2_1_193", "s2_2_133", "s2_2_26", "s2_2_68"]
 )
-def test_misses_that_were_wrong_or_refused(name: str) -> None:
+def test_miss_at_the_edge_of_feasibility_agrees_with_a_dense_program(name: str) -> None:
     problem = load_problem(CASES / f"{name}.toml").problem
     miss = solve(problem).optimal.miss
     if problem.periods <= 4:
@@ -84,14 +84,14 @@ def test_misses_that_were_wrong_or_refused(name: str) -> None:
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", ["s2_2_26", "s2_2_68"])
-def test_misses_with_thrust_in_a_ball_to_forty_digits(name: str) -> None:
+def test_miss_for_thrust_in_a_ball_agrees_with_forty_digits(name: str) -> None:
     problem = load_problem(CASES / f"{name}.toml").problem
     assert assert_precise(problem, solve(problem).optimal.miss)
 
 
 @pytest.mark.parametrize("thrust", list(ThrustShape))
 @pytest.mark.parametrize("gap", [1e-1, 1e-5, 1e-9])
-def test_just_under_the_min_bound_that_reaches_zero(
+def test_miss_is_zero_only_above_the_minimum_bound(
     paper: Paper, thrust: ThrustShape, gap: float
 ) -> None:
     problem = paper(periods=3, thrust=thrust)
@@ -105,7 +105,7 @@ def test_just_under_the_min_bound_that_reaches_zero(
 
 
 @pytest.mark.parametrize("bound", [0.115, 0.14, 0.172])
-def test_flat_sets_of_optimal_controls(paper: Paper, bound: float) -> None:
+def test_selections_from_a_flat_set_are_optimal(paper: Paper, bound: float) -> None:
     problem = paper(bound=bound)
     optimal = solve(problem).optimal
     assert optimal.miss == pytest.approx(cone_program(Dense(problem), "norm")[0], rel=RELATIVE)
@@ -117,7 +117,7 @@ def test_flat_sets_of_optimal_controls(paper: Paper, bound: float) -> None:
         )
 
 
-def test_every_dimension_down_to_a_point(paper: Paper) -> None:
+def test_set_loses_dimensions_at_the_minimum_bound(paper: Paper) -> None:
     """At the minimum bound that reaches zero the set loses dimensions; with fewer periods it is a
     point.
     """
@@ -138,7 +138,9 @@ def test_every_dimension_down_to_a_point(paper: Paper) -> None:
 
 @pytest.mark.parametrize("axes", [(2,), (0, 1), (0, 1, 2)])
 @pytest.mark.parametrize("thrust", list(ThrustShape))
-def test_axes_without_thrust(paper: Paper, axes: tuple[int, ...], thrust: ThrustShape) -> None:
+def test_problem_with_axes_without_thrust_is_solved(
+    paper: Paper, axes: tuple[int, ...], thrust: ThrustShape
+) -> None:
     problem = paper(thrust=thrust)
     control = problem.control.copy()
     control[:, :, list(axes)] = 0.0
@@ -162,7 +164,9 @@ def miss_in_metres(paper: Paper) -> float:
 
 
 @pytest.mark.parametrize("size", [1e-6, 1e6])
-def test_lengths_of_any_size(paper: Paper, miss_in_metres: float, size: float) -> None:
+def test_miss_scales_with_the_unit_of_length(
+    paper: Paper, miss_in_metres: float, size: float
+) -> None:
     problem = paper(bound=0.1726)
     other = replace(
         problem,
@@ -206,7 +210,7 @@ def check(seed: int, *, precise_to: int = 0, members: bool = True) -> str:
     return told
 
 
-def test_a_model_that_amplifies_rounding_is_refused(paper: Paper) -> None:
+def test_model_that_amplifies_rounding_is_refused(paper: Paper) -> None:
     problem = paper(periods=20)
     growing = np.repeat([np.diag([4.0, 0.1, 0.1, 1.0, 1.0, 1.0])], 20, axis=0)
     with pytest.raises(ValueError, match="multiplies deviations by over 1e\\+10"):
@@ -214,7 +218,7 @@ def test_a_model_that_amplifies_rounding_is_refused(paper: Paper) -> None:
     replace(problem, transition=growing[::-1] / 4.0)
 
 
-def test_random_problems() -> None:
+def test_random_problems_agree_with_dense_programs() -> None:
     told = Counter(check(seed) for seed in range(24))
     assert told["refused"] == 0
     assert told["reached"] > 0
@@ -222,13 +226,13 @@ def test_random_problems() -> None:
 
 
 @pytest.mark.parametrize("seed", [11, 78, 196, 274])
-def test_programs_with_thrust_in_a_ball_are_solved_whatever_the_rounding(seed: int) -> None:
+def test_programs_with_thrust_in_a_ball_are_solved_for_any_rounding(seed: int) -> None:
     # With each of three kernels of a BLAS some of these were refused, and others with each.
     assert check(seed) in {"missed", "reached"}
 
 
 @pytest.mark.thorough
-def test_two_thousand_random_problems() -> None:
+def test_two_thousand_random_problems_agree_with_forty_digits() -> None:
     # Half of them are at the edges: few may be refused, none may be wrong.
     told = Counter(check(seed, precise_to=4, members=False) for seed in range(2000))
     assert told["refused"] <= 10

@@ -57,7 +57,7 @@ def exact(paper: Paper) -> Solution:
     return solve(paper())
 
 
-def test_matrices(paper: Paper) -> None:
+def test_matrices_are_the_identified_ones(paper: Paper) -> None:
     problem = paper()
     # Rows and columns in the paper's axes.
     a, b = (
@@ -85,7 +85,7 @@ def ends_in_paper(bounds: Floats) -> Floats:
     return np.sort(to_paper(bounds.T).T, axis=1)
 
 
-def test_bounds_of_forward_sets_and_tube(exact: Solution) -> None:
+def test_bounds_of_forward_sets_and_tube_agree_with_the_reference(exact: Solution) -> None:
     scale = exact.problem.state_bounds[:, None]
     forward = exact.sets.bounds(SetKind.FORWARD)
     tube = exact.sets.bounds(SetKind.TUBE)
@@ -96,7 +96,9 @@ def test_bounds_of_forward_sets_and_tube(exact: Solution) -> None:
     assert np.abs(tube[4] / scale).max() == 0.0
 
 
-def test_counts(exact: Solution, paper: Paper) -> None:
+def test_counts_of_vertices_facets_and_dimensions_agree_with_the_reference(
+    exact: Solution, paper: Paper
+) -> None:
     found = [exact.sets.counts(SetKind.FORWARD, t) for t in range(1, 5)]
     assert found == [
         VertexCounts(10, 7, 3),
@@ -110,7 +112,7 @@ def test_counts(exact: Solution, paper: Paper) -> None:
     assert solve(paper(thrust=ThrustShape.BALL)).sets.counts(SetKind.TUBE, 2) is None
 
 
-def test_min_norms(paper: Paper, exact: Solution) -> None:
+def test_minimum_norms_agree_with_the_reference(paper: Paper, exact: Solution) -> None:
     problem = paper()
     assert exact.optimal.miss == 0.0
     assert min_periods(problem) == 3
@@ -120,7 +122,7 @@ def test_min_norms(paper: Paper, exact: Solution) -> None:
     assert solve(paper(bound=0.15)).optimal.miss == printed("1.62757318")
 
 
-def test_min_energy_l1_and_peak(exact: Solution) -> None:
+def test_minimum_energy_l1_and_peak_agree_with_the_reference(exact: Solution) -> None:
     assert effort(minimum_energy(exact.optimal)).energy == printed("0.14323052820")
     sparse = minimum_l1(exact.optimal)
     assert effort(sparse).l1 == printed("0.88770050948")
@@ -143,7 +145,7 @@ def test_min_energy_l1_and_peak(exact: Solution) -> None:
         (MotionModel.TIME_VARYING, 0.143250218, 0.212159),
     ],
 )
-def test_nonlinear_misses(
+def test_nonlinear_misses_agree_with_the_reference(
     paper: Paper, orbit: EllipticOrbit, model: MotionModel, energy: float, miss: float
 ) -> None:
     problem = paper(model)

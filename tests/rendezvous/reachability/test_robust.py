@@ -59,7 +59,7 @@ def test_tightened_constraints_hold_for_every_disturbance(paper: Paper) -> None:
             assert (np.abs(states) <= problem.state_bounds + 1e-9).all()
 
 
-def test_feedback_keeps_what_no_fixed_control_keeps(paper: Paper) -> None:
+def test_feedback_plan_satisfies_constraints_that_fixed_controls_violate(paper: Paper) -> None:
     problem = paper()
     disturbance = pushes(problem, 0.012)
     with pytest.raises(EmptyTubeError):
@@ -79,7 +79,7 @@ def test_feedback_keeps_what_no_fixed_control_keeps(paper: Paper) -> None:
     np.testing.assert_array_equal(run(plan, moves)[1][:3], run(plan, later)[1][:3])
 
 
-def test_the_terminal_spread_is_what_the_last_disturbance_does(paper: Paper) -> None:
+def test_terminal_spread_is_near_the_effect_of_the_last_disturbance(paper: Paper) -> None:
     # Earlier ones can be answered, the last one cannot: its own effect is a lower bound.
     problem = paper()
     disturbance = pushes(problem, 1e-3)
@@ -93,7 +93,7 @@ def test_the_terminal_spread_is_what_the_last_disturbance_does(paper: Paper) -> 
     assert (spread / problem.state_bounds).sum() < 0.6 * (fixed / problem.state_bounds).sum()
 
 
-def test_a_plan_that_is_not_optimal_is_refused(
+def test_feedback_plan_that_is_not_optimal_is_refused(
     paper: Paper, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def shifted(*arguments: Any, **options: Any) -> Any:

@@ -71,7 +71,7 @@ def test_routes_agree_with_each_other(random_problem: Random, seed: int, size: i
 @needs_ppl
 @settings(max_examples=25, deadline=None, suppress_health_check=SHARED)
 @given(seed=st.integers(0, 10**6), size=st.integers(2, 5))
-def test_exact_route_has_the_vertices_of_exact_rationals(
+def test_exact_route_agrees_with_exact_rationals(
     random_problem: Random, seed: int, size: int
 ) -> None:
     for optimum in blocks_of(random_problem(seed, size)):
@@ -90,7 +90,7 @@ def test_exact_route_has_the_vertices_of_exact_rationals(
 
 @pytest.mark.parametrize("thrust", list(ThrustShape))
 @pytest.mark.parametrize("bound", [1.0, 0.15])
-def test_a_thousand_members_are_optimal_and_a_thousand_others_are_not(
+def test_samples_are_optimal_and_controls_outside_the_set_are_not(
     paper: Paper, thrust: ThrustShape, bound: float
 ) -> None:
     problem = paper(bound=bound, thrust=thrust)
@@ -113,7 +113,7 @@ def test_a_thousand_members_are_optimal_and_a_thousand_others_are_not(
         assert (optimal.excess(outside) > 1e-9).all()
 
 
-def test_samples_spread_over_the_set(paper: Paper) -> None:
+def test_samples_are_reproducible_and_centred_on_the_centroid(paper: Paper) -> None:
     optimal = solve(paper()).optimal
     corners = vertices(optimal)
     drawn = samples(optimal, 1500, np.random.default_rng(0))
@@ -132,7 +132,9 @@ def test_samples_spread_over_the_set(paper: Paper) -> None:
 
 
 @pytest.mark.parametrize("thrust", list(ThrustShape))
-def test_each_choice_is_best_of_a_thousand(paper: Paper, thrust: ThrustShape) -> None:
+def test_selection_has_the_smallest_cost_of_a_thousand_members(
+    paper: Paper, thrust: ThrustShape
+) -> None:
     optimal = solve(paper(thrust=thrust)).optimal
     drawn = [effort(each) for each in samples(optimal, 1000, np.random.default_rng(2))]
     chosen = {
@@ -174,7 +176,7 @@ def test_analytic_centre_has_the_max_product_of_slacks(paper: Paper) -> None:
     )
 
 
-def test_reasons_for_the_lifted_route(paper: Paper, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_lifted_route_states_its_reason(paper: Paper, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("infoset.rendezvous.reachability.sets.MAX_VERTICES", 100)
     for problem, reason in (
         (paper(), ""),
@@ -187,7 +189,7 @@ def test_reasons_for_the_lifted_route(paper: Paper, monkeypatch: pytest.MonkeyPa
         assert reason in solution.reason
 
 
-def test_projections_of_both_routes(paper: Paper) -> None:
+def test_projections_of_both_routes_agree(paper: Paper) -> None:
     exact = solve(paper())
     both = [exact.sets, ReachableSets(exact.problem, tuple(map(LiftedSets, exact.optimal.blocks)))]
     for kind, t, axes in (

@@ -142,7 +142,7 @@ def far_apart(found: Floats, exact: Floats, weight: Floats) -> float:
     ],
 )
 @pytest.mark.parametrize("eccentricity", [0.0, 0.1, 0.5, 0.9, 0.95, 0.99, 0.999, 0.9999])
-def test_transitions_are_exact_but_for_rounding(
+def test_transitions_are_exact_except_for_rounding(
     eccentricity: float, spans: tuple[float, float]
 ) -> None:
     # Products of panels in the same variables are wrong by 2e-11 at 0.95 and 3e-9 at 0.99.
@@ -161,7 +161,7 @@ def test_transitions_are_exact_but_for_rounding(
 
 @pytest.mark.parametrize("duration", [1e-6, 0.3, 5.0, 40.0])
 @pytest.mark.parametrize("eccentricity", [0.0, 0.6, 0.99])
-def test_a_transition_back_is_the_inverse_of_the_one_forward(
+def test_backward_transition_is_the_inverse_of_the_forward_transition(
     eccentricity: float, duration: float
 ) -> None:
     with mp.workdps(50):
@@ -235,7 +235,7 @@ def random_interval(seed: int) -> tuple[TschaunerHempel, float]:
     )
 
 
-def test_no_orbit_of_a_large_eccentricity_is_refused() -> None:
+def test_orbits_of_a_large_eccentricity_have_finite_gramians() -> None:
     # 37 of 80 such cases were refused.
     for seed in range(80):
         motion, duration_s = random_interval(seed)
@@ -243,7 +243,7 @@ def test_no_orbit_of_a_large_eccentricity_is_refused() -> None:
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_a_gramian_is_that_of_two_parts(seed: int) -> None:
+def test_gramian_is_the_sum_over_two_parts(seed: int) -> None:
     motion, duration_s = random_interval(seed)
     middle_s = 0.4 * duration_s
     whole = motion.gramian(0.0, duration_s)
@@ -261,7 +261,7 @@ def test_a_gramian_is_that_of_two_parts(seed: int) -> None:
     )
 
 
-def test_an_interval_of_too_many_panels_is_refused() -> None:
+def test_interval_with_too_many_panels_is_refused() -> None:
     motion = TschaunerHempel(EllipticOrbit(1.0, 0.5))
     with pytest.raises(
         ValueError, match=r"turns by 5e\+05 rad from 2 s to 500000 s; at most 200000 rad"
@@ -269,18 +269,18 @@ def test_an_interval_of_too_many_panels_is_refused() -> None:
         motion.segment([0.0, 2.0], [1.0, 5e5])
 
 
-def test_no_interval_has_no_matrices() -> None:
+def test_empty_array_of_intervals_gives_empty_arrays_of_matrices() -> None:
     found = TschaunerHempel(EllipticOrbit(1.0, 0.5)).segment(np.empty((0, 2)), np.empty((0, 2)))
     assert (found.transition.shape, found.held.shape) == ((0, 2, 6, 6), (0, 2, 6, 3))
 
 
-def test_many_revolutions_are_not_refused() -> None:
+def test_interval_of_many_revolutions_has_a_finite_gramian() -> None:
     # 1000 radians were refused from e = 0.9 on.
     motion = TschaunerHempel(EllipticOrbit(1.0, 0.9, 0.3))
     assert np.isfinite(motion.segment(0.0, 1000.0).gramian).all()
 
 
-def test_eccentricities_beyond_the_digits_of_a_time_are_refused() -> None:
+def test_eccentricity_above_the_maximum_is_refused() -> None:
     with pytest.raises(
         ValueError, match=r"the eccentricity must be at most 0\.999999, found 0\.9999999"
     ):

@@ -70,7 +70,7 @@ def after(relative: Floats, chief: Floats, end_s: float) -> Floats:
     return to_hill(flown(from_hill(relative, chief), end_s), flown(chief, end_s))
 
 
-def test_a_craft_behind_on_the_same_circular_orbit_has_negative_y() -> None:
+def test_craft_behind_on_the_same_circular_orbit_has_negative_y() -> None:
     # 10 km behind: the chord is 10 km to first order, and all six components keep their values.
     axis, behind = 6778e3, 10e3
     chief = reference(axis, 0.0, 0.5)
@@ -112,7 +112,7 @@ def test_linear_motions_are_two_body_motion_to_first_order(
 
 
 @pytest.mark.parametrize(("eccentricity", "anomaly"), [(0.0, 0.3), (0.1, 2.5)])
-def test_the_nonlinear_motion_is_two_body_motion(eccentricity: float, anomaly: float) -> None:
+def test_nonlinear_motion_is_two_body_motion(eccentricity: float, anomaly: float) -> None:
     axis = 9000e3
     motion = NonlinearMotion(EllipticOrbit.of_size(axis, eccentricity, MU, anomaly), axis)
     relative = np.array([40e3, -70e3, 25e3, 30.0, -20.0, 15.0])

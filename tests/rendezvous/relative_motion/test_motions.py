@@ -108,14 +108,14 @@ def test_matrices_satisfy_their_differential_equations(name: str, duration: floa
         )
 
 
-def test_the_published_gramian() -> None:
+def test_gramian_agrees_with_the_published_one() -> None:
     found = in_paper_axes(ClohessyWiltshire(0.001176).gramian(0.0, 30.0))[:, INTERLEAVED][
         INTERLEAVED
     ]
     np.testing.assert_allclose(found, PUBLISHED_GRAMIAN, rtol=2e-12, atol=1e-18)
 
 
-def test_the_equations_of_two_papers_in_their_axes() -> None:
+def test_dynamics_are_the_equations_of_two_papers() -> None:
     # x'' = 2 w y', y'' = 3 w^2 y - 2 w x', z'' = -w^2 z: (1.8) of Barseghyan and Stepanyan.
     found = in_paper_axes(ClohessyWiltshire(RATE).dynamics(0.0)) @ np.array(
         [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
@@ -138,12 +138,12 @@ def test_the_equations_of_two_papers_in_their_axes() -> None:
 
 
 @given(st.floats(0.0, 0.99), st.floats(-50.0, 50.0))
-def test_keplers_equation(eccentricity: float, mean: float) -> None:
+def test_eccentric_anomaly_satisfies_keplers_equation(eccentricity: float, mean: float) -> None:
     found = float(eccentric_of_mean(mean, eccentricity))
     assert found - eccentricity * np.sin(found) == pytest.approx(mean, rel=1e-14, abs=1e-14)
 
 
-def test_an_orbit_of_a_size() -> None:
+def test_orbit_of_a_semi_major_axis_has_the_identified_matrices() -> None:
     orbit = EllipticOrbit.of_size(1e7, 0.1, 3.986004418e14)
     # Shorikov and Goranov (2021), identified from their tables: frozen at perigee, a period of 180
     # s, 0.15 m/s^2.
