@@ -13,3 +13,4 @@ from infoset.kernels import Kernels
 _kernels = Kernels("contract", "nsz")
 compiled = _kernels.compiled
 allocation_free = _kernels.entry
+inlined = _kernels.inlined

@@ -19,18 +19,24 @@ from typing import NamedTuple
 import numpy as np
 
 from infoset.rendezvous._arrays import Floats
-from infoset.rendezvous._compile import allocation_free, compiled
+from infoset.rendezvous._compile import allocation_free, compiled, inlined
 from infoset.rendezvous.dormand_prince import STAGES, error_of_step, step_of
 
-STATES, COLUMNS = 12, 9
-"""Position, velocity and costate; what they are differentiated by: end state (6), nu in its plane
-(2), end mass.
-"""
+R, V, P_R, P_V = 0, 3, 6, 9
+"""First rows of position, velocity and both parts of the costate in a state and its variations."""
+STATES = 12
+"""Number of rows of a state: position, velocity and costate."""
+COLUMNS = 9
+"""Number of parameters of the variations: end state (6), nu in its plane (2), mass at the end."""
+MASS = COLUMNS - 1
+"""Column of the derivatives by the mass at the end."""
 _SAFETY, _MIN_FACTOR, _MAX_FACTOR = 0.9, 0.2, 6.0
 _MAX_STEPS = 20_000
 _FIRST_STEP = 0.05
 NO_VARIATIONS = np.zeros((0, COLUMNS))
 _Parameters = tuple[Floats, Floats, Floats]
+_Vector = tuple[float, float, float]
+_Symmetric = tuple[float, float, float, float, float, float]
 
 
 class Response(NamedTuple):
@@ -143,74 +149,117 @@ def _subtract_axial(
 
 @allocation_free
 def _rates(s: float, y: Floats, z: Floats, parameters: _Parameters, dy: Floats, dz: Floats) -> None:
-    """Rates, in time to go, of the state and of its variations.
+    """Fill the rates, in time to go, of the state and of its variations.
 
-    `parameters` are the craft (mu, oblateness, thrust, mass at the end, flow) and room for two
-    matrices, (3, 3). At the end of the game p_v is zero: there the direction of thrust is that of
-    p_r, which is its rate.
+    r' = -v, v' = -(g + (T / m) u), p_r' = G p_v and p_v' = p_r, where G is the gradient of g and u
+    the direction of p_v. At the end of the game p_v is zero, and u is the direction of its rate,
+    p_r.
+
+    The variations follow, with K the gradient of G p_v: dr' = -dv, dv' = -(G dr + (T / m) du),
+    dp_r' = G dp_v + K dr, dp_v' = dp_r. The last column also changes the mass by one.
+
+    `parameters` are the craft (mu, oblateness, thrust, mass at the end, flow) and working arrays
+    for G and K, shape (3, 3).
     """
-    craft, first, second = parameters
+    craft, gradient, gradient_change = parameters
     thrust = craft[2]
     mass = craft[3] + craft[4] * s
     push = thrust / mass
-    derivatives(y[:3], y[9:], craft[0], craft[1], dy[3:6], first, second, len(z) > 0)
-    at = 9 if s > 0.0 else 6
-    x0 = y[at]
-    x1 = y[at + 1]
-    x2 = y[at + 2]
+    with_variations = len(z) > 0
+    gravity = dy[V:P_R]
+    derivatives(
+        y[:V], y[P_V:], craft[0], craft[1], gravity, gradient, gradient_change, with_variations
+    )
+
+    primer_row = P_V if s > 0.0 else P_R
+    x0 = y[primer_row]
+    x1 = y[primer_row + 1]
+    x2 = y[primer_row + 2]
     inverse = 1.0 / np.sqrt(x0 * x0 + x1 * x1 + x2 * x2)
-    u0 = x0 * inverse
-    u1 = x1 * inverse
-    u2 = x2 * inverse
+    u = (x0 * inverse, x1 * inverse, x2 * inverse)
     for i in range(3):
-        dy[i] = -y[3 + i]
-        dy[6 + i] = first[i, 0] * y[9] + first[i, 1] * y[10] + first[i, 2] * y[11]
-        dy[9 + i] = y[6 + i]
-    dy[3] = -dy[3] - push * u0
-    dy[4] = -dy[4] - push * u1
-    dy[5] = -dy[5] - push * u2
-    if len(z) == 0:
-        return
-    turn = push * inverse
-    g00 = first[0, 0]
-    g01 = first[0, 1]
-    g02 = first[0, 2]
-    g11 = first[1, 1]
-    g12 = first[1, 2]
-    g22 = first[2, 2]
-    m00 = second[0, 0]
-    m01 = second[0, 1]
-    m02 = second[0, 2]
-    m11 = second[1, 1]
-    m12 = second[1, 2]
-    m22 = second[2, 2]
+        dy[R + i] = -y[V + i]
+        dy[P_R + i] = (
+            gradient[i, 0] * y[P_V] + gradient[i, 1] * y[P_V + 1] + gradient[i, 2] * y[P_V + 2]
+        )
+        dy[P_V + i] = y[P_R + i]
+    for i in range(3):
+        dy[V + i] = -dy[V + i] - push * u[i]
+
+    if with_variations:
+        _vary(z, primer_row, u, push * inverse, gradient, gradient_change, dz)
+        # dv' of the mass: the derivative of -(T / m) u by m.
+        fall = push / mass
+        for i in range(3):
+            dz[V + i, MASS] += fall * u[i]
+
+
+@allocation_free
+def _vary(
+    z: Floats,
+    primer_row: int,
+    u: _Vector,
+    turn: float,
+    gradient: Floats,
+    gradient_change: Floats,
+    dz: Floats,
+) -> None:
+    """Fill the rates of the variations, see `_rates`, with the mass fixed.
+
+    The variation of u, a unit vector along the vector x in rows `primer_row` to `primer_row` + 2,
+    is du = (dx - (u . dx) u) / |x|, and `turn` is T / (m |x|).
+    """
+    g = _upper_triangle(gradient)
+    k = _upper_triangle(gradient_change)
     for j in range(COLUMNS):
-        r0 = z[0, j]
-        r1 = z[1, j]
-        r2 = z[2, j]
-        q0 = z[9, j]
-        q1 = z[10, j]
-        q2 = z[11, j]
-        t0 = z[at, j]
-        t1 = z[at + 1, j]
-        t2 = z[at + 2, j]
-        along = u0 * t0 + u1 * t1 + u2 * t2
-        dz[0, j] = -z[3, j]
-        dz[1, j] = -z[4, j]
-        dz[2, j] = -z[5, j]
-        dz[3, j] = -(g00 * r0 + g01 * r1 + g02 * r2 + turn * (t0 - along * u0))
-        dz[4, j] = -(g01 * r0 + g11 * r1 + g12 * r2 + turn * (t1 - along * u1))
-        dz[5, j] = -(g02 * r0 + g12 * r1 + g22 * r2 + turn * (t2 - along * u2))
-        dz[6, j] = g00 * q0 + g01 * q1 + g02 * q2 + m00 * r0 + m01 * r1 + m02 * r2
-        dz[7, j] = g01 * q0 + g11 * q1 + g12 * q2 + m01 * r0 + m11 * r1 + m12 * r2
-        dz[8, j] = g02 * q0 + g12 * q1 + g22 * q2 + m02 * r0 + m12 * r1 + m22 * r2
-        dz[9, j] = z[6, j]
-        dz[10, j] = z[7, j]
-        dz[11, j] = z[8, j]
-    fall = push / mass
-    dz[3, COLUMNS - 1] += fall * u0
-    dz[4, COLUMNS - 1] += fall * u1
-    dz[5, COLUMNS - 1] += fall * u2
+        dr = _vector_at(z, R, j)
+        dp_v = _vector_at(z, P_V, j)
+        dx = _vector_at(z, primer_row, j)
+        along = u[0] * dx[0] + u[1] * dx[1] + u[2] * dx[2]
+
+        by_gravity = _product(g, dr)
+        by_costate = _add_product(_product(g, dp_v), k, dr)
+        for i in range(3):
+            dz[R + i, j] = -z[V + i, j]
+            dz[V + i, j] = -(by_gravity[i] + turn * (dx[i] - along * u[i]))
+            dz[P_R + i, j] = by_costate[i]
+            dz[P_V + i, j] = z[P_R + i, j]
+
+
+@inlined
+def _vector_at(z: Floats, row: int, column: int) -> _Vector:
+    """Return three rows of a column, from `row` on."""
+    return z[row, column], z[row + 1, column], z[row + 2, column]
+
+
+@inlined
+def _upper_triangle(matrix: Floats) -> _Symmetric:
+    """Return the entries 00, 01, 02, 11, 12, 22 of a symmetric matrix."""
+    return matrix[0, 0], matrix[0, 1], matrix[0, 2], matrix[1, 1], matrix[1, 2], matrix[2, 2]
+
+
+@inlined
+def _product(m: _Symmetric, x: _Vector) -> _Vector:
+    """Return the product of a symmetric matrix, as its upper triangle, and a vector."""
+    m00, m01, m02, m11, m12, m22 = m
+    return (
+        m00 * x[0] + m01 * x[1] + m02 * x[2],
+        m01 * x[0] + m11 * x[1] + m12 * x[2],
+        m02 * x[0] + m12 * x[1] + m22 * x[2],
+    )
+
+
+@inlined
+def _add_product(start: _Vector, m: _Symmetric, x: _Vector) -> _Vector:
+    """Return `start` plus the product of a symmetric matrix, as its upper triangle, and a
+    vector.
+    """
+    m00, m01, m02, m11, m12, m22 = m
+    return (
+        start[0] + m00 * x[0] + m01 * x[1] + m02 * x[2],
+        start[1] + m01 * x[0] + m11 * x[1] + m12 * x[2],
+        start[2] + m02 * x[0] + m12 * x[1] + m22 * x[2],
+    )
 
 
 _step = step_of(_rates)
