@@ -1,5 +1,4 @@
-"""One craft's extremals, from the end of the game back to its start, with their variational
-equations: compiled.
+"""Compiled extremals of one craft, from the end of the game back to its start, with variations.
 
 An extremal takes its craft as far along `nu` as possible by the time of the end. There its costate
 is (nu, 0), and backward in time it is the same flow for pursuer and evader: thrust along p_v, where
@@ -8,8 +7,8 @@ and the flow is smooth up to the end.
 
 Wang's slides, "Optimal control", with k = +1 for the pursuer and -1 for the evader: u = k lambda_v
 / |lambda_v|, lambda_r' = (mu / r^3) lambda_v - 3 mu (lambda_v . r) r / r^5 (they omit '. r'),
-lambda_v' = -lambda_r; p = k lambda. That of the mass, lambda_m' = k |lambda_v| T / m^2 (they omit
-k), is not needed: both thrust fully all the time.
+lambda_v' = -lambda_r; p = k lambda. The costate of the mass, lambda_m' = k |lambda_v| T / m^2 (they
+omit k), is not needed: both thrust fully all the time.
 """
 
 from __future__ import annotations
@@ -30,19 +29,29 @@ COLUMNS = 9
 """Number of parameters of the variations: end state (6), nu in its plane (2), mass at the end."""
 MASS = COLUMNS - 1
 """Column of the derivatives by the mass at the end."""
-_SAFETY, _MIN_FACTOR, _MAX_FACTOR = 0.9, 0.2, 6.0
+_SAFETY = 0.9
+"""Share of the step that the error estimate allows: that of SciPy's and of Hairer's DOP853."""
+_MIN_FACTOR = 0.2
+"""Least ratio of a step to the one before: that of SciPy's DOP853."""
+_MAX_FACTOR = 6.0
+"""Largest ratio of a step to the one before: that of Hairer's DOP853 (SciPy has 10)."""
 _MAX_STEPS = 20_000
+"""The longest game takes about 2000, 20 a radian at `FINE`: more are needed only near the
+centre.
+"""
 _FIRST_STEP = 0.05
+"""Radians of a circular orbit: near the step that `FINE` allows."""
 NO_VARIATIONS = np.zeros((0, COLUMNS))
+"""Variations without rows: only the state is integrated."""
 _Parameters = tuple[Floats, Floats, Floats]
 _Vector = tuple[float, float, float]
 _Symmetric = tuple[float, float, float, float, float, float]
 
 
 class Response(NamedTuple):
-    """Linear dependence of an end state at a guess of it: rho + by_nu dnu + by_time dT leads to the
-    true one.
+    """Linear dependence of an end state on nu and the duration, at a guess of the end state.
 
+    The guess plus rho + by_nu dnu + by_time dT is the end state of the extremal to first order.
     `rho`, shape (6,), is Newton's correction of the guess; `by_nu`, shape (6, 2), and `by_time`,
     shape (6,), are the derivatives along two directions across nu and by the duration. `regular`
     says that there is no conjugate point: the map from end states near by to start states preserves
@@ -72,13 +81,13 @@ def derivatives(
     second: Floats,
     with_second: bool,
 ) -> None:
-    """Put the acceleration, its gradient (3, 3) and, if wanted, the gradient of gradient times `p`
-    (3, 3) into arrays.
+    """Fill the acceleration `g`, its gradient `first` and, if wanted, the gradient of `first` @ p.
 
-    `oblateness` is mu J2 R^2 / 2, the axis z: the potential is mu/r + oblateness (1/r^3 - 3
-    z^2/r^5). For a function f of q = r . r the gradient is 2 f' r, its gradient 4 f'' r r^T + 2 f'
-    I, and along p 8 f''' s r r^T + 4 f'' (r p^T + p r^T + s I) with s = r . p. The oblate part is a
-    power of q, less z^2 times one.
+    `first` and `second` have shape (3, 3), and `with_second` asks for `second`. `oblateness` is mu
+    J2 R^2 / 2, the axis z: the potential is mu/r + oblateness (1/r^3 - 3 z^2/r^5). For a function f
+    of q = r . r the gradient is 2 f' r, its gradient 4 f'' r r^T + 2 f' I, and along p 8 f''' s r
+    r^T + 4 f'' (r p^T + p r^T + s I) with s = r . p. The oblate part is a power of q less z^2 times
+    a power of q; `_subtract_axial` does the latter.
     """
     q = r[0] * r[0] + r[1] * r[1] + r[2] * r[2]
     s = r[0] * p[0] + r[1] * p[1] + r[2] * p[2]
@@ -92,6 +101,7 @@ def derivatives(
         f1 -= 1.5 * f3 * inverse
         f2 += 3.75 * f3 * inverse * inverse
         f4 -= 13.125 * f3 * inverse * inverse * inverse
+
     for i in range(3):
         g[i] = 2.0 * f1 * r[i]
         for j in range(3):
@@ -102,6 +112,7 @@ def derivatives(
             for j in range(3):
                 second[i, j] = 8.0 * f4 * s * r[i] * r[j] + 4.0 * f2 * (r[i] * p[j] + p[i] * r[j])
             second[i, i] += 4.0 * f2 * s
+
     if oblateness != 0.0:
         _subtract_axial(r, p, s, q, oblateness, g, first, second)
 
@@ -125,6 +136,8 @@ def _subtract_axial(
     f2 = 8.75 * f / (q * q)
     f4 = -39.375 * f / (q * q * q)
     along = 2.0 * f1 * s
+
+    # The derivatives of f alone, times z^2.
     for i in range(3):
         g[i] -= square * 2.0 * f1 * r[i]
         for j in range(3):
@@ -135,6 +148,8 @@ def _subtract_axial(
                 turned += 4.0 * f2 * s
             first[i, j] -= square * plain
             second[i, j] -= square * turned + 2.0 * z * p[2] * plain
+
+    # The derivatives of z^2, and of its products with those of f.
     g[2] -= 2.0 * z * f
     first[2, 2] -= 2.0 * f
     second[2, 2] -= 2.0 * along
@@ -269,13 +284,12 @@ _step = step_of(_rates)
 def flow_back(
     y: Floats, z: Floats, craft: Floats, begin: float, end: float, tolerance: float
 ) -> bool:
-    """Integrate a state and its variations from time to go `begin` to `end`, in place; either may
-    be the greater.
+    """Integrate a state and its variations in place, from time to go `begin` to `end`.
 
-    `y`, shape (12,), is (position, velocity, p_r, p_v), and `z`, shape (12, 9), contains its
-    derivatives; one of no rows (`NO_VARIATIONS`) integrates y alone. `craft`, shape (5,), is (mu,
-    oblateness, thrust, mass at the end of the game, mass flow). Returns False where the steps are
-    too many or too small, or a number overflows.
+    Either time may be the greater. `y`, shape (12,), is (position, velocity, p_r, p_v), and `z`,
+    shape (12, 9), contains its derivatives; an array without rows (`NO_VARIATIONS`) means that only
+    y is integrated. `craft`, shape (5,), is (mu, oblateness, thrust, mass at the end of the game,
+    mass flow). Returns False if the steps are too many or too small, or a number overflows.
 
     The `tolerance` of a step's error, relative and absolute, applies to y alone. A step costs 12
     stages of some 0.3 us, or 0.1 us for y alone.
@@ -287,6 +301,7 @@ def flow_back(
     y_next = np.empty_like(y)
     z_next = np.empty_like(z)
     parameters = craft, np.empty((3, 3)), np.empty((3, 3))
+
     span = abs(end - begin)
     sign = 1.0 if end > begin else -1.0
     s = begin
@@ -294,12 +309,15 @@ def flow_back(
     first = 0
     for _ in range(_MAX_STEPS):
         left = abs(end - s)
+        # A rounding error of the sum of steps must not leave a step of its size.
         last = step >= left * (1.0 - 1e-12)
         h = sign * (left if last else step)
         _step(s, h, first, y, z, parameters, ky, kz, y_next, z_next)
         error = error_of_step(y, y_next, ky, tolerance, abs(h))
         if not error < np.inf:
             return False
+
+        # The first stage is the same if the step is repeated.
         first = 1
         if error < 1.0:
             for i in range(STATES):
@@ -311,6 +329,8 @@ def flow_back(
                 return True
             s += h
             first = 0
+
+        # The estimated error is of order eight. Below 1e-10 its root exceeds the largest factor.
         factor = _MAX_FACTOR if error < 1e-10 else _SAFETY * error**-0.125
         step = abs(h) * min(max(factor, _MIN_FACTOR), _MAX_FACTOR)
         if step < 1e-13 * max(span, 1e-3):
@@ -325,10 +345,9 @@ def end_of(state: Floats, nu: Floats) -> Floats:
 
 @compiled
 def rate(y: Floats, mu: float, oblateness: float, push: float) -> Floats:
-    """Return the time derivative of position and velocity, shape (6,), at a state and costate,
-    shape (12,).
+    """Return the time derivative of position and velocity, shape (6,).
 
-    `push` is the acceleration of the thrust.
+    `y`, shape (12,), is a state and its costate, and `push` is the acceleration of the thrust.
     """
     out = np.empty(6)
     gradient = np.empty((3, 3))
@@ -352,10 +371,10 @@ def respond(
     duration: float,
     tolerance: float,
 ) -> Response:
-    """Return the response of one side at a guess of its end state; `plane`, shape (2, 3), are the
-    directions across nu.
+    """Return the response of one side at a guess of its end state.
 
-    `start`, shape (6,), is the state at the start of the game, and `craft` that of `flow_back`.
+    `start`, shape (6,), is the state at the start of the game, `craft` is described in `flow_back`,
+    and the rows of `plane`, shape (2, 3), are the directions across nu.
     """
     y = np.zeros(STATES)
     z = np.zeros((STATES, COLUMNS))
@@ -366,11 +385,13 @@ def respond(
         y[6 + i] = nu[i]
         z[6 + i, 6] = plane[0, i]
         z[6 + i, 7] = plane[1, i]
+
     is_propagated = flow_back(y, z, craft, 0.0, duration, tolerance)
 
     by_end = z[:6, :6].copy()
     inverse = np.zeros((6, 6))
     determinant = invert(by_end, inverse) if is_propagated else 0.0
+
     # A longer game starts further back, and ends with less mass.
     later = rate(y, craft[0], craft[1], craft[2] / (craft[3] + craft[4] * duration))
     rho = np.zeros(6)
@@ -381,17 +402,18 @@ def respond(
             rho[i] += inverse[i, j] * (start[j] - y[j])
             by_nu[i, 0] -= inverse[i, j] * z[j, 6]
             by_nu[i, 1] -= inverse[i, j] * z[j, 7]
-            by_time[i] += inverse[i, j] * (later[j] + craft[4] * z[j, 8])
+            by_time[i] += inverse[i, j] * (later[j] + craft[4] * z[j, MASS])
+
     residual = np.abs(start - y[:6]).max() if determinant != 0.0 else np.inf
     return Response(rho, by_nu, by_time, determinant > 0.0, inverse, y[6:].copy(), residual)
 
 
 @compiled
 def invert(matrix: Floats, inverse: Floats) -> float:
-    """Fill the inverse of a matrix, shape (n, n), and return its determinant; 0 if it is singular
-    or not finite.
+    """Fill the inverse of a matrix, shape (n, n), and return its determinant.
 
-    Gauss and Jordan's elimination with partial pivoting; the matrix is overwritten.
+    The determinant is 0 if the matrix is singular or not finite. Gauss and Jordan's elimination
+    with partial pivoting; the matrix is overwritten.
     """
     count = len(matrix)
     determinant = 1.0
