@@ -10,8 +10,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from infoset.rendezvous._arrays import Flags, Floats, Places, Shorts
-from infoset.rendezvous.multipoint._cost_to_come import Legs, extend, write_quadratics
+from infoset.rendezvous._arrays import Flags, Floats, Shorts
+from infoset.rendezvous.multipoint._cost_to_come import (
+    DECIDED,
+    TARGET,
+    CostToCome,
+    Kept,
+    Legs,
+    extend,
+    write_quadratics,
+)
 from infoset.rendezvous.multipoint.times import MIN_SHARE, Grid, TimeLimits, room_s
 from infoset.rendezvous.multipoint.tour import Meet, Tour
 
@@ -65,20 +73,6 @@ class _Departure(NamedTuple):
     legs: Legs
     states: Floats
     """Shape (n + 1, G, 6); the last are those of the chaser if it coasts."""
-
-
-class _Visits(NamedTuple):
-    """Visits of one target, the last of a set of visited ones, see `extend`."""
-
-    cost: Floats
-    mean: Floats
-    covariance: Floats
-    back: Shorts
-
-    @property
-    def cheapest(self) -> Places:
-        """Rows of `cost` in rising order, of each time."""
-        return np.argsort(self.cost, axis=0)
 
 
 def search_grid(
@@ -141,7 +135,7 @@ class _TimeGrid:
         done = 0
         total = sum(self._pairs(visits) for visits in range(1, self._count + 1))
         for _ in range(self._count):
-            following: dict[int, dict[int, _Visits]] = {}
+            following: dict[int, dict[int, CostToCome]] = {}
             for visited, before in level.items():
                 departure = self._departure(visited)
                 for last in self._next(visited):
@@ -181,13 +175,13 @@ class _TimeGrid:
             return [self._order[visited.bit_count()]]
         return [target for target in range(self._count) if not visited >> target & 1]
 
-    def _start(self) -> _Visits:
+    def _start(self) -> CostToCome:
         """Return the chaser on its coasting orbit, at the first time of the grid."""
         size = len(self._steps_s)
         cost = np.full((1, size), np.inf)
         cost[0, 0] = 0.0
         back = np.full((1, size, 4), _NONE, dtype=np.int16)
-        return _Visits(cost, np.zeros((1, size, 3)), np.zeros((1, size, 3, 3)), back)
+        return CostToCome(cost, np.zeros((1, size, 3)), np.zeros((1, size, 3, 3)), back)
 
     def _leave_s(self, visited: int) -> float:
         """Return the first time at which the chaser can leave the last of a set of visited
@@ -255,8 +249,8 @@ class _TimeGrid:
         return np.ascontiguousarray(np.moveaxis(since_zero @ initial.T, 2, 0))
 
     def _visit(
-        self, before: dict[int, _Visits], last: int, departure: _Departure, final: bool
-    ) -> _Visits:
+        self, before: dict[int, CostToCome], last: int, departure: _Departure, final: bool
+    ) -> CostToCome:
         """Return the visits of the target `last` that come from targets `before`."""
         size = len(self._steps_s)
         flyby = self._tour.targets[last].meet is Meet.FLYBY
@@ -265,46 +259,27 @@ class _TimeGrid:
         # A last rendezvous needs candidates of each time of the visit before it: of 90 valleys 2
         # were lost otherwise.
         rows = ranks * size if (flyby or final) and START not in before else ranks
-        visits = _Visits(
+        visits = CostToCome(
             np.full((rows, size), np.inf),
             np.zeros((rows, size, 3)),
             np.zeros((rows, size, 3, 3)),
             np.full((rows, size, 4), _NONE, dtype=np.int16),
         )
         met = 3 if flyby else 6
+        kept = Kept(ranks, self._apart)
         # The cheapest first: most others cost more already than the whole ways known.
         for target, earlier in sorted(before.items(), key=lambda each: float(each[1].cost.min())):
-            extend(
-                earlier.cost,
-                earlier.mean,
-                earlier.covariance,
-                earlier.cheapest,
-                legs,
-                states[last] - states[target],
-                target,
-                met,
-                ranks,
-                self._apart,
-                visits.cost,
-                visits.back,
-            )
+            cheapest = np.argsort(earlier.cost, axis=0)
+            relative = states[last] - states[target]
+            extend(earlier, cheapest, legs, relative, target, met, kept, visits)
         if not flyby or final:
             return visits
 
         for target, earlier in before.items():
-            write_quadratics(
-                earlier.mean,
-                earlier.covariance,
-                legs,
-                states[last] - states[target],
-                target,
-                visits.back,
-                visits.mean,
-                visits.covariance,
-            )
+            write_quadratics(earlier, legs, states[last] - states[target], target, visits)
         return visits
 
-    def _candidates(self, complete: int, ends: dict[int, _Visits]) -> Iterator[Candidate]:
+    def _candidates(self, complete: int, ends: dict[int, CostToCome]) -> Iterator[Candidate]:
         """Yield the visits of all targets that are in time, and cost no more than those near
         them.
         """
@@ -328,8 +303,8 @@ class _TimeGrid:
         size = cost.shape[1]
         shape = (len(cost) // ranks, ranks, size)
         cost = cost.reshape(shape)
-        target = back[..., 0].reshape(shape)
-        decided = back[..., 3].reshape(shape)
+        target = back[..., TARGET].reshape(shape)
+        decided = back[..., DECIDED].reshape(shape)
         edge = ((1, 1), (0, 0), (1, 1))
         costs = np.pad(cost, edge)
         targets = np.pad(target, edge)
