@@ -18,9 +18,13 @@ from infoset.experiments.multipoint.file import MultipointProblem
 from infoset.rendezvous.multipoint import BestOrder, Grid, Path, Tour
 
 _POINTS = 1601
+"""Number of equally spaced times of a path; chosen for smooth curves and files of 100 kB a
+craft.
+"""
 _ENOUGH_A_REVOLUTION = 20.0
-"""Times of a grid in a revolution: with fewer, its lowest costs may be in other valleys than the
-minima.
+"""Times of a grid in a revolution below which a note says that it is coarse.
+
+With fewer times its lowest costs may be in other valleys than the minima.
 """
 
 
@@ -55,7 +59,7 @@ class MultipointReport:
 
     @property
     def hill(self) -> bool:
-        """Whether the axes are those of Hill."""
+        """Whether the axes are Hill's axes."""
         return self.problem.orbit_rate_rad_s is not None
 
     @property
@@ -103,7 +107,7 @@ class MultipointReport:
 
     @property
     def notes(self) -> list[str]:
-        """Return what is known of the best order and of the best times."""
+        """Return how the order and the times were chosen, and how sure it is that they are best."""
         notes = []
         if self.order_chosen == "best":
             notes.append(self._order_note())
@@ -150,25 +154,23 @@ class MultipointReport:
                 f"all orders were compared on a grid of {self._grid_text(search.grid)}, and the "
                 f"best {search.orders} searched again: the order is the best one found"
             )
+        # Branch and bound of linear motion at given times leaves out no order.
         linear = isinstance(self.problem.tour, Tour)
-        proved = linear and self.times_chosen == "given" and not self.best.lost
-        return (
-            "no order that fits the times costs less"
-            if proved
-            else "the order is the best one found"
-        )
+        if linear and self.times_chosen == "given" and not self.best.lost:
+            return "no order that fits the times costs less"
+        return "the order is the best one found"
 
     def _grid_text(self, grid: Grid) -> str:
         return f"{grid.times} times, {self.per_revolution(grid):.2g} a revolution"
 
     @property
     def revolutions(self) -> float:
-        """Return the revolutions until the latest time: of the reference orbit, or of a circle
-        through the start.
+        """Return the number of revolutions until the latest time.
+
+        They are revolutions of the reference orbit, or of a circular orbit through the start.
         """
-        return self._revolutions_until(
-            self.end_s if self.problem.latest_s is None else self.problem.latest_s
-        )
+        latest_s = self.problem.latest_s
+        return self._revolutions_until(self.end_s if latest_s is None else latest_s)
 
     def per_revolution(self, grid: Grid) -> float:
         """Return the number of times of a grid in a revolution."""
@@ -255,7 +257,7 @@ def _node_json(report: MultipointReport, index: int) -> dict[str, object]:
     jump = report.path.jumps[index]
     state = report.path.arrival_states[index]
     rendezvous = bool(nodes.rendezvous[index])
-    return {
+    values: dict[str, object] = {
         "name": report.names[index],
         "meet": "rendezvous" if rendezvous else "flyby",
         "position_m": state[:3],
@@ -263,16 +265,16 @@ def _node_json(report: MultipointReport, index: int) -> dict[str, object]:
         "target_velocity_m_s": nodes.arrive[index, 3:],
         "leave_s": nodes.leave_s[index],
         "jump_m_s3": jump[:3],
-        **({"velocity_jump_m_s2": jump[3:]} if rendezvous else {}),
     }
+    if rendezvous:
+        values["velocity_jump_m_s2"] = jump[3:]
+    return values
 
 
 def trajectories(report: MultipointReport) -> str:
-    """Return the trajectories of the chaser and of the targets, as CSV; only the chaser has a
-    control.
-    """
+    """Return the trajectories of the chaser and the targets as CSV; targets have no control."""
     times = report.times
-    none = np.full((len(report.times), 3), np.nan)
+    none = np.full((len(times), 3), np.nan)
     tracks: list[tuple[list[str], list[Floats]]] = [
         (["chaser"], [times, report.path.state(times), report.path.control(times)])
     ]
@@ -293,6 +295,7 @@ def report_lines(report: MultipointReport) -> Iterator[Part]:
     yield f"axes: {report.axes_text}"
     if report.best.objective > path.cost:
         yield f"cost including the price of time = {report.best.objective:.8g} m^2/s^3"
+
     unit, per_s = report.time_unit
     table = number_table(
         "target",
@@ -315,19 +318,14 @@ def report_lines(report: MultipointReport) -> Iterator[Part]:
             f"{np.linalg.norm(path.jumps[index, :3]):.4g}",
         )
     yield table
+
     if "best" not in (report.order_chosen, report.times_chosen):
         yield from report.notes
         return
     text = f"{report.best.evaluations} paths computed"
     if report.order_chosen == "best":
-        text += (
-            ""
-            if report.best.order_search is not None
-            else f", {report.best.nodes} partial orders examined"
-        )
-        text += (
-            f", {len(report.best.lost)} left out because no trajectory was found"
-            if report.best.lost
-            else ""
-        )
+        if report.best.order_search is None:
+            text += f", {report.best.nodes} partial orders examined"
+        if report.best.lost:
+            text += f", {len(report.best.lost)} left out because no trajectory was found"
     yield "; ".join([text, *report.notes])

@@ -13,9 +13,7 @@ from infoset.observer.linear_observer import MAX_POLYTOPE_STATES, Estimate
 
 
 def _centre(estimate: Estimate) -> Floats | None:
-    """Return the centre of a largest ball in a set; None if it is empty, or its facets are not
-    known.
-    """
+    """Return the centre of a largest ball in a set; None if it is empty or has no known facets."""
     if estimate.is_empty or estimate.states > MAX_POLYTOPE_STATES:
         return None
     return estimate.chebyshev_centre()
@@ -23,49 +21,63 @@ def _centre(estimate: Estimate) -> Floats | None:
 
 def observer_page(report: ObserverReport) -> str:
     """Return the page as HTML."""
-    time, title = times(report)
     problem = report.problem
-    data = report.data
     about = [problem.description] if problem.description else []
     about.append(
-        f"{len(report.estimates)} steps; {data.origin}. Step with the arrow keys or the slider."
+        f"{len(report.estimates)} steps; {report.data.origin}. Step with the arrow keys or the "
+        "slider."
     )
+    empty_from = None
     if report.contradicted:
+        empty_from = int(np.argmax([estimate.is_empty for estimate in report.estimates]))
         about.append(
             f"The measurements contradict the model at step {int(report.inconsistency.step)}."
         )
-    bounds = shown_bounds(report.estimates)
-    later = None if report.smoothed is None else shown_bounds(report.smoothed)
+
+    time, title = times(report)
     content = {
         "heading": f"Possible states of {problem.name}",
         "about": about,
         "names": problem.names,
         "time": time,
         "time_title": title,
-        "empty_from": int(np.argmax([estimate.is_empty for estimate in report.estimates]))
-        if report.contradicted
-        else None,
-        "steps": [
-            {
-                "k": estimate.step,
-                "lower": None if estimate.is_empty else bounds[index, 0],
-                "upper": None if estimate.is_empty else bounds[index, 1],
-                "later": None if later is None or np.isnan(later[index]).any() else later[index],
-                "centre": _centre(estimate),
-                "vertices": estimate.polygons.polygon() if estimate.states == 2 else [],
-                "smoothed": []
-                if report.smoothed is None or estimate.states != 2
-                else report.smoothed[index].polygons.polygon(),
-                "measured": [
-                    None if np.isnan(value) else value for value in data.measured[index].tolist()
-                ],
-                "inputs": data.inputs[index],
-                "state": None if data.states is None else data.states[index],
-            }
-            for index, estimate in enumerate(report.estimates)
-        ],
+        "empty_from": empty_from,
+        "steps": _steps(report),
     }
     script = (resources.files("infoset.experiments.observer") / "page.js").read_text(
         encoding="utf-8"
     )
     return page(f"Observer {problem.name}", [], content, script)
+
+
+def _steps(report: ObserverReport) -> list[dict[str, object]]:
+    """Return the values of each step, with all keys in each; null or empty if not known."""
+    data = report.data
+    bounds = shown_bounds(report.estimates)
+    smoothed_bounds = None if report.smoothed is None else shown_bounds(report.smoothed)
+    steps: list[dict[str, object]] = []
+    for index, estimate in enumerate(report.estimates):
+        values: dict[str, object] = {
+            "k": estimate.step,
+            "lower": None,
+            "upper": None,
+            "later": None,
+            "centre": _centre(estimate),
+            "vertices": [],
+            "smoothed": [],
+            "measured": [
+                None if np.isnan(value) else value for value in data.measured[index].tolist()
+            ],
+            "inputs": data.inputs[index],
+            "state": None if data.states is None else data.states[index],
+        }
+        if not estimate.is_empty:
+            values["lower"], values["upper"] = bounds[index]
+        if smoothed_bounds is not None and not np.isnan(smoothed_bounds[index]).any():
+            values["later"] = smoothed_bounds[index]
+        if estimate.states == 2:
+            values["vertices"] = estimate.polygons.polygon()
+            if report.smoothed is not None:
+                values["smoothed"] = report.smoothed[index].polygons.polygon()
+        steps.append(values)
+    return steps

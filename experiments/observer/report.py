@@ -17,15 +17,17 @@ from infoset.observer.linear_observer import MAX_POLYTOPE_STATES, Estimate, Inco
 from infoset.sim.columns import Cell, csv_text
 
 _SHOWN_STEPS = 12
-_ROUNDING = 1e-12
-"""Share of the maximum bound of a state below which a bound that is shown is zero."""
+"""Number of the last steps in the table: two tables of them fit on a screen."""
+_BOUND_ROUNDING = 1e-12
+"""Share of the maximum bound of a state below which a bound is shown as zero.
+
+About 5000 rounding errors, far below the six digits that are shown.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class ObserverReport:
-    """Results of one command; `smoothed` are the sets that use later measurements too, if they are
-    wanted.
-    """
+    """Results of one command; `smoothed` are the sets that use later measurements, if asked for."""
 
     problem: ObserverProblem
     data: Data
@@ -35,11 +37,11 @@ class ObserverReport:
 
     @cached_property
     def excess_widths(self) -> Floats | None:
-        """Difference between the widths of the last set and the exact ones, shape (n,); None if it
-        is not reduced.
-        """
+        """Widths of the last set less the exact widths, shape (n,); None if it is not reduced."""
         last = self.estimates[-1]
-        return last.excess_widths() if last.reduced and not last.is_empty else None
+        if not last.reduced or last.is_empty:
+            return None
+        return last.excess_widths()
 
     @property
     def contradicted(self) -> bool:
@@ -48,7 +50,7 @@ class ObserverReport:
 
 
 def contains(estimate: Estimate, state: Floats) -> bool:
-    """Whether a state is in a set; of five and more states, within its bounds."""
+    """Return whether a state is in a set, or within its bounds if it has five or more states."""
     if estimate.states > MAX_POLYTOPE_STATES:
         return bool((estimate.lower <= state).all() and (state <= estimate.upper).all())
     shape = estimate.polygons if estimate.states == 2 else estimate.polytopes[0]
@@ -57,7 +59,6 @@ def contains(estimate: Estimate, state: Floats) -> bool:
 
 def report_json(report: ObserverReport) -> dict[str, object]:
     """Return the results for `infoset.experiments.common.output.to_json`."""
-    where = report.inconsistency
     steps: list[dict[str, object]] = [
         {"k": estimate.step, **_bounds(estimate), "empty": bool(estimate.is_empty)}
         for estimate in report.estimates
@@ -69,45 +70,48 @@ def report_json(report: ObserverReport) -> dict[str, object]:
             step["smoothed"] = _bounds(report.smoothed[index])
         if report.data.states is not None:
             step["state"] = report.data.states[index]
+
+    inconsistency: dict[str, object] | None = None
+    if report.contradicted:
+        where = report.inconsistency
+        inconsistency = {
+            "k": int(where.step),
+            "output": int(where.output) + 1,
+            "excess": float(where.excess),
+        }
     return {
         "data": report.data.origin,
         "states": report.problem.names,
         "steps": steps,
         "final": _bounds(report.estimates[-1]),
         "excess_widths": report.excess_widths,
-        "inconsistency": {
-            "k": int(where.step),
-            "output": int(where.output) + 1,
-            "excess": float(where.excess),
-        }
-        if report.contradicted
-        else None,
+        "inconsistency": inconsistency,
     }
 
 
 def _bounds(estimate: Estimate) -> dict[str, object]:
     """Return the bounds of the states; null for the empty set."""
-    return {
-        end: None if estimate.is_empty else getattr(estimate, end) for end in ("lower", "upper")
-    }
+    if estimate.is_empty:
+        return {"lower": None, "upper": None}
+    return {"lower": estimate.lower, "upper": estimate.upper}
 
 
 def report_csv(report: ObserverReport) -> str:
-    """Return the bounds of each step as CSV; those of an empty set are empty cells."""
+    """Return the bounds of each step as CSV; the bounds of an empty set are empty cells."""
     states = range(1, len(report.problem.names) + 1)
-    sets = {
-        "": report.estimates,
-        **({} if report.smoothed is None else {"smoothed_": report.smoothed}),
-    }
-    columns = [
-        f"x{state}_{kind}{end}" for kind in sets for state in states for end in ("lower", "upper")
-    ]
-    blocks = [
-        bounds_of(sets[kind]).swapaxes(1, 2).reshape(len(report.estimates), -1) for kind in sets
-    ]
+    sets = {"": report.estimates}
+    if report.smoothed is not None:
+        sets["smoothed_"] = report.smoothed
+
+    columns = []
+    blocks = []
+    for kind, estimates in sets.items():
+        columns += [f"x{state}_{kind}{end}" for state in states for end in ("lower", "upper")]
+        blocks.append(bounds_of(estimates).swapaxes(1, 2).reshape(len(estimates), -1))
     if report.data.states is not None:
         columns += [f"x{state}" for state in states]
         blocks.append(report.data.states)
+
     rows: list[list[Cell]] = [
         [
             estimate.step,
@@ -123,7 +127,9 @@ def times(report: ObserverReport) -> tuple[Floats, str]:
     """Return the times of the steps, and the title of their axis."""
     steps = np.array([estimate.step for estimate in report.estimates], dtype=float)
     step_s = report.problem.system.step_s
-    return (steps, "step") if step_s is None else (steps * step_s, "time, s")
+    if step_s is None:
+        return steps, "step"
+    return steps * step_s, "time, s"
 
 
 def bounds_of(estimates: Sequence[Estimate]) -> Floats:
@@ -132,24 +138,20 @@ def bounds_of(estimates: Sequence[Estimate]) -> Floats:
 
 
 def shown_bounds(estimates: Sequence[Estimate]) -> Floats:
-    """Return the same to be read: bounds within the rounding errors of the maximum bounds of a
-    state are zero.
-    """
+    """Return `bounds_of` for display: bounds within the rounding errors of a state are zero."""
     bounds = bounds_of(estimates)
-    bounds[np.abs(bounds) < _ROUNDING * np.abs(np.nan_to_num(bounds)).max(axis=(0, 1))] = 0.0
+    largest = np.abs(np.nan_to_num(bounds)).max(axis=(0, 1))
+    bounds[np.abs(bounds) < _BOUND_ROUNDING * largest] = 0.0
     return bounds
 
 
 def _bounds_table(names: Sequence[str], estimates: Sequence[Estimate]) -> Table:
     """Return a table of the bounds of the last steps."""
     table = number_table("step", *(f"{name}\n{end}" for name in names for end in ("from", "to")))
-    for estimate, ends in list(zip(estimates, shown_bounds(estimates), strict=True))[
-        -_SHOWN_STEPS:
-    ]:
-        table.add_row(
-            str(estimate.step),
-            *("empty" if np.isnan(end) else f"{end:.6g}" for end in ends.T.ravel()),
-        )
+    bounds = shown_bounds(estimates)
+    for estimate, ends in zip(estimates[-_SHOWN_STEPS:], bounds[-_SHOWN_STEPS:], strict=True):
+        cells = ("empty" if np.isnan(end) else f"{end:.6g}" for end in ends.T.ravel())
+        table.add_row(str(estimate.step), *cells)
     return table
 
 
@@ -162,10 +164,12 @@ def report_lines(report: ObserverReport) -> Iterator[Part]:
     yield f"{problem.name}: {len(problem.names)} states, {count} steps{gaps}; {report.data.origin}"
     if count > _SHOWN_STEPS:
         yield f"bounds of the last {_SHOWN_STEPS} steps:"
+
     yield _bounds_table(problem.names, report.estimates)
     if report.smoothed is not None:
         yield "the same with later measurements (--smooth):"
         yield _bounds_table(problem.names, report.smoothed)
+
     if report.data.states is not None:
         inside = sum(map(contains, report.estimates, report.data.states))
         place = "the set" if len(problem.names) <= MAX_POLYTOPE_STATES else "its bounds"

@@ -25,7 +25,7 @@ from infoset.rendezvous.pareto import (
 )
 
 SAMPLES = 31
-"""Number of times in a trajectory of the CSV file."""
+"""Number of times in a trajectory of the CSV file, chosen: about one in 3 % of the flight."""
 CHOICES = {
     "min_group_loss": "minimum group loss",
     "min_sum_of_costs": "minimum sum of costs",
@@ -34,7 +34,10 @@ CHOICES = {
 }
 """Names in print of the rules of `ParetoReport.selections`."""
 _ZERO = 1e-9
-"""Components of a meeting smaller than this part of the largest one are printed as zero."""
+"""Part of the largest component of a meeting below which components are printed as zero.
+
+They are rounding errors of the minimisation, and far below the six digits that are printed.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,11 +86,9 @@ class ParetoReport:
     @cached_property
     def cost_squared(self) -> Floats:
         """J_i^2 of the flights, m^2/s^3, shape (n,)."""
-        return (
-            self.solution.cost_squared()
-            if self.imposed is None
-            else self.imposed.encounter.cost_squared
-        )
+        if self.imposed is None:
+            return self.solution.cost_squared()
+        return self.imposed.encounter.cost_squared
 
     @cached_property
     def excess(self) -> Floats:
@@ -117,7 +118,8 @@ def report_json(report: ParetoReport) -> dict[str, object]:
     """Return the results for `infoset.experiments.common.output.to_json`."""
     solution = report.solution
     encounter = report.problem.encounter
-    return {
+    same_matrix = solution.same_matrix
+    values: dict[str, object] = {
         "units": {
             "axes": AXES,
             "costate_at_meeting": "m/s^3 of the position's three, m/s^2 of the velocity's",
@@ -131,27 +133,29 @@ def report_json(report: ParetoReport) -> dict[str, object]:
         "craft": [_craft_json(report, index) for index in range(len(solution.costs))],
         "group_loss_m2_s3": report.group_loss,
         "imposed_bound": _imposed_json(report),
-        "matrix": [cost.matrix for cost in solution.costs[: 1 if solution.same_matrix else None]],
-        **({"distances": distances(solution)} if solution.same_matrix else {}),
-        "selections": {
-            name: {
-                "meeting": _named_state(solution, point),
-                "cost_squared_m2_s3": solution.cost_squared(point),
-                "excess_m2_s3": solution.excess(point),
-                "group_loss_m2_s3": solution.group_loss(point),
-            }
-            for name, point in report.selections.items()
-        },
-        **_coalitions_json(report.coalitions, [cost.craft.name for cost in solution.costs]),
-        "sweep": {
-            "meeting_time_s": [other.encounter.meeting_s for other in report.sweep],
-            "group_loss_m2_s3": [other.group_loss() for other in report.sweep],
-            "cost_squared_m2_s3": [other.cost_squared() for other in report.sweep],
-            "ideal_cost_squared_m2_s3": [
-                [cost.ideal_cost_squared for cost in other.costs] for other in report.sweep
-            ],
-        },
+        "matrix": [cost.matrix for cost in solution.costs[: 1 if same_matrix else None]],
     }
+    if same_matrix:
+        values["distances"] = distances(solution)
+    values["selections"] = {
+        name: {
+            "meeting": _named_state(solution, point),
+            "cost_squared_m2_s3": solution.cost_squared(point),
+            "excess_m2_s3": solution.excess(point),
+            "group_loss_m2_s3": solution.group_loss(point),
+        }
+        for name, point in report.selections.items()
+    }
+    values |= _coalitions_json(report.coalitions, [cost.craft.name for cost in solution.costs])
+    values["sweep"] = {
+        "meeting_time_s": [other.encounter.meeting_s for other in report.sweep],
+        "group_loss_m2_s3": [other.group_loss() for other in report.sweep],
+        "cost_squared_m2_s3": [other.cost_squared() for other in report.sweep],
+        "ideal_cost_squared_m2_s3": [
+            [cost.ideal_cost_squared for cost in other.costs] for other in report.sweep
+        ],
+    }
+    return values
 
 
 def _named_state(solution: EncounterSolution, point: Floats) -> dict[str, float]:
@@ -226,7 +230,7 @@ def trajectories(report: ParetoReport) -> str:
 
 
 def imposed_text(report: ParetoReport, imposed: ImposedBound) -> str:
-    """Return what the bound changes, and which results do not depend on it."""
+    """Return a text about the changes by the bound, and the results that do not depend on it."""
     peak = max(imposed.peaks_without_m_s2)
     bound = imposed.encounter.max_m_s2
     return (
@@ -245,8 +249,10 @@ def report_lines(report: ParetoReport) -> Iterator[Part]:
     meeting = ", ".join(
         f"{key} = {value:.6g}" for key, value in _named_state(solution, report.point).items()
     )
-    yield f"{report.problem.name}: {encounter.meeting.value} at {encounter.meeting_s:g} s: {meeting}"
+    kind = encounter.meeting.value
+    yield f"{report.problem.name}: {kind} at {encounter.meeting_s:g} s: {meeting}"
     yield f"axes: {AXES}"
+
     table = number_table(
         "craft",
         "ideal J*^2\nm^2/s^3",
@@ -262,6 +268,7 @@ def report_lines(report: ParetoReport) -> Iterator[Part]:
     yield table
     if report.imposed is not None:
         yield imposed_text(report, report.imposed)
+
     free = [component.name.lower() for component in encounter.free]
     titles = [f"{name}, {'m' if len(name) == 1 else 'm/s'}" for name in free]
     chosen = number_table("choice", *titles, "group loss\nm^2/s^3")
@@ -270,6 +277,7 @@ def report_lines(report: ParetoReport) -> Iterator[Part]:
         values = (f"{value if abs(value) > _ZERO * scale else 0.0:.6g}" for value in point)
         chosen.add_row(CHOICES[rule], *values, number(float(solution.group_loss(point))))
     yield from ("", chosen)
+
     if report.coalitions is None:
         yield "the coalitions are not computed: there are too many craft"
         return

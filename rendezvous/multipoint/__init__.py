@@ -1,6 +1,4 @@
-"""Minimum-energy visits to several moving targets: flybys and rendezvous, their times and their
-order.
-"""
+"""Minimum-energy visits to several moving targets: flybys and rendezvous, times and order."""
 
 from infoset.rendezvous.multipoint.bounded import bound_path, bound_visits, needed_bound
 from infoset.rendezvous.multipoint.kepler import KeplerTour

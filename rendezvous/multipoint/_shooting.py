@@ -1,5 +1,6 @@
-"""Paths under the gravity of one point by shooting, continued from the coasting orbit as targets
-move away from it.
+"""Paths under the gravity of one point, by shooting.
+
+Newton's method starts at the coasting orbit, and the targets are moved away from it in steps.
 """
 
 from __future__ import annotations
@@ -42,7 +43,11 @@ _FIRST_STEP = 0.3
 def _rates(
     _time: float, _y: Floats, z: Floats, _parameters: tuple[()], _dy: Floats, slope: Floats
 ) -> None:
-    """Time derivatives of z in column 0, and of its variations in the others."""
+    """Fill the time derivatives of z, in column 0, and of its variations, in the others.
+
+    r' = v, v' = -r / |r|^3 + lambda_v, lambda_r' = lambda_v / |r|^3 - 3 (r . lambda_v) r / |r|^5,
+    lambda_v' = -lambda_r, and the rate of the energy is |lambda_v|^2 / 2. The energy is not varied.
+    """
     r0 = z[0, 0]
     r1 = z[1, 0]
     r2 = z[2, 0]
@@ -110,12 +115,12 @@ def longest_step(z: Floats) -> float:
 
 @compiled
 def propagate(z: Floats, duration: float) -> bool:
-    """Propagate (r, v, lambda_r, lambda_v, energy), in column 0 of z, and its variations in place;
-    z is (13, 1 + m).
+    """Propagate a state, its costate and the energy, with variations, in place.
 
-    Lengths and times are such that the gravitational parameter is one. Returns whether the
-    trajectory neither falls into the centre nor takes too many steps. The energy is not varied.
-    Steps are those of `longest_step`.
+    `z`, shape (13, 1 + m), contains (r, v, lambda_r, lambda_v, energy) in column 0, and its
+    variations in the others. Lengths and times are such that the gravitational parameter is one.
+    Returns whether the trajectory neither falls into the centre nor takes too many steps. The
+    energy is not varied. Steps are those of `longest_step`.
     """
     slopes = np.zeros((STAGES, *z.shape))
     z_next = np.zeros(z.shape)
@@ -140,8 +145,9 @@ def propagate(z: Floats, duration: float) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Visits up to the next rendezvous, from a known state; `goal`, shape (k, 6), contains the
-    targets' states.
+    """Visits up to the next rendezvous, from a known state.
+
+    `goal`, shape (k, 6), contains the states of the targets.
     """
 
     start_s: float
@@ -153,9 +159,7 @@ class Block:
 
     @cached_property
     def units(self) -> tuple[float, float]:
-        """Units of length and time in which mu is one: the distance at the start, and its rate's
-        inverse.
-        """
+        """Units of length and time in which mu is one; the length is the distance at the start."""
         length = float(np.linalg.norm(self.start_state[:3]))
         return length, float(np.sqrt(length**3 / self.gravitational_parameter_m3_s2))
 
@@ -193,17 +197,16 @@ def blocks_of(
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """A block's trajectory: lambda at the start, then the jumps at all nodes but the last, in units
-    of the block.
+    """Trajectory of a block, given by its `unknowns` in units of the block.
+
+    They are lambda at the start, then the jumps at all nodes but the last.
     """
 
     block: Block
     unknowns: Floats
 
     def along(self, time_s: Floats) -> Floats:
-        """Return states and costates in SI, shape (k, 12), at k increasing times: at a node, after
-        the jump.
-        """
+        """Return states and costates, SI, shape (k, 12), at times; at a node, after the jump."""
         block = self.block
         duration = self.block.units[1]
         z = _initial(block, self.unknowns[:6])
@@ -222,9 +225,7 @@ class Shot:
         return values * block.value_units
 
     def segments(self) -> tuple[Floats, Floats, float]:
-        """Return states and costates at the start and at the end of each segment, shape (k, 12),
-        and the energy: SI.
-        """
+        """Return states and costates at the ends of segments, shape (k, 12), and the energy: SI."""
         block = self.block
         count = len(self.block.time_s)
         z = _initial(block, self.unknowns[:6])
@@ -275,9 +276,7 @@ class ShotPath(Path):
         )
 
     def breaks(self) -> Floats:
-        """Return times, s, not decreasing: radians of the circular orbits at the starts of the
-        segments.
-        """
+        """Return times, s, not decreasing: radians of circular orbits at starts of segments."""
         mu = self.shots[0].block.gravitational_parameter_m3_s2
         radians = np.sqrt(mu / np.linalg.norm(self.start_states[:, :3], axis=1) ** 3) * (
             self.nodes.arrive_s - self.starts_s
@@ -306,11 +305,10 @@ class ShotPath(Path):
 
 
 def shoot(block: Block, near: Floats | None = None) -> Shot | None:
-    """Find the trajectory of a block by Newton's method, with the residual reduced in steps; None
-    if it fails.
+    """Return the trajectory of a block by Newton's method, or None if it fails.
 
-    The initial unknowns are `near`, of other times; if Newton's method fails from them, or they are
-    None, those of the coasting orbit.
+    The residual is reduced in steps. The initial unknowns are `near`, of other times; if Newton's
+    method fails from them, or they are None, those of the coasting orbit.
     """
     coasting = np.zeros(3 + 3 * len(block.time_s))
     initials = [] if near is None else [(near, MIN_STEP_FROM_NEAR)]
@@ -322,8 +320,9 @@ def shoot(block: Block, near: Floats | None = None) -> Shot | None:
 
 
 def _initial(block: Block, costate: Floats, variations: int = 0) -> Floats:
-    """State, costate and energy at the start of a block in column 0, and columns for their
-    variations.
+    """Return an array for the state, costate and energy of a block, with variations.
+
+    Column 0 has the values at the start of the block.
     """
     z = np.zeros((13, 1 + variations))
     z[:12, 0] = np.concatenate([block.start_state / block.value_units[:6], costate])
@@ -336,8 +335,9 @@ def _advance(z: Floats, duration: float) -> None:
 
 
 def _residual(block: Block, unknowns: Floats, slopes: Floats | None = None) -> Floats | None:
-    """Return the residual at the nodes, or None if there is no trajectory; fill in its derivatives
-    `slopes`.
+    """Return the residual at the nodes, or None if there is no trajectory.
+
+    If `slopes` is given, the derivatives are filled into it.
     """
     goals = block.goal / block.value_units[:6]
     size = len(unknowns)
@@ -408,8 +408,10 @@ def _follow(block: Block, initial: Floats, min_step: float) -> Floats | None:
 def _newton(
     block: Block, unknowns: Floats, share: float, goal: Floats, slopes: Floats
 ) -> tuple[Floats, int] | None:
-    """Newton's method to a residual `goal`; derivatives are renewed where it is slow. None if it
-    does not converge.
+    """Return unknowns with a residual `goal` by Newton's method, and the number of rounds.
+
+    Derivatives are computed again if the convergence is slow. The result is None without
+    convergence.
     """
     before = np.inf
     fresh = False

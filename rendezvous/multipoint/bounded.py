@@ -34,9 +34,7 @@ class BoundedPath(LinearPath):
         return saturated(super().control(time_s), self.max_m_s2)
 
     def breaks(self) -> Floats:
-        """Return times, s, not decreasing, between which the control is smooth and turns by about a
-        radian.
-        """
+        """Return times, s, not decreasing; the control turns by about a radian between them."""
         return np.concatenate([flight.breaks() for flight in self.flights])
 
     def along(self, time_s: Floats) -> tuple[Floats, Floats]:
@@ -51,15 +49,17 @@ class BoundedPath(LinearPath):
 
 
 def needed_bound(path: LinearPath) -> float:
-    """Return the smallest bound, m/s^2, with which the visits of a `path` are possible at its
-    times; to 1e-6 below.
+    """Return the smallest possible bound, m/s^2, at the times of a `path`; to 1e-6 below.
+
+    It is at most 1e-6 of it too low.
     """
     return least_bound(_arcs(path)).value_m_s2
 
 
 def bound_path(path: LinearPath, max_m_s2: float) -> LinearPath:
-    """Return the path of minimum energy through the nodes of a `path` with |u| <= `max_m_s2`, or
-    the `path` itself.
+    """Return the path of minimum energy through the nodes of a `path` with |u| <= `max_m_s2`.
+
+    It is the `path` itself if it keeps the bound.
 
     Raises
     ------
@@ -105,8 +105,9 @@ def bound_path(path: LinearPath, max_m_s2: float) -> LinearPath:
 
 
 def _at_rest(path: LinearPath) -> tuple[Floats, Floats]:
-    """States at the ends and at the starts of the segments, shape (N, 6), with zeros for velocities
-    at flybys.
+    """Return states at the ends and at the starts of the segments, shape (N, 6).
+
+    The velocities at flybys are zero.
     """
     nodes = path.nodes
     free = ~nodes.rendezvous
@@ -143,11 +144,11 @@ def bound_visits(
     limits: TimeLimits | None,
     guesses: Sequence[Floats] = (),
 ) -> BestOrder:
-    """Return the visits of `best` with |u| <= `max_m_s2`, or `best` itself if its path keeps the
-    bound.
+    """Return the visits of `best` with |u| <= `max_m_s2`.
 
-    The order stays. With `limits`, the times are optimised again with the bound, from those of
-    `best` and from `guesses`; without them, they stay.
+    They are `best` itself if its path keeps the bound. The order stays. With `limits`, the times
+    are optimised again with the bound, from those of `best` and from `guesses`; without them, they
+    stay.
 
     Raises
     ------

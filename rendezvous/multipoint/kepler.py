@@ -57,8 +57,7 @@ class KeplerTour(Visits):
         )
 
     def flyer(self, order: Sequence[int]) -> Callable[[Floats], Path]:
-        """Return a function of N times that shoots paths of one `order`, each from the nearest one
-        before.
+        """Return a function of N times that shoots a path of one `order` from the nearest path.
 
         Raises
         ------

@@ -202,10 +202,10 @@ def best_times(
     *,
     progress: Report | None = None,
 ) -> BestTimes:
-    """Find the best times of one `order` of a `tour`; `limits`, `guesses` and `progress` as for
-    `best_order`.
+    """Find the best times of one `order` of a `tour`.
 
-    In linear motion, descents begin at the best candidates of a grid of times (`search_grid`).
+    The arguments `limits`, `guesses` and `progress` are described in `best_order`. In linear
+    motion, descents begin at the best candidates of a grid of times (`search_grid`).
     """
     if isinstance(tour, Tour):
         bounded = _bounded(tour, order, limits, guesses)
@@ -260,8 +260,9 @@ def _best_on_grids(
     guesses: Sequence[Floats],
     report: Report,
 ) -> tuple[tuple[int, ...], BestTimes]:
-    """Find the best of some `orders` and its times, from candidates of a grid before the latest
-    time of `bounded`.
+    """Find the best of some `orders` and its times, from candidates on grids.
+
+    The grids end at the latest time of `bounded`.
     """
     grids = [search_grid(tour, bounded, order) for order in orders]
     candidates = [candidate for grid in grids for candidate in grid.candidates]
@@ -292,11 +293,10 @@ def _best_on_grids(
 def _bounded(
     tour: Tour, order: Sequence[int], limits: TimeLimits, guesses: Sequence[Floats]
 ) -> TimeLimits:
-    """Return limits with a latest time: without one, a time after which the price of time alone
-    costs more.
+    """Return limits with a latest time.
 
-    The objective of any order bounds that time. It is sought in doubled intervals up to eight times
-    the last guess.
+    Without one, it is the time after which the price of time alone costs more. The objective of any
+    order bounds that time. It is sought in doubled intervals up to eight times the last guess.
 
     Raises
     ------

@@ -70,20 +70,20 @@ class Path(ABC):
 
     @abstractmethod
     def breaks(self) -> Floats:
-        """Return times, s, not decreasing, between which the control is smooth and turns by about a
-        radian.
-        """
+        """Return times, s, not decreasing; the control turns by about a radian between them."""
 
     @property
     def jumps(self) -> Floats:
-        """Costate before minus costate after, shape (N, 6): dI / d(target's state); zero in the
-        velocity of a flyby.
+        """Costate before minus costate after, shape (N, 6): dI / d(target's state).
+
+        It is zero in the velocity of a flyby.
         """
         return self.costate_before - self.costate_after
 
     def costate(self, time_s: Floats) -> Floats:
-        """Return lambda (m/s^3, m/s^2), shape (k, 6), at k times: after the jump at a node, zero
-        during a stay.
+        """Return lambda (m/s^3, m/s^2), shape (k, 6), at k times.
+
+        At a node it is the value after the jump, and it is zero during a stay.
         """
         return self.along(time_s)[1]
 
@@ -103,9 +103,7 @@ class LinearPath(Path):
     motion: LinearMotion
 
     def breaks(self) -> Floats:
-        """Return times, s, not decreasing, between which the control is smooth and turns by about a
-        radian.
-        """
+        """Return times, s, not decreasing; the control turns by about a radian between them."""
         legs = zip(self.starts_s, self.nodes.arrive_s, strict=True)
         return np.concatenate([self.motion.breaks(float(start), float(end)) for start, end in legs])
 
@@ -138,9 +136,7 @@ class LinearPath(Path):
         return states, costates
 
     def _segment_of(self, time_s: Floats) -> tuple[Integers, Flags]:
-        """The segment of each time, and whether the chaser is in motion to its end rather than
-        staying there.
-        """
+        """Return the segment of each time, and whether the chaser moves in it or stays."""
         which = np.searchsorted(self.nodes.leave_s, time_s, side="right")
         last = len(self.nodes.leave_s) - 1
         ended = (which > last) & (time_s <= self.nodes.arrive_s[last])
@@ -206,11 +202,10 @@ def solve_segments(
 
 
 def _velocities(effort: Floats, ahead: Floats, behind: Floats, free: Flags) -> Floats:
-    """Minimise sum |effort_k + ahead_k v_k - behind_k v_(k-1)|^2 over velocities v_k that are free;
-    others are zero.
+    """Minimise sum |effort_k + ahead_k v_k - behind_k v_(k-1)|^2 over the free velocities v_k.
 
-    The normal equations have 3 x 3 blocks on three diagonals: a banded matrix, shape (6, 3 N), of
-    the lower diagonals.
+    The other velocities are zero. The normal equations have 3 x 3 blocks on three diagonals: a
+    banded matrix, shape (6, 3 N), of the lower diagonals.
     """
     diagonal = np.einsum("kra,krb->kab", ahead, ahead)
     diagonal[:-1] += np.einsum("kra,krb->kab", behind[1:], behind[1:])
@@ -232,8 +227,9 @@ def _velocities(effort: Floats, ahead: Floats, behind: Floats, free: Flags) -> F
 def _carried(
     motion: LinearMotion, grid: Floats, start: Floats, costate_end: Floats
 ) -> tuple[Floats, Floats]:
-    """States and costates at the inner times of a grid, from the state at its start and the costate
-    at its end.
+    """Return states and costates at the inner times of a grid.
+
+    They follow from the state at its start and the costate at its end.
     """
     segment = motion.segment(grid[:-1], grid[1:])
     count = len(grid) - 2
@@ -251,8 +247,9 @@ def _carried(
 
 
 def check_times(start_s: float, arrive_s: Floats, leave_s: Floats) -> None:
-    """Raise `ValueError` unless the times of the start, of arrivals and of departures are finite
-    and increase.
+    """Raise `ValueError` unless all times are finite and increase.
+
+    These are the times of the start, of the arrivals and of the departures.
     """
     if not (np.isfinite(start_s) and np.isfinite(arrive_s).all() and np.isfinite(leave_s).all()):
         raise ValueError("a time is not finite")
@@ -273,12 +270,12 @@ def check_times(start_s: float, arrive_s: Floats, leave_s: Floats) -> None:
 def time_gradient(
     nodes: Nodes, arrive: Floats, before: Floats, after: Floats, max_m_s2: float = np.inf
 ) -> Floats:
-    """dI/dt, shape (N,), from the chaser's states at the nodes and its costates before and after
-    them, shapes (N, 6).
+    """Return dI/dt, shape (N,), from states and costates at the nodes.
 
-    D'(V_i - V) at a flyby. H(t+) - H(t-) + (lambda- - lambda+)' x_i' at a rendezvous: as the target
-    coasts in the dynamics of the chaser, this is the power lambda_V' u - 1/2 |u|^2, after minus
-    before; 1/2 |u|^2 below the bound.
+    The states of the chaser and its costates before and after the nodes have shape (N, 6). D'(V_i -
+    V) at a flyby. H(t+) - H(t-) + (lambda- - lambda+)' x_i' at a rendezvous: as the target coasts
+    in the dynamics of the chaser, this is the power lambda_V' u - 1/2 |u|^2, after minus before;
+    1/2 |u|^2 below the bound.
     """
     flyby = ((before - after)[:, :3] * (nodes.arrive[:, 3:] - arrive[:, 3:])).sum(axis=1)
     sizes_before, sizes_after = (

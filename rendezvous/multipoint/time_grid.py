@@ -1,6 +1,4 @@
-"""Orders and times of visits, both together, on a grid of times: dynamic programming over sets of
-visited targets.
-"""
+"""Orders and times of visits on a grid of times: dynamic programming over sets of targets."""
 
 from __future__ import annotations
 
@@ -49,9 +47,7 @@ _NONE = -2
 
 
 class Candidate(NamedTuple):
-    """An order and times of its visits, s, whose objective, m^2/s^3, is the lowest among those near
-    it on the grid.
-    """
+    """An order and times, s, whose objective, m^2/s^3, is the lowest near them on the grid."""
 
     order: tuple[int, ...]
     time_s: Floats
@@ -66,9 +62,7 @@ class GridSearch(NamedTuple):
 
 
 class _Departure(NamedTuple):
-    """Legs that leave the last of a set of visited targets, and the states of all bodies at their
-    ends.
-    """
+    """Legs from the last of a set of visited targets, and states of all bodies at their ends."""
 
     legs: Legs
     states: Floats
@@ -160,8 +154,9 @@ class _TimeGrid:
         return comb(self._count, visits) * visits * max(visits - 1, 1)
 
     def _most_times(self) -> int:
-        """Return the largest number of times, with `MAX_TRIPLES` sequences of three times; two
-        visits have none.
+        """Return the largest number of times with at most `MAX_TRIPLES` sequences of three times.
+
+        Two visits have no such sequences.
         """
         passes = sum(
             self._pairs(visits) * (self._ranks if visits > 3 else 1)
@@ -184,9 +179,7 @@ class _TimeGrid:
         return CostToCome(cost, np.zeros((1, size, 3)), np.zeros((1, size, 3, 3)), back)
 
     def _leave_s(self, visited: int) -> float:
-        """Return the first time at which the chaser can leave the last of a set of visited
-        targets.
-        """
+        """Return the earliest time at which the chaser leaves the last of a set of targets."""
         stays = sum(
             float(stay) for target, stay in enumerate(self._tour.dwell_s) if visited >> target & 1
         )
@@ -197,9 +190,7 @@ class _TimeGrid:
         return self._leave_s(visited) + self._min_gap_s + self._steps_s
 
     def _departure(self, visited: int) -> _Departure:
-        """Return what the visits after a set of visited targets need; sets with equal times share
-        it.
-        """
+        """Return legs and states for visits after a set; stored for sets with equal times."""
         leave_s = self._leave_s(visited)
         if leave_s not in self._departures:
             self._departures[leave_s] = self._departure_at(
@@ -208,8 +199,9 @@ class _TimeGrid:
         return self._departures[leave_s]
 
     def _departure_at(self, leave: Floats, arrive: Floats) -> _Departure:
-        """Return the legs between times, and the states at their ends; long ones of a time-varying
-        motion are sums.
+        """Return the legs between times, and the states at their ends.
+
+        Long legs of a time-varying motion are composed of short ones.
         """
         motion = self._tour.motion
         size = len(leave)
@@ -280,9 +272,7 @@ class _TimeGrid:
         return visits
 
     def _candidates(self, complete: int, ends: dict[int, CostToCome]) -> Iterator[Candidate]:
-        """Yield the visits of all targets that are in time, and cost no more than those near
-        them.
-        """
+        """Yield visits of all targets in time that cost no more than their neighbours."""
         start_s = self._tour.start_s
         for last, visits in ends.items():
             arrive_s = self._arrive_s(complete & ~(1 << last))
@@ -293,11 +283,10 @@ class _TimeGrid:
                 yield Candidate(order, times, float(cost[row, at]))
 
     def _lowest(self, cost: Floats, back: Shorts) -> Flags:
-        """Return whether costs are finite and not above those near them; see `extend` for the
-        shapes.
+        """Return whether costs are finite and not above their neighbours' costs.
 
-        Near are those of neighbouring times whose ways come from the same target, at times that are
-        not far apart.
+        The shapes are described in `CostToCome`. Near are those of neighbouring times whose ways
+        come from the same target, at times that are not far apart.
         """
         ranks = min(self._ranks, len(cost))
         size = cost.shape[1]
@@ -326,9 +315,7 @@ class _TimeGrid:
         return lowest.reshape(-1, size)
 
     def _way(self, visited: int, last: int, row: int, at: int) -> tuple[tuple[int, ...], Floats]:
-        """Return the order and the times of the visits of a set of targets that end in a row and at
-        a time.
-        """
+        """Return order and times of visits of a set of targets that end in a row at a time."""
         order: list[int] = []
         times: list[float] = []
         while last != START:

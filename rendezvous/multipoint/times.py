@@ -90,9 +90,7 @@ class TimeLimits:
 
 
 class Grid(NamedTuple):
-    """Equally spaced times of the first visit, and of later ones with the same gaps and stays
-    before them.
-    """
+    """Equally spaced times of the first visit; later visits have the same gaps and stays before."""
 
     times: int
     until_s: float
@@ -133,9 +131,7 @@ class BestTimes:
 
 @dataclass(frozen=True, eq=False)
 class _Trial:
-    """Gaps, the path at their times, its objective and the slope of the objective along the
-    gaps.
-    """
+    """Gaps, the path at their times, and its objective with its slope along the gaps."""
 
     gaps: Floats
     path: Path
@@ -153,9 +149,7 @@ class _StoppedError(Exception):
 
 @dataclass
 class _Trials:
-    """The objective as a function of gaps, with the limits of the gaps; it counts its
-    evaluations.
-    """
+    """The objective as a function of gaps, with their limits and a count of evaluations."""
 
     fly: FlyAt
     shifts_s: Floats
@@ -315,8 +309,9 @@ def _unsettled(trials: _Trials, best: _Trial) -> float:
 
 
 def room_s(start_s: float, dwell_s: Floats, limits: TimeLimits) -> float:
-    """Return the time for travel, s, infinite without a latest time; raise `NoRoomError` if the
-    visits do not fit.
+    """Return the time for travel, s; infinite without a latest time.
+
+    Raise `NoRoomError` if the visits do not fit.
     """
     if limits.latest_s is None:
         return float(np.inf)
@@ -334,8 +329,9 @@ def room_s(start_s: float, dwell_s: Floats, limits: TimeLimits) -> float:
 
 
 def _spread(count: int, scale: float, minimum: float, bounded: bool, most: int) -> list[Floats]:
-    """Return initial gaps: even, rising and falling, over all the time and over half of it, and a
-    Halton sequence.
+    """Return initial gaps: even, rising and falling ones, then a Halton sequence.
+
+    The shapes are stretched over all the time and over half of it.
     """
     rising = np.arange(1.0, count + 1.0)
     lengths = (1.0, 0.5) if bounded else (0.5, 1.0, 2.0, 4.0, 8.0)
@@ -352,11 +348,10 @@ def _spread(count: int, scale: float, minimum: float, bounded: bool, most: int) 
 
 
 def _valleys(starts: Sequence[_Trial], most: int) -> list[_Trial]:
-    """Return one start of each valley, the cheapest first: those that cost no more than the ones
-    nearest to them.
+    """Return one start of each valley, the cheapest first.
 
-    Toern and Viitanen, "Topographical global optimization using pre-sampled points", J. Global
-    Optim. 5 (1994) 267-276.
+    A start of a valley costs no more than its nearest neighbours. Toern and Viitanen,
+    "Topographical global optimization using pre-sampled points", J. Global Optim. 5 (1994) 267-276.
     """
     ranked = sorted(starts, key=lambda trial: trial.objective)
     gaps = np.stack([trial.gaps for trial in ranked])
@@ -370,8 +365,9 @@ def _valleys(starts: Sequence[_Trial], most: int) -> list[_Trial]:
 def _descend(
     trials: _Trials, start: _Trial, scale: float | Floats, tolerance: float, enough: float
 ) -> _Trial:
-    """Minimise from a start, in gaps over `scale`; stop below `enough`, or after a few points
-    without a path.
+    """Minimise from a start, in gaps over `scale`.
+
+    It stops below `enough`, or after a few points without a path.
     """
     if start.objective < enough:
         return start

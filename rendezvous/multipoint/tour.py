@@ -47,8 +47,9 @@ class TourTarget:
 
 
 class Visits(ABC):
-    """Moving targets and the start (`start_s`, `start_state`) of a chaser that visits them; all
-    move in one dynamics.
+    """Moving targets, and the start of a chaser that visits them, in one dynamics.
+
+    The chaser starts in `start_state` at `start_s`.
 
     Raises
     ------
@@ -77,15 +78,16 @@ class Visits(ABC):
 
     @abstractmethod
     def flyer(self, order: Sequence[int]) -> Callable[[Floats], Path]:
-        """Return `fly` for one `order` as a function of N times, which remembers what helps it to
-        find paths.
+        """Return `fly` for one `order` as a function of N times.
+
+        The function may store the last paths, to find the next ones faster.
         """
 
     def fly(self, order: Sequence[int], time_s: ArrayLike) -> Path:
-        """Return the path of minimum energy that reaches targets in an `order`, some or all, each
-        once, at N times.
+        """Return the path of minimum energy that reaches targets in an `order` at N times.
 
-        `ValueError` is raised if times do not increase; other errors are those of `flyer`.
+        Some targets or all are visited, each once. `ValueError` is raised if times do not increase;
+        other errors are those of `flyer`.
         """
         return self.flyer(order)(np.asarray(time_s, dtype=np.float64))
 

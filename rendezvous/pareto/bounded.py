@@ -57,16 +57,16 @@ is below 1e-6.
 
 
 def needed_bound(encounter: Encounter) -> NeededBound:
-    """Return the smallest bound with which any meeting of an `encounter` is possible; to 1e-6 from
-    below.
+    """Return the smallest bound with which any meeting of an `encounter` is possible.
+
+    It is at most 1e-6 of it too low.
     """
     least = least_bound([_arc(encounter, craft, 1.0) for craft in encounter.craft])
     return NeededBound(least.value_m_s2, tuple(np.flatnonzero(least.shares > _NEEDS_IT).tolist()))
 
 
 def bound_encounter(solution: EncounterSolution, max_m_s2: float) -> BoundedEncounter:
-    """Return the meeting of minimum group loss of a solved encounter with |u| <= `max_m_s2` for
-    every craft.
+    """Return the meeting of minimum group loss with |u| <= `max_m_s2` for every craft.
 
     A craft of weight 0 does not count in the choice of the meeting, but must reach it.
 

@@ -94,9 +94,7 @@ class Encounter:
 
     @property
     def common(self) -> int:
-        """Number of components of the terminal state that the craft have in common: 6, or the 3 of
-        the position.
-        """
+        """Number of common components of the terminal states: 6, or 3 (the position)."""
         return 6 if self.meeting is Meeting.RENDEZVOUS else 3
 
     @property

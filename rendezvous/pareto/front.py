@@ -30,8 +30,7 @@ def pareto_set(solution: EncounterSolution, weights: Floats) -> Floats:
 
 
 def simplex_weights(craft: int, count: int) -> Floats:
-    """Return about `count` rows of weights, shape (k, craft), spread evenly over all shares of
-    `craft` craft.
+    """Return about `count` rows of weights, shape (k, craft), spread evenly over all shares.
 
     Those of single craft are included. A lattice up to three craft, beyond that a low-discrepancy
     sequence.
@@ -51,8 +50,6 @@ def simplex_weights(craft: int, count: int) -> Floats:
 
 
 def distances(solution: EncounterSolution) -> Floats:
-    """Return d_ij = |p_i* - p_j*|_M of the ideals of a `solution` with one M, m/s^1.5, shape (n,
-    n).
-    """
+    """Return d_ij = |p_i* - p_j*|_M of the ideals of a `solution` with one M, m/s^1.5, (n, n)."""
     scaled = solution.ideals @ solution.costs[0].root.T
     return np.asarray(np.linalg.norm(scaled[:, None] - scaled, axis=-1))

@@ -18,11 +18,11 @@ ideal.
 
 
 def min_sum_of_costs(solution: EncounterSolution) -> Floats:
-    """Return the free values, shape (f,), that minimise sum w_i J_i of a `solution`: costs like
-    impulses.
+    """Return the free values, shape (f,), that minimise sum w_i J_i of a `solution`.
 
-    A sum of norms of affine functions, convex: Newton's method in a trust region. It begins at the
-    best of the mean of the ideals and the ideals that cost nothing, where the norm has a corner.
+    The J_i are costs like impulses. A sum of norms of affine functions, convex: Newton's method in
+    a trust region. It begins at the best of the mean of the ideals and the ideals that cost
+    nothing, where the norm has a corner.
     """
     roots, back, middle, ideals, size, weights = _scaled(solution)
     if size == 0.0:
@@ -55,8 +55,7 @@ def min_sum_of_costs(solution: EncounterSolution) -> Floats:
 
 
 def minimax_excess(solution: EncounterSolution) -> Floats:
-    """Return the free values, shape (f,), that minimise the maximum weighted excess of a
-    `solution`.
+    """Return free values, shape (f,), that minimise the maximum weighted excess of a `solution`.
 
     With one M, the centre of the smallest enclosing ball. Sequential quadratic programming on (p,
     t), minimum t with w_i e_i(p) <= t, then Newton's method on the conditions of the active craft.
@@ -103,10 +102,10 @@ def minimax_excess(solution: EncounterSolution) -> Floats:
 
 
 def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
-    """Return the Pareto-optimal free values of a `solution` nearest to `preferred` ones, shape
-    (f,), in the norm of M.
+    """Return the Pareto-optimal free values of a `solution` nearest to `preferred` ones.
 
-    An exact projection onto the convex hull of the ideals.
+    Both have shape (f,), and the distance is the norm of M. An exact projection onto the convex
+    hull of the ideals.
 
     Raises
     ------

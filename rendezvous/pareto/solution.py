@@ -1,6 +1,4 @@
-"""The solution in closed form: every craft's cost as a quadratic form of the free terminal values,
-and its flight.
-"""
+"""Solution in closed form: costs as quadratic forms of the free terminal values, and flights."""
 
 from __future__ import annotations
 
@@ -16,8 +14,9 @@ from infoset.rendezvous.pareto.encounter import Craft, Encounter
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """The minimum-energy flight of one craft from its start to the meeting, where its `costate`,
-    shape (6,), is.
+    """The minimum-energy flight of one craft from its start to the meeting.
+
+    `costate`, shape (6,), is the costate at the meeting.
     """
 
     craft: Craft
@@ -29,8 +28,9 @@ class Plan:
         return self._costate_at(np.asarray(time_s, dtype=np.float64))[..., 3:]
 
     def state(self, time_s: ArrayLike) -> Floats:
-        """Return x(t) = Phi x0 + G(t, t0) Phi(T, t)' lambda, m and m/s, shape (..., 6): (2.5) of
-        the paper.
+        """Return x(t) = Phi x0 + G(t, t0) Phi(T, t)' lambda, m and m/s, shape (..., 6).
+
+        This is (2.5) of the paper.
         """
         times = np.asarray(time_s, dtype=np.float64)
         segment = self.craft.motion.segment(np.full(times.shape, self.craft.start_s), times)
@@ -42,15 +42,14 @@ class Plan:
         return np.linspace(self.craft.start_s, self.meeting_s, count)
 
     def effects(self, time_s: Floats) -> Floats:
-        """Return Phi(T, t) B(t), shape (k, 6, 3), the effect of a unit control for a second on the
-        terminal state.
+        """Return Phi(T, t) B(t), shape (k, 6, 3).
+
+        It is the effect of a unit control for a second on the terminal state.
         """
         return self._to_meeting(time_s)[:, :, 3:]
 
     def breaks(self) -> Floats:
-        """Return times from start to meeting between which the motion turns by about a radian at
-        most, s.
-        """
+        """Return times, s, between which the motion turns by at most about a radian."""
         return self.craft.motion.breaks(self.craft.start_s, self.meeting_s)
 
     def _costate_at(self, times: Floats) -> Floats:
@@ -121,17 +120,16 @@ class EncounterSolution:
         return all(np.allclose(cost.matrix, first, rtol=1e-12, atol=0.0) for cost in self.costs[1:])
 
     def meeting_state(self, point: Floats | None = None) -> Floats:
-        """Return the terminal state, shape (6,), of a `point`, shape (f,); of an intercept only the
-        position.
+        """Return the terminal state, shape (6,), of a `point`, shape (f,).
+
+        Only the position is common to all craft at an intercept.
         """
         return np.asarray(
             self.encounter.base + self.encounter.opening @ (self.point if point is None else point)
         )
 
     def excess(self, point: Floats | None = None) -> Floats:
-        """Return J_i^2 - J_i*^2 of all craft, m^2/s^3, shape (..., n), at a `point`, shape (...,
-        f).
-        """
+        """Return J_i^2 - J_i*^2 of all craft, m^2/s^3, shape (..., n), at a `point` (..., f)."""
         point = self.point if point is None else point
         return np.stack([cost.excess(point) for cost in self.costs], axis=-1)
 
@@ -142,8 +140,9 @@ class EncounterSolution:
         )
 
     def group_loss(self, point: Floats | None = None) -> Floats:
-        """Return the weighted sum of excesses, the norm (1.7), m^2/s^3, shape (...), at a `point`,
-        shape (..., f).
+        """Return the norm (1.7), m^2/s^3, shape (...), at a `point`, shape (..., f).
+
+        It is the weighted sum of the excesses.
         """
         return np.asarray(self.excess(point) @ self.encounter.weights)
 
@@ -189,11 +188,10 @@ def solve_encounter(encounter: Encounter) -> EncounterSolution:
 
 
 def weighted_point(costs: Sequence[CraftCost], weights: ArrayLike) -> Floats:
-    """Return the free values, shape (f,), that minimise the sum of excesses with `weights`, not
-    negative, shape (n,).
+    """Return the free values, shape (f,), that minimise the weighted sum of excesses.
 
-    (sum w_i M_i)^-1 sum w_i M_i p_i*, as a least-squares problem of the roots of M_i of the
-    `costs`.
+    The `weights`, shape (n,), are not negative. The values are (sum w_i M_i)^-1 sum w_i M_i p_i*,
+    as a least-squares problem of the roots of M_i of the `costs`.
     """
     roots = np.sqrt(np.asarray(weights, dtype=np.float64))
     rows = np.concatenate([root * cost.root for root, cost in zip(roots, costs, strict=True)])

@@ -9,9 +9,7 @@ from infoset.rendezvous.piecewise import integral_of_size, max_control
 
 
 class Flight(Protocol):
-    """A flight with a control u, m/s^2, shape (k, 3) at k times, that is smooth between `breaks`,
-    s.
-    """
+    """A flight with a control u, m/s^2, shape (k, 3) at k times, smooth between `breaks`, s."""
 
     def control(self, time_s: Floats) -> Floats:
         """Return u."""

@@ -1,5 +1,4 @@
-"""One branch of the game's extremals: the distance l that the evader keeps at a time T, followed as
-T grows.
+"""Branch of extremals: the distance l that the evader keeps at a time T, followed as T grows.
 
 At T -> 0 nu is the line of sight and l the distance, so no guess is needed. Capture is where l has
 fallen to the capture radius: l above it before then excludes an earlier capture on this branch.
@@ -42,8 +41,10 @@ class Ending(Enum):
 
 @dataclass(frozen=True)
 class Branch:
-    """A branch of extremals, `nodes` in ascending order of duration; `work` is the radians of
-    extremals propagated.
+    """A branch of extremals.
+
+    The `nodes` are in ascending order of duration, and `work` is the radians of extremals
+    propagated.
     """
 
     nodes: tuple[Node, ...]
@@ -59,8 +60,7 @@ class Branch:
 def follow(
     pair: Pair, first: Node, radius: float, latest: float, max_work: float = MAX_WORK
 ) -> Branch:
-    """Follow a branch from its first extremal, as the duration grows, to the capture, to `latest`,
-    or to a fold.
+    """Follow a branch as the duration grows, to the capture, to `latest`, or to a fold.
 
     A `radius` of minus infinity follows the branch beyond the capture. `max_work` limits the
     radians of extremals propagated: the same limit on every machine. A capture that ends the branch
@@ -129,8 +129,9 @@ def polish(pair: Pair, guess: Floats, duration: float, radius: float, latest: fl
 
 
 def first_crossing(before: Node, after: Node, radius: float) -> float | None:
-    """Return the time at which l first falls to a radius between two extremals, by the cubic
-    through both, or None.
+    """Return the time at which l first falls to a radius between two extremals, or None.
+
+    It is computed from the cubic through both.
     """
     step = after.duration - before.duration
     # Between its ends a cubic falls below the lower one by at most 4/27 of its slopes times the
@@ -158,9 +159,7 @@ def first_crossing(before: Node, after: Node, radius: float) -> float | None:
 
 
 def _predicted(nodes: list[Node], duration: float) -> Floats:
-    """Extrapolate (pursuer, evader, nu) by the cubic through the last two extremals with their
-    slopes.
-    """
+    """Extrapolate (pursuer, evader, nu) by the cubic through the last two extremals and slopes."""
     node = nodes[-1]
     step = duration - node.duration
     guess = node.vector + step * node.slope

@@ -1,5 +1,6 @@
-"""The 3 x 3 system that couples the extremals of both sides, and Newton's step of both: compiled.
-Nondimensional.
+"""Compiled 3 x 3 system that couples the extremals of both sides, and Newton's step of both.
+
+All values are nondimensional.
 """
 
 from __future__ import annotations
@@ -59,8 +60,9 @@ def across(nu: Floats) -> Floats:
 def couple(
     pursuer: Response, evader: Response, plane: Floats, nu: Floats, distance: float, time_free: bool
 ) -> Coupling:
-    """Return the coupling of two responses at a guess of `nu`, with the directions `plane` across
-    it, and of l.
+    """Return the coupling of two responses at a guess of `nu` and l.
+
+    The rows of `plane` are the directions across nu.
     """
     outer = np.empty((3, 3))
     inverse = np.empty((3, 3))
@@ -117,8 +119,9 @@ def newton_step(
     state: Floats,
     time_free: bool,
 ) -> Step:
-    """Return Newton's step for corrections `rho`, shape (2, 6), of the end states of a guess, shape
-    (17,).
+    """Return Newton's step of a guess, shape (17,), of (pursuer, evader, nu, T, l).
+
+    `rho`, shape (2, 6), are the corrections of the end states.
     """
     gap = np.empty(3)
     turn = np.zeros(3)

@@ -266,9 +266,7 @@ def _product(m: _Symmetric, x: _Vector) -> _Vector:
 
 @inlined
 def _add_product(start: _Vector, m: _Symmetric, x: _Vector) -> _Vector:
-    """Return `start` plus the product of a symmetric matrix, as its upper triangle, and a
-    vector.
-    """
+    """Return a vector plus a symmetric matrix, as its upper triangle, times a vector."""
     m00, m01, m02, m11, m12, m22 = m
     return (
         start[0] + m00 * x[0] + m01 * x[1] + m02 * x[2],

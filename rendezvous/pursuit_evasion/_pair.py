@@ -1,5 +1,4 @@
-"""The extremals of one side at a time, and of both together by Newton's method: at a duration T, or
-at a distance l.
+"""Extremals of one side, and of both sides by Newton's method at a duration T or a distance l.
 
 At each duration T both sides reach the maximum distance along nu, and r_E - r_P = l nu. At l = 0
 these are the terminal conditions of Wang's slides ("Optimal control"): r_P = r_E, lambda_rP +
@@ -43,8 +42,9 @@ _FARTHEST, _NEAR, _FRACTION, _NEAR_ENOUGH = 0.7, 1e-2, 0.2, 1e-3
 
 @dataclass(frozen=True)
 class ExtremalCraft:
-    """One side of a game, which chooses its direction of thrust; all nondimensional, `start` of
-    shape (6,).
+    """One side of a game, which chooses its direction of thrust.
+
+    All values are nondimensional, and `start` has shape (6,).
     """
 
     start: Floats
@@ -71,9 +71,7 @@ class ExtremalCraft:
     def correct(
         self, response: Response, end_state: Floats, nu: Floats, duration: float, tolerance: float
     ) -> Floats | None:
-        """Newton's correction of another guess, shape (6,), with the derivatives of an earlier one
-        near by.
-        """
+        """Return Newton's correction of a guess, (6,), with the derivatives of another."""
         y = end_of(end_state, nu)
         is_propagated = flow_back(
             y, NO_VARIATIONS, self.kernel_craft(duration), 0.0, duration, tolerance
@@ -81,8 +79,9 @@ class ExtremalCraft:
         return response.inverse @ (self.start - y[:6]) if is_propagated else None
 
     def ballistic(self, duration: float, nu: Floats) -> Floats:
-        """Return a guess of the end state after a short time, shape (6,): gravity and thrust are
-        those at the start.
+        """Return a guess of the end state after a short time, shape (6,).
+
+        Gravity and thrust are constant, as at the start.
         """
         y = np.concatenate([self.start, nu, nu])
         velocity = (
@@ -96,8 +95,9 @@ class ExtremalCraft:
 
 @dataclass(frozen=True)
 class KnownPath:
-    """A side on a known path: `state_at` gives state, shape (6,), and acceleration, shape (3,), at
-    a time.
+    """A side on a known path.
+
+    `state_at` returns state, shape (6,), and acceleration, shape (3,), at a time.
     """
 
     state_at: Callable[[float], tuple[Floats, Floats]]
@@ -155,9 +155,7 @@ class Node:
 
     @property
     def is_saddle(self) -> bool:
-        """Whether no small change of nu increases the distance of the evader, and both extremals
-        are maxima.
-        """
+        """Whether no small change of nu helps the evader, and both extremals are maxima."""
         return self.regular and bool(self.curvature[0] + self.distance > 0.0)
 
     @property
@@ -187,8 +185,9 @@ class _Linear:
     coupling: Coupling
 
     def step(self, rho: Floats, state: Floats) -> Step:
-        """Newton's step of (pursuer, evader, nu, T, l) for corrections of the two end states, shape
-        (2, 6).
+        """Return Newton's step of (pursuer, evader, nu, T, l).
+
+        `rho`, shape (2, 6), are the corrections of the two end states.
         """
         return newton_step(
             self.pursuer, self.evader, self.plane, self.coupling.inverse, rho, state, self.time_free
@@ -222,9 +221,7 @@ class Pair:
     evader: Side
 
     def is_sound(self, node: Node) -> bool:
-        """Return whether an extremal is a saddle, or a nearest one where the evader cannot
-        choose.
-        """
+        """Return whether it is a saddle, or a nearest extremal if the evader's path is fixed."""
         return node.is_nearest if isinstance(self.evader, KnownPath) else node.is_saddle
 
     def solve(
@@ -239,13 +236,12 @@ class Pair:
         close: float = CLOSE,
         latest: float = math.inf,
     ) -> Node | None:
-        """Return the extremal near a guess, shape (15,), of end states and nu, or None if Newton's
-        method does not converge.
+        """Return the extremal near a guess, shape (15,), of end states and nu.
 
-        If `time_free`, the distance is known and the duration a guess, otherwise the reverse. The
-        propagation has a `tolerance`, that of derivatives `linear_tolerance` if it is larger;
-        `close` is the maximum size of the last correction, and `latest` the longest duration that
-        can be propagated.
+        It is None if Newton's method does not converge. If `time_free`, the distance is known and
+        the duration a guess, otherwise the reverse. The propagation has a `tolerance`, that of
+        derivatives `linear_tolerance` if it is larger; `close` is the maximum size of the last
+        correction, and `latest` the longest duration that can be propagated.
 
         Both sides are propagated with their variations, then several times without, with the same
         derivatives, while each correction is a fraction of the previous one: 0.5 ms and 0.1 ms per
@@ -301,10 +297,10 @@ class Pair:
         return _Linear(p, e, plane, time_free, coupling) if coupling.solvable else None
 
     def begin(self, latest: float, radius: float) -> Node | None:
-        """Return the extremal of a short duration, at most `latest`, from the line of sight as a
-        guess, or None.
+        """Return the extremal of a short duration, at most `latest`, or None.
 
-        Its distance is greater than the capture radius: there is no earlier capture.
+        The guess of nu is the line of sight. Its distance is greater than the capture radius: there
+        is no earlier capture.
         """
         duration = min(_FIRST_DURATION, 0.5 * latest)
         while duration > _MIN_OF_FIRST:

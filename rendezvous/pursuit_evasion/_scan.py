@@ -1,8 +1,8 @@
-"""All directions of the evader at one duration: a search for one that keeps it farther away.
-Nondimensional.
+"""Scan of all directions at one duration for one that keeps the evader farther away.
 
-h(nu) is the distance that a side reaches along nu. The evader keeps the maximum of h_E - h_P over
-all nu: a branch of extremals that is not the maximum is not optimal for it.
+All values are nondimensional. h(nu) is the distance that a side reaches along nu. The evader keeps
+the maximum of h_E - h_P over all nu: a branch of extremals that is not the maximum is not optimal
+for it.
 """
 
 from __future__ import annotations
@@ -41,8 +41,9 @@ class Scan:
 
 @dataclass(frozen=True)
 class End:
-    """The end of an extremal of one side along `nu`, with the directions across it and the linear
-    response.
+    """End of an extremal of one side along `nu`.
+
+    It has the directions across nu and the linear response.
     """
 
     state: Floats
@@ -52,8 +53,7 @@ class End:
 
 
 def scan(pair: Pair, node: Node) -> Scan:
-    """Compute extremals in all directions at the duration of a known extremal, from its direction
-    outward.
+    """Compute extremals in all directions at the duration of a known extremal.
 
     120 directions per side, each from a solved neighbour: at least 0.5 s per revolution. A
     reachable set that is not convex has several extremals per direction. If the end of another
@@ -76,8 +76,7 @@ def scan(pair: Pair, node: Node) -> Scan:
 
 
 def greater(pair: Pair, node: Node) -> Node | None:
-    """Return an extremal of the same duration that keeps the evader farther away; None if none is
-    found.
+    """Return an extremal of the same duration that keeps the evader farther away, or None.
 
     Durations of more than six revolutions are not scanned, because that would take minutes.
     """
@@ -97,9 +96,7 @@ def directions(count: int) -> Floats:
 
 
 def _fan(side: Side, state: Floats, nu: Floats, grid: Floats, duration: float) -> dict[int, End]:
-    """Find the end states of one side for the directions of a grid, which are sorted from nu
-    outward.
-    """
+    """Find the end states of one side for the directions of a grid, sorted from nu outward."""
     first = end_along(side, state, nu, duration)
     solved: dict[int, End] = {}
     if first is None:
@@ -139,8 +136,9 @@ def _turn(side: Side, seed: End, toward: Floats, duration: float) -> End | None:
 
 
 def end_along(side: Side, state: Floats, nu: Floats, duration: float) -> End | None:
-    """Return the end of the extremal of one side along nu, near a guess; None if Newton's method
-    finds none.
+    """Return the end of the extremal of one side along nu, near a guess.
+
+    It is None if Newton's method does not converge.
     """
     plane = across(nu)
     before = np.inf

@@ -1,5 +1,4 @@
-"""Checks that a capture is a saddle point; they share as little as possible with the method of
-solution.
+"""Checks that a capture is a saddle point, as independent as possible of the solution's method.
 
 The Hamiltonian is that of Wang's slides, "Optimal control": H_P + H_E, constant, and one in their
 scale. The other checks are not from there.
@@ -150,8 +149,9 @@ class Certificate:
 
     @property
     def undecided(self) -> tuple[str, ...]:
-        """Return a phrase for each check that was not made or is only partly conclusive: it limits
-        the claim.
+        """Return a phrase for each check that was not made or is only partly conclusive.
+
+        They limit the claim.
         """
         if not self.directions_tried:
             return ("the other directions at the capture were not compared",)
@@ -178,13 +178,12 @@ class Certificate:
 
 
 def certify(solution: CaptureSolution, *, all_directions: bool = False) -> Certificate:
-    """Check the capture of a `solution`; `all_directions` also scans all directions at the capture
-    time.
+    """Check the capture of a `solution`.
 
-    The scan looks for a direction that keeps the evader farther away. Cost: 0.3 s for one
-    revolution, and at least 0.5 s more for the directions. All deviations together take at most
-    twice the work limit of a game; in games of more than six revolutions the last ones may be
-    inconclusive.
+    `all_directions` also scans all directions at the capture time. The scan looks for a direction
+    that keeps the evader farther away. Cost: 0.3 s for one revolution, and at least 0.5 s more for
+    the directions. All deviations together take at most twice the work limit of a game; in games of
+    more than six revolutions the last ones may be inconclusive.
 
     Raises
     ------
@@ -279,8 +278,7 @@ def _followed(
 
 
 def _along(paths: tuple[ExtremalPath, ExtremalPath], node: Node) -> tuple[float, float]:
-    """Return the drift of the Hamiltonian, scaled to be one, and the minimum distance from the
-    planet's centre.
+    """Return the drift of the Hamiltonian, scaled to one, and the minimum distance from the centre.
 
     The costate of the mass is the integral of |p_v| thrust / m^2, by Gauss and Legendre's rule on
     panels.
@@ -311,8 +309,9 @@ def _along(paths: tuple[ExtremalPath, ExtremalPath], node: Node) -> tuple[float,
 
 
 def _integrator_gap(pursuer: ExtremalCraft, evader: ExtremalCraft, node: Node) -> float:
-    """Integrate both forward from their start states and costates by a multistep method, and
-    compare the ends.
+    """Integrate both forward by a multistep method, and return the distance of the ends.
+
+    The initial values are the states and costates at the start.
     """
     gaps = []
     for craft, costate, end in zip(
@@ -332,8 +331,9 @@ def _integrator_gap(pursuer: ExtremalCraft, evader: ExtremalCraft, node: Node) -
 
 
 def _forward_rates(time: float, y: Floats, craft: ExtremalCraft) -> Floats:
-    """State and costate in time; gravity's gradient along p_v by a complex step, not by its
-    formula.
+    """Return the rates of state and costate in time.
+
+    Gravity's gradient along p_v is a complex step, not a formula.
     """
     out = np.empty(12)
     p = y[9:]

@@ -85,8 +85,7 @@ def fly(
     seed: int | np.random.SeedSequence = 0,
     solution: CaptureSolution | None = None,
 ) -> PursuitFlight:
-    """Simulate a pursuer that computes a new plan at regular times, `replan_s` apart, and follows
-    each until the next.
+    """Simulate a pursuer that computes and follows a new plan at times `replan_s` apart.
 
     `steering` is that of the evader; None is optimal against the true state of the pursuer. No
     `observation` observes the evader exactly; otherwise `seed` is that of its errors. `solution` is
@@ -267,8 +266,9 @@ class _Pursuit:
     def _end_in_leg(
         self, pursuer: ExtremalPath, evader: PathNow, spell: float, last: bool
     ) -> PursuitFlight | None:
-        """Return the flight if it ends in the leg: by a capture, or in the last leg at the closest
-        approach.
+        """Return the flight if it ends in the leg, else None.
+
+        It ends by a capture or, in the last leg, at the closest approach.
         """
 
         def distance(time: float) -> float:
@@ -321,8 +321,9 @@ class _Pursuit:
 
 
 def _lasts(craft: ExtremalCraft, dry: float) -> float:
-    """Return how long the propellant lasts; a little less for a craft without dry mass, whose
-    acceleration diverges.
+    """Return the duration of the propellant.
+
+    It is a little less for a craft without dry mass, whose acceleration diverges.
     """
     share = 1.0 if dry > 0.0 else 0.999
     return share * (craft.mass - dry) / craft.flow if craft.flow > 0.0 else np.inf

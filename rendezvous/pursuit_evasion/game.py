@@ -143,8 +143,9 @@ def _need(holds: bool | np.bool_, message: str) -> None:
 
 @dataclass(frozen=True)
 class Units:
-    """Units of a game: the pursuer's semi-major axis and mass at the start, and the time of a
-    radian of a circular orbit of that size.
+    """Units of a game: the pursuer's semi-major axis and mass at the start, and a time.
+
+    The unit of time is a radian of a circular orbit of that size.
     """
 
     length_m: float
@@ -212,8 +213,9 @@ def scaled_game(game: Game, units: Units | None = None) -> ScaledGame:
 
 
 def horizon_s(game: Game) -> float:
-    """Return the longest duration of a game, s: the time until a player's propellant is spent, or
-    that of the game.
+    """Return the longest duration of a game, s.
+
+    It ends when a player's propellant is spent, or at the limit of the game.
     """
     longest = game.longest_s
     if not np.isfinite(longest):

@@ -1,6 +1,4 @@
-"""Paths of the players, extremal or steered by a rule, and the history of a capture for figures and
-tables.
-"""
+"""Paths of the players, extremal or steered, and samples of a capture for figures and tables."""
 
 from __future__ import annotations
 
@@ -46,9 +44,7 @@ class ExtremalPath:
     duration: float
 
     def at(self, time: float) -> Floats:
-        """Return state and costate at a time, shape (12,); the time may be a little beyond the
-        end.
-        """
+        """Return state and costate at a time, shape (12,), which may be a little beyond the end."""
         y = end_of(self.end_state, self.nu)
         self._carry(y, 0.0, self.duration - time)
         return y
@@ -89,8 +85,9 @@ def extremal_paths(
 
 @dataclass(frozen=True)
 class SteeredPath:
-    """The path of a craft that steers by a rule: `solution` gives state and mass, shape (7,), at a
-    time.
+    """The path of a craft that is steered by a rule.
+
+    `solution` returns state and mass, shape (7,), at a time.
     """
 
     craft: ExtremalCraft
@@ -104,8 +101,7 @@ class SteeredPath:
 
 
 def steered_path(craft: ExtremalCraft, direction: Direction, duration: float) -> SteeredPath:
-    """Return the path of a craft that steers by a rule: full thrust along the direction, or none
-    where that is zero.
+    """Return the path of a craft with thrust along a direction, or none where that is zero.
 
     SciPy's DOP853 to 1e-12: some 3 ms a revolution. Raise `PathError` if the direction turns so
     fast that integration takes too long, or the path comes too near the planet's centre.
@@ -168,8 +164,7 @@ class CaptureHistory:
 
 
 def history(solution: CaptureSolution, count: int = 400) -> CaptureHistory:
-    """Sample the capture of a `solution` at `count` equally spaced times, from the start to the
-    end.
+    """Sample the capture of a `solution` at `count` equally spaced times from start to end.
 
     Raises
     ------

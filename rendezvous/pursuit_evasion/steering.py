@@ -29,8 +29,9 @@ class Policy(Enum):
     INWARD = "inward"
 
     def direction(self, _time: float, state: Floats) -> Floats:
-        """Return the direction of thrust, shape (3,), at a `state` of position and velocity in any
-        units.
+        """Return the direction of thrust, shape (3,), at a `state` of position and velocity.
+
+        The state may be in any units.
         """
         sign = -1.0 if self in (Policy.RETROGRADE, Policy.ANTINORMAL, Policy.INWARD) else 1.0
         if self is Policy.COAST:
@@ -44,8 +45,9 @@ class Policy(Enum):
 
 @dataclass(frozen=True)
 class RandomSteering:
-    """Random directions, uniform over the sphere, each constant for `hold_s`; seed and run number
-    determine them.
+    """Random directions, uniform over the sphere, each constant for `hold_s`.
+
+    Seed and run number determine them.
     """
 
     seed: int
