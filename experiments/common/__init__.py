@@ -1,1 +1,1 @@
-"""What all problems share: TOML files, options, screen, output, figures and pages."""
+"""Parts that all problems share: TOML files, options, screen, output, figures and pages."""

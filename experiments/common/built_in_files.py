@@ -15,8 +15,9 @@ SCENARIO = "scenario"
 
 
 class ProblemKind(NamedTuple):
-    """Command of a kind of problem, and the module in `infoset.experiments` and the name of its
-    dataclass.
+    """Command of a kind of problem, and its dataclass.
+
+    `module` is the module in `infoset.experiments` of the dataclass `owner`.
     """
 
     command: str
@@ -69,32 +70,33 @@ def built_in_names(kinds: Collection[str]) -> list[str]:
 
 
 def built_in(name: str, kinds: Collection[str]) -> BuiltIn:
-    """Return the built-in file of a name; `InputError` if there is none, or it has none of these
-    kinds.
+    """Return the built-in file of a name.
+
+    Raise `InputError` if there is none, or it is of another kind.
     """
     file = built_in_files().get(name)
     if file is not None and file.kind not in kinds:
         raise InputError(f"{name}: {taken_by(file.kind, name)}")
-    known = choice(
-        "built-in scenario" if SCENARIO in kinds else "built-in problem",
-        name,
-        built_in_names(kinds),
-    )
+    noun = "scenario" if SCENARIO in kinds else "problem"
+    known = choice(f"built-in {noun}", name, built_in_names(kinds))
     return built_in_files()[known]
 
 
 def kind_of(document: Mapping[str, Any]) -> str | None:
-    """Return the kind of a parsed file: a kind of problem, or `SCENARIO` for tables of a scenario;
-    None for others.
+    """Return the kind of a parsed file: a kind of problem, or `SCENARIO`.
+
+    None for other files. A scenario is known by its tables.
     """
     kind = document.get("kind")
     if isinstance(kind, str) and kind in PROBLEMS:
         return kind
-    return SCENARIO if kind is None and {"uncertainty", "dispersion"} <= document.keys() else None
+    if kind is None and {"uncertainty", "dispersion"} <= document.keys():
+        return SCENARIO
+    return None
 
 
 def taken_by(kind: str, file: str = "FILE") -> str:
-    """Return what a file of a kind is, and the command that takes it."""
+    """Return the kind of a file in words, and the command that takes it."""
     if kind == SCENARIO:
         return f"this is a scenario; use infoset engage {file}"
     return f"this is a problem of kind {kind}; use infoset {PROBLEMS[kind].command} {file}"

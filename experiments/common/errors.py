@@ -9,11 +9,13 @@ from collections.abc import Iterator, Sequence
 LONGEST_SHOWN = 60
 """Maximum length of a value in a message."""
 _LONGEST_WORD = 100
+"""Number of letters of a word that are compared: the time grows as their square."""
 
 
 def on_a_screen(message: str) -> str:
-    """Return a message with a question mark for each unprintable character: parts may come from a
-    hostile file.
+    """Return a message with a question mark for each unprintable character.
+
+    Parts of a message may come from a hostile file.
     """
     return "".join(letter if letter.isprintable() or letter == "\n" else "?" for letter in message)
 
@@ -29,8 +31,9 @@ class InputError(Exception):
 def input_errors(
     source: str, remedy: str = "", kind: type[Exception] = ValueError
 ) -> Iterator[None]:
-    """Turn an error into an `InputError` with the name of the file, option or problem, and a remedy
-    at its end.
+    """Turn an error into an `InputError`.
+
+    Its message begins with the name of the file, option or problem, and ends with a remedy.
     """
     try:
         yield
@@ -43,17 +46,22 @@ def shown(value: object) -> str:
     if isinstance(value, dict):
         return "a table"
     if isinstance(value, list):
-        text = f"[{', '.join('[...]' if isinstance(item, list) else shown(item) for item in value[:LONGEST_SHOWN])}]"
+        items = [
+            "[...]" if isinstance(item, list) else shown(item) for item in value[:LONGEST_SHOWN]
+        ]
+        text = f"[{', '.join(items)}]"
     elif isinstance(value, str):
-        text = (
-            '"' + "".join(c if c.isprintable() else "?" for c in value[: LONGEST_SHOWN + 1]) + '"'
-        )
+        letters = (c if c.isprintable() else "?" for c in value[: LONGEST_SHOWN + 1])
+        text = f'"{"".join(letters)}"'
     else:
         text = str(value).lower().replace("infinity", "inf")
-    return text if len(text) <= LONGEST_SHOWN else text[: LONGEST_SHOWN - 3] + "..."
+
+    if len(text) > LONGEST_SHOWN:
+        return text[: LONGEST_SHOWN - 3] + "..."
+    return text
 
 
 def nearest(word: str, known: Sequence[str]) -> str | None:
     """Return the most similar known word, or None if none is similar."""
     similar = difflib.get_close_matches(word[:_LONGEST_WORD], known, n=1, cutoff=0.6)
-    return similar[0] if similar else None
+    return next(iter(similar), None)

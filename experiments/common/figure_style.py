@@ -1,5 +1,6 @@
-"""The style of all figures: the sheet `infoset.mplstyle`, and colours and lines that differ in grey
-too.
+"""The style of all figures: the sheet `infoset.mplstyle`, colours and lines.
+
+Colours and lines differ in grey, too.
 """
 
 from __future__ import annotations
@@ -103,27 +104,27 @@ def first_panels(grid: NDArray[Any], count: int) -> list[Axes]:
 
 
 def label_axes(axes: Any, titles: Sequence[str]) -> None:
-    """Write the titles of two or three axes, with a few ticks each and room around what is
-    drawn.
-    """
+    """Write the titles of two or three axes, with few ticks and room around the drawing."""
+    in_space = len(titles) > 2
     for name, title in zip("xyz", titles, strict=False):
-        getattr(axes, f"set_{name}label")(title, labelpad=-2.0 if len(titles) > 2 else None)
+        getattr(axes, f"set_{name}label")(title, labelpad=-2.0 if in_space else None)
     axes.locator_params(nbins=5)
     axes.margins(0.08)
-    if len(titles) > 2:
+    if in_space:
         axes.tick_params(pad=-2.0)
 
 
 def letters(panels: Iterable[Axes], titles: Sequence[str] = (), **look: Any) -> None:
-    """Write (a), (b) ... above axes, with their titles if there are any; no letter above a single
-    one.
+    """Write (a), (b) ... above axes, with their titles if there are any.
 
-    `look` are arguments of `matplotlib.text.Text`.
+    A single panel has no letter. `look` are arguments of `matplotlib.text.Text`.
     """
     every = [*panels]
     for number, axes in enumerate(every):
-        letter = [f"({chr(ord('a') + number)})"] if len(every) > 1 else []
-        axes.set_title(" ".join([*letter, *titles[number : number + 1]]), loc="left", **look)
+        words = [*titles[number : number + 1]]
+        if len(every) > 1:
+            words.insert(0, f"({chr(ord('a') + number)})")
+        axes.set_title(" ".join(words), loc="left", **look)
 
 
 def legend_below(figure: Figure, columns: int, **more: Any) -> None:
@@ -156,16 +157,18 @@ def plain_ticks(one: Axis, subs: Sequence[float] = ()) -> None:
 
 
 def plain(text: str) -> str:
-    """Return a text of a file so that a figure shows it as it is: two dollars would begin a
-    formula.
+    """Return a text of a file so that a figure shows it as it is.
+
+    Two dollars would begin a formula.
     """
     return text.replace("$", r"\$")
 
 
 @style()
 def figure_bytes(figure: Figure) -> list[tuple[str, bytes]]:
-    """Return a figure as PDF and as PNG, each with its file ending; the same figure gives the same
-    bytes.
+    """Return a figure as PDF and as PNG, each with its file ending.
+
+    The same figure gives the same bytes.
     """
     files = []
     for kind, undated in (("pdf", "CreationDate"), ("png", "Software")):

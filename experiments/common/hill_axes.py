@@ -1,5 +1,6 @@
-"""Hill's axes, in which relative motion is given and shown; their titles; conversion from the axes
-of two papers.
+"""Hill's axes of relative motion, their titles, and the conversion from other axes.
+
+Two papers have other axes.
 """
 
 from __future__ import annotations
@@ -24,15 +25,17 @@ def component_titles(symbol: str) -> list[str]:
 
 
 def from_paper(vectors: ArrayLike) -> Floats:
-    """Convert positions, velocities, controls or states, shape (..., 3) or (..., 6), from the axes
-    of the papers.
+    """Convert vectors or states from the axes of the papers.
+
+    Positions, velocities and controls have the shape (..., 3), states (..., 6).
     """
     return _turned(np.asarray(vectors, dtype=float), _PAPER_AXES)
 
 
 def to_paper(vectors: ArrayLike) -> Floats:
-    """Convert positions, velocities, controls or states, shape (..., 3) or (..., 6), to the axes of
-    the papers.
+    """Convert vectors or states to the axes of the papers.
+
+    Positions, velocities and controls have the shape (..., 3), states (..., 6).
     """
     return _turned(np.asarray(vectors, dtype=float), _PAPER_AXES.T)
 

@@ -57,13 +57,16 @@ _UNTRAPPED = Context(prec=60, traps=[])
 value.
 """
 _MAX_FAULTS = 50
+"""Maximum number of faults in a message: two screens."""
 MAX_FILE_BYTES = 100_000
-"""Size of the largest TOML file that is read."""
+"""Size of the largest TOML file that is read: ten times the largest built-in file."""
 MAX_KEY_PARTS = 20
 """Maximum number of parts of a dotted key of a TOML file; the longest key of our files has three.
 
 The time of the parser grows as the square of this number: for a file of `MAX_FILE_BYTES` with parts
 of one letter it is 0.3 s with 20 parts, 1 s with 100, and 11 s with half of the file in one key."""
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+"""Numbers on the command line: also those without a digit on one side of the point."""
 _TOKENS = re.compile(
     r"""(?P<dot>\.)|(?P<blank>[ \t]++)|(?P<comment>\#[^\n]*+)"""
     r'''|(?P<part>"""(?:[^"\\]|\\.|"(?!""))*+(?:"{3,5})?|"(?:[^"\\\n]|\\.)*+"?|[A-Za-z0-9_-]++'''
@@ -76,8 +79,10 @@ between them. No token is read twice, so the time is proportional to the length 
 
 
 class KeyField(NamedTuple):
-    """What the value of a key is: a table of a dataclass, many of them, an interval, or anything
-    else.
+    """The kind of value of a key: a table, many tables, an interval, or anything else.
+
+    `table` is the dataclass of a table, and `many` says whether there is an array of them. `pair`
+    is an interval. `numeric` is the type of a number.
     """
 
     table: type | None
@@ -99,9 +104,9 @@ def read_file(
         A built-in name wins over a file of that name, unless the argument has a path separator or
         ends in ``.toml``.
     settings : sequence of str or None
-        KEY=VALUE: values in place of those of the file, for example ``thruster.budget_m_s=500``. A
-        key of an array of tables has the number of its table, ``craft.2.weight``; ``.min`` and
-        ``.max`` are the ends of an interval.
+        KEY=VALUE: values that replace values of the file, for example
+        ``thruster.budget_m_s=500``. A key of an array of tables has the number of its table,
+        ``craft.2.weight``; ``.min`` and ``.max`` are the ends of an interval.
 
     Raises
     ------
@@ -131,6 +136,7 @@ def load_problem(
         )
     if kind == SCENARIO:
         raise InputError(f"{source}: {taken_by(kind)}")
+
     owner: type = getattr(
         import_module(f"infoset.experiments.{PROBLEMS[kind].module}"), PROBLEMS[kind].owner
     )
@@ -148,6 +154,7 @@ def read_text(
         raise InputError(f"{source}: {taken_by(kind)}")
     if wanted != SCENARIO and document.pop("kind", None) != wanted:
         raise InputError(f'{source}: kind: must be "{wanted}"; write it above the first table')
+
     reading = _Reading(owner, source)
     values = reading.in_si(document, owner, ())
     for setting in settings or ():
@@ -156,8 +163,9 @@ def read_text(
 
 
 def source_of(name_or_path: str | os.PathLike[str], kinds: Collection[str]) -> tuple[str, str]:
-    """Return the text of a built-in file of these kinds or of a file of the user, and its name for
-    messages.
+    """Return the text of a file, and its name for messages.
+
+    The file is a built-in one of these kinds, or a file of the user.
     """
     given = os.fspath(name_or_path)
     is_name = (
@@ -172,8 +180,9 @@ def source_of(name_or_path: str | os.PathLike[str], kinds: Collection[str]) -> t
 
 
 def read_input(file: Path, max_bytes: int) -> bytes:
-    """Return the content of a file of the user; `InputError` if it has more than `max_bytes`, or
-    cannot be read.
+    """Return the content of a file of the user.
+
+    Raise `InputError` if it has more than `max_bytes`, or cannot be read.
     """
     try:
         with file.open("rb") as stream:
@@ -191,8 +200,9 @@ def kind_name(owner: type) -> str:
 
 
 class _Reading:
-    """A file that is being read: its faults, and its keys and values as written, by their paths in
-    SI.
+    """A file that is being read: its faults, and its keys and values as written.
+
+    Both are by their paths with the names of the fields, in SI.
     """
 
     def __init__(self, owner: type, source: str) -> None:
@@ -216,29 +226,32 @@ class _Reading:
                 self._faults[here] = f"is written again, as {key}"
                 continue
             self._written[here] = key, value
-            field = known[name]
-            if field.table is not None and isinstance(value, dict):
-                values[name] = self.in_si(value, field.table, here)
-            elif field.table is not None and isinstance(value, list):
-                values[name] = [
-                    self.in_si(each, field.table, (*here, str(index)))
-                    if isinstance(each, dict)
-                    else each
-                    for index, each in enumerate(value)
-                ]
-            else:
-                values[name] = _scaled(value, si_factor(key, name) or Decimal(1))
-                if (
-                    field.pair
-                    and isinstance(values[name], float | int)
-                    and not isinstance(value, bool)
-                ):
-                    values[name] = [values[name]] * 2
+            factor = si_factor(key, name) or Decimal(1)
+            values[name] = self._value_in_si(value, known[name], here, factor)
+
         return values
 
+    def _value_in_si(self, value: Any, field: KeyField, path: KeyPath, factor: Decimal) -> Any:
+        """Return the value of a key with numbers in SI; a number for an interval is both ends."""
+        if field.table is not None and isinstance(value, dict):
+            return self.in_si(value, field.table, path)
+        if field.table is not None and isinstance(value, list):
+            tables = [*value]
+            for index, each in enumerate(value):
+                if isinstance(each, dict):
+                    tables[index] = self.in_si(each, field.table, (*path, str(index)))
+            return tables
+
+        scaled = _scaled(value, factor)
+        is_number = isinstance(scaled, float | int) and not isinstance(value, bool)
+        if field.pair and is_number:
+            return [scaled, scaled]
+        return scaled
+
     def _unknown(self, path: KeyPath, known: Mapping[str, KeyField]) -> None:
-        """Note a key that no field has, with the nearest one of its table, or the same key of
-        another table.
+        """Note a key that no field has, with the key that was probably meant.
+
+        That is the nearest key of its table, or the same key of another table.
         """
         if len(self._faults) > _MAX_FAULTS:
             return
@@ -247,52 +260,72 @@ class _Reading:
             self._guessed.add((*path[:-1], with_unit))
             self._faults[path] = f"is not a known key; {_units_text(with_unit)}"
             return
+
         quantity, unit = quantity_and_unit(path[-1])
         by_quantity = {quantity_and_unit(name)[0]: name for name in known}
         near = by_quantity.get(nearest(quantity, [*by_quantity]) or "")
         guess = similar_key(path[-1], keys_of(self._owner))
+
         if near is not None:
             self._guessed.add((*path[:-1], near))
+            guess = near
+            # The unit as written, if it fits.
             in_unit = f"{quantity_and_unit(near)[0]}_{unit}"
-            guess = in_unit if si_factor(in_unit, near) is not None else near
-        self._faults[path] = "is not a known key" + (f"; did you mean {guess}?" if guess else "")
+            if si_factor(in_unit, near) is not None:
+                guess = in_unit
+
+        fault = "is not a known key"
+        if guess:
+            fault += f"; did you mean {guess}?"
+        self._faults[path] = fault
 
     def set(self, values: dict[str, Any], setting: str) -> None:
-        """Replace a value by that of KEY=VALUE."""
+        """Replace a value by the value of KEY=VALUE."""
         key, mark, literal = (part.strip() for part in setting.partition("="))
         if not mark or not key or not literal:
             raise InputError(
                 f"--set: must be KEY=VALUE, found {shown(setting)}; for example --set name=mine"
             )
+
         found = _found(values, self._owner, key)
         if found is None:
-            prefix, _, last = key.rpartition(".")
-            siblings = [
-                name.rsplit(".", 1)[-1]
-                for name in keys_of(self._owner)
-                if name.rpartition(".")[0] == prefix
-            ]
-            with_unit = _with_wrong_unit(last, siblings)
-            guess = similar_key(key, keys_of(self._owner))
-            hint = f"; did you mean {guess}?" if guess else ""
-            if with_unit is not None:
-                hint = f"; {_units_text(with_unit)}"
-            raise InputError(f"--set: {self._source} has no key {shown(key)}{hint}")
-        table, owner, name, end = found
-        path = key.split(".")[: None if end is None else -1]
+            raise InputError(f"--set: {self._source} has no key {shown(key)}{self._hint_for(key)}")
+
+        path = key.split(".")
+        if found.end is not None:
+            path.pop()
+        # The number of a table of an array counts from one in a key, and from zero in a path.
         where = tuple(str(int(part) - 1) if part.isdecimal() else part for part in path[:-1])
         given = _value(literal)
-        value = self.in_si({path[-1]: given}, owner, where)[name]
-        if end is not None:
+        value = self.in_si({path[-1]: given}, found.owner, where)[found.name]
+
+        if found.end is not None:
             if isinstance(given, bool) or not isinstance(given, int | Decimal):
                 raise InputError(f"--set: {key}: must be a number, found {shown(given)}")
-            pair = table.get(name)
+            pair = found.table.get(found.name)
             if not isinstance(pair, list) or len(pair) != 2:
                 raise InputError(
                     f"--set: {key}: the file has no such interval; set both ends, KEY=[1.0, 2.0]"
                 )
-            value = [value[0], pair[1]] if end == 0 else [pair[0], value[0]]
-        table[name] = value
+            # A number for an interval was read as both of its ends.
+            end_value = value[0]
+            value = [*pair]
+            value[found.end] = end_value
+
+        found.table[found.name] = value
+
+    def _hint_for(self, key: str) -> str:
+        """Return the end of a message about an unknown key: the key that was probably meant."""
+        keys = keys_of(self._owner)
+        table, _, last = key.rpartition(".")
+        siblings = [name.rsplit(".", 1)[-1] for name in keys if name.rpartition(".")[0] == table]
+        with_unit = _with_wrong_unit(last, siblings)
+        if with_unit is not None:
+            return f"; {_units_text(with_unit)}"
+        guess = similar_key(key, keys)
+        if guess:
+            return f"; did you mean {guess}?"
+        return ""
 
     def made(self, values: Mapping[str, Any]) -> Any:
         """Return the dataclass; raise `InputError` with a line for each fault."""
@@ -302,20 +335,28 @@ class _Reading:
         except ValidationError as error:
             for details in error.errors(include_url=False):
                 self._invalid(details)
-        if made is None or self._faults:
-            lines = [
-                f"{self._source}: {self._line(path, text)}" for path, text in self._faults.items()
-            ]
-            rest = ["... and more; correct these first"] if len(lines) > _MAX_FAULTS else []
-            raise InputError("\n".join([*lines[:_MAX_FAULTS], *rest]))
-        return made
+
+        if made is not None and not self._faults:
+            return made
+
+        lines = [f"{self._source}: {self._line(path, text)}" for path, text in self._faults.items()]
+        if len(lines) > _MAX_FAULTS:
+            lines[_MAX_FAULTS:] = ["... and more; correct these first"]
+        raise InputError("\n".join(lines))
 
     def _invalid(self, details: Mapping[str, Any]) -> None:
+        """Note an error of pydantic at its key."""
         path = tuple(map(str, details["loc"][1:]))
-        if details["type"] == "missing" and path in self._guessed:
-            return
-        text = details["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
-        text = "is missing" if details["type"] == "missing" else re.sub(r"^[A-Z]\w+: ", "", text)
+        if details["type"] == "missing":
+            if path in self._guessed:
+                # It is written under a name that is not known, which has a fault.
+                return
+            text = "is missing"
+        else:
+            text = details["msg"].removeprefix("Value error, ")
+            text = text.replace("Input should be", "must be")
+            text = re.sub(r"^[A-Z]\w+: ", "", text)  # the name of a class
+
         name, _, rest = text.partition(" ")
         written = self._written.get((*path, name))
         if written is not None and written[0] != name and rest.startswith("must be"):
@@ -328,18 +369,21 @@ class _Reading:
         self._faults.setdefault(path, text)
 
     def _line(self, path: KeyPath, text: str) -> str:
-        """Return a fault with its key as written, its value, and the SI unit of its limits if the
-        key has another.
+        """Return a fault with its key as written and its value.
+
+        The SI unit of the limits is named if the key has another unit.
         """
-        key, value = self._written.get(path, (path[-1] if path else "", None))
-        si_unit = quantity_and_unit(path[-1])[1] if path else ""
-        unit = f" (in {si_unit})" if path and key != path[-1] and re.search(r"[1-9]", text) else ""
-        found = (
-            f", found {shown(value)}" if value is not None and not isinstance(value, dict) else ""
-        )
+        if not path:
+            return text
+        key, value = self._written.get(path, (path[-1], None))
         parts = [f"#{int(part) + 1}" if part.isdecimal() else part for part in path[:-1]]
-        where = ".".join([*parts, key if key.isidentifier() else shown(key)])
-        return f"{where}: {text}{unit}{found}" if path else text
+        parts.append(key if key.isidentifier() else shown(key))
+        line = f"{'.'.join(parts)}: {text}"
+        if key != path[-1] and re.search(r"[1-9]", text):
+            line += f" (in {quantity_and_unit(path[-1])[1]})"
+        if value is not None and not isinstance(value, dict):
+            line += f", found {shown(value)}"
+        return line
 
 
 @cache
@@ -354,28 +398,29 @@ def _key_field(hint: Any) -> KeyField:
         hint = next(kind for kind in get_args(hint) if kind is not types.NoneType)
     if get_origin(hint) is Annotated:
         hint = get_args(hint)[0]
+
     inner = get_args(hint)
     many = get_origin(hint) is tuple and inner[1:] == (...,) and is_dataclass(inner[0])
     table = inner[0] if many else hint
-    is_table = isinstance(table, type) and is_dataclass(table)
-    return KeyField(
-        table if is_table else None,
-        many,
-        hint == tuple[float, float],
-        hint if hint in (int, float) else None,
-    )
+    if not isinstance(table, type) or not is_dataclass(table):
+        table = None
+    numeric = hint if hint in (int, float) else None
+    return KeyField(table, many, pair=hint == tuple[float, float], numeric=numeric)
 
 
 def keys_of(owner: type, prefix: str = "") -> list[str]:
-    """Return the keys of a file with their tables; those of an array of tables have the number
-    1.
+    """Return the keys of a file with their tables.
+
+    The keys of an array of tables have the number 1.
     """
     keys = []
     for name, field in fields_of(owner).items():
         if field.table is None:
             keys.append(prefix + name)
+        elif field.many:
+            keys += keys_of(field.table, f"{prefix}{name}.1.")
         else:
-            keys += keys_of(field.table, f"{prefix}{name}.{'1.' if field.many else ''}")
+            keys += keys_of(field.table, f"{prefix}{name}.")
     return keys
 
 
@@ -391,8 +436,9 @@ def similar_key(key: str, known: Sequence[str]) -> str | None:
 
 
 def _with_wrong_unit(key: str, known: Iterable[str]) -> str | None:
-    """Return the known key that a key is except for its unit: `pixel_error_rad` for
-    `pixel_error_mas`.
+    """Return the known key that a key is except for its unit.
+
+    For example `pixel_error_rad` for `pixel_error_mas`.
     """
     for name in known:
         quantity, unit = quantity_and_unit(name)
@@ -411,28 +457,42 @@ def _units_text(name: str) -> str:
 
 
 def numeric_key(owner: type, key: str) -> type[int] | type[float] | None:
-    """Return whether the value of a key may be a whole number or any number; None if neither, or
-    there is no key.
+    """Return the type of the number that the value of a key may be.
+
+    None if it is not a number, or there is no such key.
     """
     found = _found({}, owner, key)
     if found is None:
         return None
-    _, table, name, _ = found
-    field = fields_of(table)[name]
-    return float if field.pair else field.numeric
+    field = fields_of(found.owner)[found.name]
+    if field.pair:
+        return float
+    return field.numeric
 
 
-def _found(
-    values: dict[str, Any], owner: type, key: str
-) -> tuple[dict[str, Any], type, str, int | None] | None:
-    """Return the table and dataclass of a key, the name of its field, and the number of an end of
-    an interval.
+class _FoundKey(NamedTuple):
+    """The place of a key: its table with the dataclass, the name of its field, and an end.
 
-    A table that is missing in `values` is added. None if there is no such key.
+    `end` is the number of an end of an interval, or None.
+    """
+
+    table: dict[str, Any]
+    owner: type
+    name: str
+    end: int | None
+
+
+def _found(values: dict[str, Any], owner: type, key: str) -> _FoundKey | None:
+    """Return the place of a key; None if there is no such key.
+
+    A table that is missing in `values` is added.
     """
     path = key.split(".")
     table = cast(Any, values)
-    end = ENDS.index(path.pop()) if len(path) > 1 and path[-1] in ENDS else None
+    end = None
+    if len(path) > 1 and path[-1] in ENDS:
+        end = ENDS.index(path.pop())
+
     for part in path[:-1]:
         if isinstance(table, list):
             number = int(part) if part.isdecimal() and len(part) < 6 else 0
@@ -445,14 +505,13 @@ def _found(
                 return None
             owner = field.table
             table = table.setdefault(part, [] if field.many else {})
+
     name = next((name for name in fields_of(owner) if si_factor(path[-1], name)), None)
-    if (
-        not isinstance(table, dict)
-        or name is None
-        or (end is not None and not fields_of(owner)[name].pair)
-    ):
+    if not isinstance(table, dict) or name is None:
         return None
-    return table, owner, name, end
+    if end is not None and not fields_of(owner)[name].pair:
+        return None
+    return _FoundKey(table, owner, name, end)
 
 
 def _value(literal: str) -> Any:
@@ -462,26 +521,23 @@ def _value(literal: str) -> Any:
     try:
         return tomllib.loads(f"value = {literal}", parse_float=Decimal)["value"]
     except (ValueError, RecursionError, InvalidOperation):
-        return (
-            Decimal(literal)
-            if re.fullmatch(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?", literal)
-            else literal
-        )
+        if _NUMBER.fullmatch(literal):
+            return Decimal(literal)
+        return literal
 
 
 def _scaled(value: Any, factor: Decimal) -> Any:
-    """Return a value with its numbers times a factor, each rounded once; whole numbers without a
-    unit stay whole.
+    """Return a value with its numbers times a factor, each rounded once.
+
+    Whole numbers without a unit stay whole.
     """
     if isinstance(value, list):
         return [_scaled(item, factor) for item in value]
     if isinstance(value, bool) or not isinstance(value, int | Decimal):
         return value
-    return (
-        value
-        if isinstance(value, int) and factor == 1
-        else float(_UNTRAPPED.multiply(Decimal(value), factor))
-    )
+    if isinstance(value, int) and factor == 1:
+        return value
+    return float(_UNTRAPPED.multiply(Decimal(value), factor))
 
 
 def parse(text: str, source: str) -> dict[str, Any]:
@@ -492,18 +548,24 @@ def parse(text: str, source: str) -> dict[str, Any]:
             f"{source}: line {line}: a key has more than {MAX_KEY_PARTS} parts; no key has more "
             "than three"
         )
+
     try:
         return tomllib.loads(text, parse_float=Decimal)
-    except (ValueError, InvalidOperation, RecursionError) as error:
-        reason = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
-        raise InputError(f"{source}: is not valid TOML: {reason}") from None
+    except RecursionError:
+        reason = "it is nested too deeply"
+    except (ValueError, InvalidOperation) as error:
+        reason = str(error)
+
+    raise InputError(f"{source}: is not valid TOML: {reason}")
 
 
 def _line_of_long_key(text: str) -> int | None:
-    """Return the number of the first line with a key of more than `MAX_KEY_PARTS` parts, or
-    None.
+    """Return the number of the first line with a key of more than `MAX_KEY_PARTS` parts.
+
+    None if there is no such key.
     """
-    parts, follows_dot = 0, False
+    parts = 0
+    follows_dot = False
     for token in _TOKENS.finditer(text):
         kind = token.lastgroup
         if kind == "part":
@@ -514,36 +576,38 @@ def _line_of_long_key(text: str) -> int | None:
         elif kind == "dot":
             follows_dot = True
         elif kind != "blank":
-            parts, follows_dot = 0, False
+            parts = 0
+            follows_dot = False
+
     return None
 
 
 def to_toml(value: Any) -> str:
     """Return the file of a dataclass, in SI; it is read back as an equal one."""
+    lines = [*_lines(value, "")]
     kind = kind_name(type(value))
-    head = [] if kind == SCENARIO else [f"kind = {_literal(kind)}"]
-    return "\n".join([*head, *_lines(value, "")]) + "\n"
+    if kind != SCENARIO:
+        lines.insert(0, f"kind = {_literal(kind)}")
+    return "\n".join(lines) + "\n"
 
 
 def _lines(value: Any, prefix: str) -> Iterator[str]:
+    """Yield the lines of a table: its keys, then its tables with their headings."""
     tables = []
     for name, field in fields_of(value.__class__).items():
         inner = plain_number(getattr(value, name))
         if inner is None or inner == ():
             continue
+        path = f"{prefix}{name}"
         if field.table is None:
             yield f"{name} = {_literal(inner)}"
+        elif field.many:
+            tables += [(f"[[{path}]]", each, path) for each in inner]
         else:
-            tables += [
-                (
-                    f"[[{prefix}{name}]]" if field.many else f"[{prefix}{name}]",
-                    each,
-                    f"{prefix}{name}.",
-                )
-                for each in (inner if field.many else (inner,))
-            ]
-    for heading, table, inner_prefix in tables:
-        yield from ("", heading, *_lines(table, inner_prefix))
+            tables.append((f"[{path}]", inner, path))
+
+    for heading, table, path in tables:
+        yield from ("", heading, *_lines(table, f"{path}."))
 
 
 def _literal(value: Any) -> str:
@@ -551,14 +615,12 @@ def _literal(value: Any) -> str:
         value = value.value
     if isinstance(value, tuple):
         return f"[{', '.join(map(_literal, value))}]"
-    return repr(value) if isinstance(value, float) else json.dumps(value, ensure_ascii=False)
+    if isinstance(value, float):
+        return repr(value)
+    return json.dumps(value, ensure_ascii=False)
 
 
 def changed(value: Kind, changes: Mapping[str, float | int], source: str) -> Kind:
     """Return a dataclass with other values by key, checked as a file with these values is."""
-    return read_text(
-        type(value),
-        to_toml(value),
-        source,
-        [f"{key}={plain_number(number)!r}" for key, number in changes.items()],
-    )
+    settings = [f"{key}={plain_number(number)!r}" for key, number in changes.items()]
+    return read_text(type(value), to_toml(value), source, settings)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import inspect
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, get_type_hints
 
 import typer
 
@@ -94,8 +95,25 @@ def choice(option: str, name: str, valid: Sequence[str]) -> str:
     """Return a valid name; raise `InputError`, with the nearest valid name, for any other."""
     if name in valid:
         return name
-    guess = nearest(name, valid)
-    hint = f"did you mean {guess}? " if guess else ""
-    raise InputError(
-        f"{option}: there is no {shown(name)}; {hint}choose one of: {', '.join(valid)}"
+    message = f"{option}: there is no {shown(name)}; "
+    if guess := nearest(name, valid):
+        message += f"did you mean {guess}? "
+    raise InputError(f"{message}choose one of: {', '.join(valid)}")
+
+
+def command_of(options: type, run: Callable[[Any], None]) -> Callable[..., None]:
+    """Return a function for Typer whose parameters are the fields of a dataclass.
+
+    The fields are declared with ``Annotated[type, typer.Option(...)]``; `run` takes the dataclass.
+    """
+    hints = get_type_hints(options, include_extras=True)
+
+    def command(**values: Any) -> None:
+        run(options(**values))
+
+    parameters = inspect.signature(options).parameters.values()
+    command.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+        [parameter.replace(annotation=hints[parameter.name]) for parameter in parameters]
     )
+    command.__annotations__ = hints
+    return command

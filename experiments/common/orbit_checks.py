@@ -8,14 +8,20 @@ from numpy.typing import ArrayLike
 from infoset.arrays import Floats
 from infoset.rendezvous.two_body import OrbitalElements, flight_fault, orbit_fault
 
-MAX_RADIANS, MIN_RADIANS = 1000.0, 1e-9
-"""Angles of the orbit during a problem, within which linear motion is meaningful."""
-EARTH_M3_S2, EARTH_RADIUS_M = 3.986004418e14, 6378137.0
+MAX_RADIANS = 1000.0
+"""Maximum angle of the orbit during a problem: 160 turns, after which linear motion is far off."""
+MIN_RADIANS = 1e-9
+"""Minimum angle of the orbit during a problem: a smaller one is a wrong unit."""
+EARTH_M3_S2 = 3.986004418e14
+"""Gravitational parameter of the Earth (WGS 84)."""
+EARTH_RADIUS_M = 6378137.0
+"""Equatorial radius of the Earth (WGS 84)."""
 
 
 def check_angle(key: str, duration_s: float, rate_rad_s: float) -> None:
-    """Raise ValueError if the orbit turns by an unlikely angle in a time; `key` is that of the
-    time.
+    """Raise ValueError if the orbit turns by an unlikely angle in a time.
+
+    `key` is the key of the time in the message.
     """
     angle = duration_s * rate_rad_s
     if not MIN_RADIANS <= angle <= MAX_RADIANS:
@@ -26,10 +32,11 @@ def check_angle(key: str, duration_s: float, rate_rad_s: float) -> None:
 
 
 def check_orbit(key: str, state: tuple[ArrayLike, ArrayLike], mu_m3_s2: float) -> None:
-    """Raise ValueError, which begins with `key`, if the orbit of a state (position and velocity,
-    SI) meets its planet.
+    """Raise ValueError if the orbit of a state meets its planet.
 
-    The orbit is an ellipse; the planet is that of `densest_m`.
+    The state is position and velocity, SI. The message begins with `key`.
+
+    The orbit is an ellipse; the planet has the radius `densest_m`.
     """
     position, velocity = (np.asarray(vector, dtype=float) for vector in state)
     fault = orbit_fault(position, velocity, mu_m3_s2, densest_m(mu_m3_s2))
@@ -38,11 +45,12 @@ def check_orbit(key: str, state: tuple[ArrayLike, ArrayLike], mu_m3_s2: float) -
 
 
 def check_flight(key: str, state: Floats, mu_m3_s2: float, before_s: float, after_s: float) -> None:
-    """Raise ValueError, which begins with `key`, if a body that coasts through a state, SI, meets
-    its planet.
+    """Raise ValueError if a body that coasts through a state meets its planet.
+
+    The state is position and velocity, SI. The message begins with `key`.
 
     It coasts along any conic, from `before_s` before the `state`, shape (6,), to `after_s` after
-    it; the planet is that of `densest_m`.
+    it; the planet has the radius `densest_m`.
     """
     position = state[:3]
     velocity = state[3:]
@@ -58,8 +66,9 @@ def check_flight(key: str, state: Floats, mu_m3_s2: float, before_s: float, afte
 
 
 def densest_m(mu_m3_s2: float) -> float:
-    """Return the radius of a planet with the density of the Earth; no planet or moon is denser, or
-    smaller.
+    """Return the radius of a planet with the density of the Earth.
+
+    No planet or moon is denser, or smaller.
     """
     return float(EARTH_RADIUS_M * (mu_m3_s2 / EARTH_M3_S2) ** (1.0 / 3.0))
 

@@ -1,5 +1,6 @@
-"""Files that commands write: no file is replaced unasked, each is written completely or not at
-all.
+"""Files that commands write, each completely or not at all.
+
+No file is replaced unless the user allows it.
 """
 
 from __future__ import annotations
@@ -27,8 +28,9 @@ if TYPE_CHECKING:
 
 STDOUT = "-"
 ENDINGS = {"--html": (".html", ".htm"), "--gif": (".gif",), "--record": (".npz",)}
-"""Endings of the files of options that other programs open by their endings: browsers, viewers,
-`infoset replay`.
+"""Endings of the files of options.
+
+Other programs open these files by their endings: browsers, viewers, `infoset replay`.
 """
 
 
@@ -54,9 +56,7 @@ class Output:
         return self.folder is not None or option in self.files
 
     def save(self, name: str, content: str | bytes, option: str | None = None) -> None:
-        """Write a file of the folder under its name, and the file of an option with the same
-        content.
-        """
+        """Write a file of the folder under its name, and the same content for an option."""
         if self.folder is not None:
             self._write(self.folder / name, content)
         if option is not None:
@@ -84,8 +84,9 @@ class Output:
         figures: Iterable[Figure | None],
         progress: Callable[[float], None],
     ) -> None:
-        """Write figures under their names, each as soon as it is drawn; None is a figure that a
-        result lacks.
+        """Write figures under their names, each as soon as it is drawn.
+
+        None is a figure that a result lacks.
         """
         for done, (name, figure) in enumerate(zip(names, figures, strict=True), start=1):
             if figure is not None:
@@ -93,8 +94,9 @@ class Output:
             progress(done / len(names))
 
     def enter(self, folder: Path, *names: str) -> None:
-        """Continue in a folder into which another function has written these files; files there are
-        replaced.
+        """Continue in a folder into which another function has written these files.
+
+        Files there are replaced.
         """
         self.folder = folder
         self._overwrite = True
@@ -111,38 +113,56 @@ def output_of(
 ) -> Iterator[Output]:
     """Yield the output of a command, and list the written files on stderr at the end.
 
-    Single files are those of the options ``json``, ``csv`` and ``html``, and of `files`, by option;
-    `names` are those that the command writes into the folder of ``--out``. Raise `InputError`
-    before the work if a file exists and ``--overwrite`` is not given, two files have the same path,
-    a file has the ending of another kind, or a folder cannot be written.
+    Single files are the files of the options ``json``, ``csv`` and ``html``, and of `files`, by
+    option; `names` are the files that the command writes into the folder of ``--out``. Raise
+    `InputError` before the work if a file exists and ``--overwrite`` is not given, two files have
+    the same path, a file has the ending of another kind, or a folder cannot be written.
     """
-    given = {
-        f"--{option}": getattr(options, option, None) for option in ("json", "csv", "html")
-    } | dict(files or {})
+    given: dict[str, Path | None] = {}
+    for option in ("json", "csv", "html"):
+        given[f"--{option}"] = getattr(options, option, None)
+    given |= files or {}
     single = {option: path for option, path in given.items() if path is not None}
     folder = options.out if names else None
+
     for option, path in single.items():
         _check_ending(option, path)
-    paths = [*single.values(), *(folder / name for name in names if folder is not None)]
+    paths = [*single.values()]
+    if folder is not None:
+        paths += [folder / name for name in names]
+    _check_paths(paths, [*(files or {}).values()], options.overwrite)
+    if folder is not None and folder.is_file():
+        raise InputError(f"{folder}: is a file, not a folder; choose another name for the folder")
+
+    for parent in dict.fromkeys(path.parent for path in paths if str(path) != STDOUT):
+        need_writable(parent)
+
+    output = Output(folder, single, options.overwrite)
+    yield output
+
+    if output.written and not options.quiet:
+        for parent in dict.fromkeys(file.parent for file in output.written):
+            line = "wrote " + ", ".join(
+                file.name for file in output.written if file.parent == parent
+            )
+            if parent != Path():
+                line += f" in {parent}"
+            say(line, quiet=False)
+
+
+def _check_paths(
+    paths: Sequence[Path], not_printed: Sequence[Path | None], overwrite: bool
+) -> None:
+    """Raise `InputError` if a path is given twice or exists, or stdout is not possible for it."""
     for number, path in enumerate(paths):
         if path in paths[:number]:
             raise InputError(
                 f"{path}: is given twice; choose another name for one of the two files"
             )
         if str(path) != STDOUT:
-            _check_new(path, options.overwrite)
-        elif files and path in files.values():
+            _check_new(path, overwrite)
+        elif path in not_printed:
             raise InputError("-: only JSON, CSV and HTML can be printed; give the name of a file")
-    if folder is not None and folder.is_file():
-        raise InputError(f"{folder}: is a file, not a folder; choose another name for the folder")
-    for parent in dict.fromkeys(path.parent for path in paths if str(path) != STDOUT):
-        need_writable(parent)
-    output = Output(folder, single, options.overwrite)
-    yield output
-    if output.written and not options.quiet:
-        for parent in dict.fromkeys(file.parent for file in output.written):
-            written = ", ".join(file.name for file in output.written if file.parent == parent)
-            say(f"wrote {written}" + (f" in {parent}" if parent != Path() else ""), quiet=False)
 
 
 def _check_ending(option: str, path: Path) -> None:
@@ -157,8 +177,9 @@ def _check_ending(option: str, path: Path) -> None:
 
 
 def need_writable(folder: Path) -> None:
-    """Raise `InputError` if no file can be written into a folder. Folders that are missing are
-    made, and removed.
+    """Raise `InputError` if no file can be written into a folder.
+
+    Folders that are missing are made, and removed.
     """
     missing = [each for each in (folder, *folder.parents) if not each.exists()]
     try:
@@ -171,7 +192,7 @@ def need_writable(folder: Path) -> None:
         ) from None
     finally:
         for each in missing:
-            with contextlib.suppress(OSError):  # those that could not be made
+            with contextlib.suppress(OSError):  # it could not be made
                 each.rmdir()
 
 
@@ -191,7 +212,9 @@ def write_file(file: Path, content: str | bytes, *, overwrite: bool = False) -> 
     """
     _check_new(file, overwrite)
     file.parent.mkdir(parents=True, exist_ok=True)
-    replace_file(file, content.encode() if isinstance(content, str) else content)
+    if isinstance(content, str):
+        content = content.encode()
+    replace_file(file, content)
 
 
 def outcome_columns(results: Results) -> dict[str, list[Cell]]:
@@ -204,17 +227,20 @@ def outcome_columns(results: Results) -> dict[str, list[Cell]]:
 
 
 def hit_key(hits: HitEstimate | None, missed: Mapping[str, object]) -> dict[str, object]:
-    """Return the keys `hit` and `missed` of a curve or a sample in JSON; nothing if the body has no
-    size.
+    """Return the keys `hit` and `missed` of a curve or a sample in JSON.
+
+    There are none if the body has no size.
     """
-    return {} if hits is None else {"hit": vars(hits), "missed": missed}
+    if hits is None:
+        return {}
+    return {"hit": vars(hits), "missed": missed}
 
 
 def to_json(value: object) -> str:
-    """Return a value as indented JSON, keys in the order given; raise ValueError if a number is not
-    finite.
+    """Return a value as indented JSON, keys in the order given.
 
-    Arrays become lists, enumerations their values, dataclasses dicts.
+    Arrays become lists, enumerations their values, dataclasses dicts. Raise ValueError if a number
+    is not finite.
     """
     return json.dumps(value, indent=2, allow_nan=False, default=json_value) + "\n"
 
@@ -223,4 +249,6 @@ def json_value(value: Any) -> object:
     """Return the JSON form of an array, an enumeration or a dataclass, for `json.dumps`."""
     if isinstance(value, Enum):
         return value.value
-    return vars(value) if is_dataclass(value) else value.tolist()
+    if is_dataclass(value):
+        return vars(value)
+    return value.tolist()

@@ -1,5 +1,6 @@
-"""One self-contained HTML document: template, style, scripts and data, with a policy that blocks
-everything else.
+"""One self-contained HTML document: template, style, scripts and data.
+
+Its policy blocks everything else.
 
 Texts of users (names, descriptions) are JSON in a block that browsers do not run; every character
 that could end this block is escaped. The scripts insert these texts as text, never as HTML. The
@@ -22,7 +23,7 @@ from infoset.experiments.common.output import json_value
 from infoset.sim.versions import versions
 
 BLOCKS = ("dom.js", "chart.js", "scene.js", "player.js")
-"""What every page is built from, in this order."""
+"""Scripts of every page, in this order."""
 
 _MARKER = re.compile(r"\{\{(\w+)\}\}")
 _ESCAPES = str.maketrans(
@@ -35,14 +36,14 @@ def page(
 ) -> str:
     """Return a page as HTML; raise ValueError if a number is not finite.
 
-    The scripts are those of the folder `assets` after the common blocks, and the text of a script
-    of this page only. The data are values for `to_json`; the keys ``heading`` and ``about`` (a list
-    of lines) stand at the top of the page.
+    `scripts` are files of the folder `assets`, after the common blocks; `own_script` is the text of
+    a script of this page only. The data are values for `to_json`; the keys ``heading`` and
+    ``about`` (a list of lines) stand at the top of the page.
     """
     style = asset("page.css")
-    programs = [asset(name) for name in (*BLOCKS, *scripts)] + (
-        [] if own_script is None else [own_script]
-    )
+    programs = [asset(name) for name in (*BLOCKS, *scripts)]
+    if own_script is not None:
+        programs.append(own_script)
     parts = {
         "title": html.escape(title),
         "version": html.escape(versions()["infoset"]),
@@ -55,8 +56,9 @@ def page(
 
 
 def embedded_json(value: object) -> str:
-    """Return a value as JSON that can stand inside a script element of HTML, and is read as the
-    same value.
+    """Return a value as JSON that can stand inside a script element of HTML.
+
+    It is read as the same value.
 
     It contains no ``<``, ``>`` and ``&``, and no line separators that are not allowed in scripts.
     The value is one for `infoset.experiments.common.output.to_json`.

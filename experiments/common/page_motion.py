@@ -13,16 +13,20 @@ from infoset.experiments.common.page_document import page
 from infoset.experiments.common.units import Unit, time_unit
 
 _SPEEDS = (5, 30, 60, 120)
+"""Speeds that the reader can choose, steps a second."""
 _FLAT = np.cos(np.radians(4.0))
+"""Cosine of the angle between normals up to which triangles are one face.
+
+Rounding turns the normals of tiny triangles by some degrees.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """A path: points in SI of shape (n, 3) at the times of the page, and the index of its line
-    style and mark.
+    """A path: points in SI, shape (n, 3), at the times of the page.
 
-    A path that ends earlier has fewer points. `choice` is the index of the choice with which it is
-    shown; None shows it with every choice.
+    `look` is the index of its line style and mark. A path that ends earlier has fewer points.
+    `choice` is the index of the choice with which it is shown; None shows it with every choice.
     """
 
     name: str
@@ -33,8 +37,9 @@ class Track:
 
 @dataclass(frozen=True, eq=False)
 class Mark:
-    """A fixed point in SI: cross, plus or diamond, as no moving point; an empty name is left out of
-    the legend.
+    """A fixed point in SI: cross, plus or diamond, as no moving point.
+
+    A mark with an empty name is not in the legend.
     """
 
     name: str
@@ -71,7 +76,7 @@ class View:
 
 @dataclass(frozen=True, eq=False)
 class PageCurve:
-    """Values at the times of the page, SI; the other fields are those of a `Track`."""
+    """Values at the times of the page, SI; `look` and `choice` are as in `Track`."""
 
     name: str
     look: int
@@ -113,7 +118,7 @@ def motion_page(
     data for it.
     """
     name, factor = time_unit(float(np.ptp(time_s)))
-    data = {
+    data: dict[str, object] = {
         "heading": heading,
         "about": list(about),
         "time_s": time_s,
@@ -123,16 +128,19 @@ def motion_page(
         "views": views,
         "graphs": graphs,
         "choices": choices,
-        **(own_data or {}),
     }
-    return page(
-        heading, ["motion.js"] if own_script else ["motion.js", "start-motion.js"], data, own_script
-    )
+    if own_data is not None:
+        data |= own_data
+    scripts = ["motion.js"]
+    if not own_script:
+        scripts.append("start-motion.js")
+    return page(heading, scripts, data, own_script)
 
 
 def faces_of(points: Floats) -> list[Floats]:
-    """Return the faces of the convex hull of points in space, or its outline in a plane or of a
-    flat set.
+    """Return the faces of the convex hull of points in space.
+
+    Points in a plane, or of a flat set, have their outline as the only face.
     """
     if points.shape[1] == 2 or len(points) < 4:
         return [outline(points)]
@@ -140,6 +148,7 @@ def faces_of(points: Floats) -> list[Floats]:
         hull = ConvexHull(points / max(float(np.ptp(points, axis=0).max()), 1e-300))
     except QhullError:
         return [outline(points)]
+
     # Triangles of one plane are one face: equal normals, to a few degrees where facets are tiny.
     faces: list[tuple[Floats, set[int]]] = []
     for simplex, equation in zip(hull.simplices, hull.equations, strict=True):
@@ -148,6 +157,7 @@ def faces_of(points: Floats) -> list[Floats]:
             faces.append((equation[:3], set(simplex.tolist())))
         else:
             mine.update(simplex.tolist())
+
     return [outline(points[sorted(corners)]) for _, corners in faces]
 
 
@@ -160,6 +170,7 @@ def outline(points: Floats) -> Floats:
             )
         except QhullError:
             pass
+
     centred = points - points.mean(axis=0)
     across = np.linalg.svd(centred, full_matrices=False)[2][:2]
     if len(across) < 2:

@@ -27,15 +27,13 @@ class NumberVerdict(Enum):
     AGREED = "agreed"
     """Ours is the printed number, to the last digit."""
     POSSIBLE = "possible"
-    """The printed number is that of one run, and runs of ours have it; their interval is too wide
-    to confirm it.
+    """The printed number is of one run, and lies in an interval of our runs that is too wide to
+    confirm it.
     """
     MISPRINT = "misprint"
-    """The correct number is known, and it is ours, or that of the other model if there is one."""
+    """The correct number is known, and it is ours, or the number of the other model."""
     EXPLAINED = "explained by another model"
-    """The numbers differ, and a model other than that of the paper's equations gives the printed
-    number.
-    """
+    """The numbers differ, and another model than the paper's equations gives the printed number."""
     NOT_EXPLAINED = "not explained"
     """The numbers differ for an unknown reason."""
     DISAGREED = "disagreed"
@@ -58,13 +56,13 @@ class PrintedNumber:
         Largest difference for an unknown reason, in units of the last digit; 0 if the numbers
         should agree.
     note : str
-        Explanation of a misprint, or what was tried to explain a difference.
+        Explanation of a misprint, or attempts to explain a difference.
     tolerance : float
         Largest error of the digits, in units of the last one: 0.5 if rounded, 1 if a paper rounds
         some numbers and truncates others, or if the last of ten or more digits has the error of
         another computation.
     agrees : (float, float) or None
-        Interval in which a number agrees, if it is another one than that of the digits.
+        Interval in which a number agrees, if it does not follow from the digits.
     """
 
     source: str
@@ -131,26 +129,46 @@ class NumberComparison:
         if not math.isfinite(ours.value):
             return NumberVerdict.DISAGREED
         if number.corrected is not None:
-            value = ours.value if ours.other is None else ours.other
-            is_right = _within(value, interval(number.corrected, number.tolerance, ours.beyond))
-            return NumberVerdict.MISPRINT if is_right else NumberVerdict.DISAGREED
-        low, high = self.band
-        if _within(ours.value if ours.spread is None else number.value, self.band):
-            return (
-                NumberVerdict.AGREED
-                if ours.spread is None or high < 2.0 * low
-                else NumberVerdict.POSSIBLE
-            )
-        if ours.other is not None and _within(ours.other, self.band):
+            return self._verdict_of_misprint(number.corrected)
+
+        if ours.spread is not None:
+            if _within(number.value, self.band):
+                return self._verdict_of_one_run()
+        elif _within(ours.value, self.band):
+            return NumberVerdict.AGREED
+        return self._verdict_of_difference()
+
+    def _verdict_of_difference(self) -> NumberVerdict:
+        """Return whether the difference is explained, or known but not explained."""
+        other = self.ours.other
+        if other is not None and _within(other, self.band):
             return NumberVerdict.EXPLAINED
-        known = _within(ours.value, interval(number.printed, number.unexplained))
-        return NumberVerdict.NOT_EXPLAINED if known else NumberVerdict.DISAGREED
+        if _within(self.ours.value, interval(self.number.printed, self.number.unexplained)):
+            return NumberVerdict.NOT_EXPLAINED
+        return NumberVerdict.DISAGREED
+
+    def _verdict_of_misprint(self, corrected: str) -> NumberVerdict:
+        """Return whether our number, or the number of the other model, is the correct one."""
+        value = self.ours.value
+        if self.ours.other is not None:
+            value = self.ours.other
+        if _within(value, interval(corrected, self.number.tolerance, self.ours.beyond)):
+            return NumberVerdict.MISPRINT
+        return NumberVerdict.DISAGREED
+
+    def _verdict_of_one_run(self) -> NumberVerdict:
+        """Return whether the interval of our runs confirms a printed number in it."""
+        low, high = self.band
+        if high < 2.0 * low:
+            return NumberVerdict.AGREED
+        return NumberVerdict.POSSIBLE
 
 
 @dataclass(frozen=True)
 class Paper:
-    """The numbers of a paper by source, options of commands by source, and remarks about other
-    misprints.
+    """The numbers of a paper by source, and remarks about other misprints.
+
+    `options` are the options of commands, by source.
     """
 
     name: str
@@ -161,37 +179,39 @@ class Paper:
 
     def compare(self, ours: Mapping[str, Sequence[Ours | float]]) -> tuple[NumberComparison, ...]:
         """Compare every number of the paper; ours are by source too, in the same order."""
-        return tuple(
-            NumberComparison(number, value if isinstance(value, Ours) else Ours(float(value)))
-            for source, numbers in self.tables.items()
-            for number, value in zip(numbers, ours[source], strict=True)
-        )
+        compared = []
+        for source, numbers in self.tables.items():
+            for number, value in zip(numbers, ours[source], strict=True):
+                known = value if isinstance(value, Ours) else Ours(float(value))
+                compared.append(NumberComparison(number, known))
+        return tuple(compared)
 
 
 def read_paper(name: str) -> Paper:
     """Read the numbers of a paper."""
-    text = (
-        resources.files("infoset.experiments")
-        .joinpath("printed", f"{name}.toml")
-        .read_text(encoding="utf-8")
-    )
-    data = tomllib.loads(text)
+    file = resources.files("infoset.experiments").joinpath("printed", f"{name}.toml")
+    data = tomllib.loads(file.read_text(encoding="utf-8"))
     tables: dict[str, tuple[PrintedNumber, ...]] = {}
     options: dict[str, Mapping[str, Any]] = {}
+
     for table in data["tables"]:
         shared = data.get("defaults", {}) | table
         options.setdefault(table["source"], shared.pop("options", {}))
         for number_name, digits in shared.pop("numbers").items():
-            known = shared | ({"printed": digits} if isinstance(digits, str) else digits)
-            known |= {"note": data["notes"][known["note"]]} if "note" in known else {}
+            own = {"printed": digits} if isinstance(digits, str) else digits
+            known = shared | own
+            if "note" in known:
+                known["note"] = data["notes"][known["note"]]
             number = PrintedNumber(name=number_name, **known)
             tables[number.source] = (*tables.get(number.source, ()), number)
+
     return Paper(name, data["title"], tuple(data["remarks"]), tables, options)
 
 
 def interval(digits: str, units: float, beyond: float = 0.0) -> tuple[float, float]:
-    """Return the interval of numbers that differ from digits by some units of the last one, plus
-    `beyond`.
+    """Return the interval of numbers that differ from digits by some units of the last one.
+
+    `beyond` is added to the half width.
     """
     # A few ulp more, so that a number on the boundary is inside.
     half_width = (units * last_digit(digits) + beyond) * (1.0 + 1e-9)

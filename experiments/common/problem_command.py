@@ -1,5 +1,6 @@
-"""Commands that solve a problem: they read it, solve it, write files and print the results, all in
-the same way.
+"""Commands that solve a problem.
+
+They read it, solve it, write files and print the results, all in the same way.
 """
 
 from __future__ import annotations
@@ -38,12 +39,13 @@ class ProblemCommand(Generic[Problem, Report]):
         Returns the report of a problem for the options of the command; the third argument begins a
         progress bar.
     to_json, to_csv, lines, to_html : callable
-        Return the keys of the JSON file, the table of the CSV file, what is printed, and the page.
+        Return the keys of the JSON file, the table of the CSV file, the printed lines and tables,
+        and the page.
     csv_name : str
         Name of the CSV file in the folder of ``--out``.
     figures : str
-        Module whose function ``draw_all`` yields the figures of a report, or None for one that it
-        lacks.
+        Module whose function ``draw_all`` yields the figures of a report, or None for a figure that
+        it lacks.
     figure_names : tuple of str
         Their names.
     """
@@ -65,9 +67,8 @@ class ProblemCommand(Generic[Problem, Report]):
         with (
             output_of(options, files) as written,
             progress_bar(options.quiet) as begin,
-            input_errors(
-                problem.name, _REMEDY, ArithmeticError
-            ),  # also of sets that are computed when they are drawn
+            # Also errors of sets that are computed when they are drawn.
+            input_errors(problem.name, _REMEDY, ArithmeticError),
         ):
             with input_errors(problem.name):
                 report = self.solve(problem, options, begin)
@@ -78,7 +79,10 @@ class ProblemCommand(Generic[Problem, Report]):
             }
             with input_errors(problem.name, _REMEDY):  # a number that is not finite is a ValueError
                 results = to_json(head | self.to_json(report))
-            page = self.to_html(report) if self.to_html and options.html is not None else ""
+            page = ""
+            if self.to_html and options.html is not None:
+                page = self.to_html(report)
+
             written.save("problem.toml", to_toml(problem))
             written.save("results.json", results, "--json")
             if written.wants("--csv"):
@@ -87,6 +91,7 @@ class ProblemCommand(Generic[Problem, Report]):
             if options.out is not None:
                 drawn = import_module(self.figures).draw_all(report)
                 written.draw(self.figure_names, drawn, begin("figures"))
+
         show(self.lines(report), options.quiet or written.stdout_taken)
 
     def report(self, options: Any) -> Report:

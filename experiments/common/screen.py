@@ -32,15 +32,13 @@ Clock = Callable[[], float]
 Part = str | Text | Table
 """A line or a table of a result on the screen."""
 NUMBER_WIDTH = 8
-"""Width of a column of numbers from 0 to 999999.9, and of those with an exponent, such as
--1.23e10.
-"""
+"""Width of a column of numbers: 999999.9 and -1.23e10 fit."""
 LINE_EVERY_S = 30.0
 """Time between two lines of progress in a log."""
-LONG_S, ESTIMATE_AFTER_S = 10.0, 2.0
-"""Time from which a command is long and its estimate is printed, and the time from which the rate
-is taken.
-"""
+LONG_S = 10.0
+"""Time, s, from which a command is long: its estimate is printed."""
+ESTIMATE_AFTER_S = 2.0
+"""Time, s, over which the rate of an estimate is measured."""
 NOT_FINITE = (
     "the numbers of the scenario are so large or so small that the results are not finite; "
     "check its units with: infoset scenarios check FILE"
@@ -71,32 +69,31 @@ def show(parts: Iterable[Part], quiet: bool) -> None:
 
     Each part is printed at once, also above a progress bar.
     """
-    if not quiet:
-        console = Console(highlight=False, markup=False, emoji=False)
-        for part in parts:
-            with console.capture() as captured:
-                if isinstance(part, Table):
-                    for column in (
-                        part.columns
-                    ):  # no word and no number is divided: lines may be longer than the screen
-                        words = [
-                            word
-                            for cell in (column.header, *column.cells)
-                            for word in str(cell).split()
-                        ]
-                        column.min_width = max(map(len, words), default=0)
-                    console.print(part, crop=False)
-                else:
-                    console.print(part, soft_wrap=True)
-            # The stream that bars on a terminal replace: click and the console would write past it.
-            sys.stdout.write(captured.get())
-            sys.stdout.flush()
+    if quiet:
+        return
+    console = Console(highlight=False, markup=False, emoji=False)
+    for part in parts:
+        with console.capture() as captured:
+            if isinstance(part, Table):
+                _keep_words(part)
+                console.print(part, crop=False)
+            else:
+                console.print(part, soft_wrap=True)
+        # The stream that bars on a terminal replace: click and the console would write past it.
+        sys.stdout.write(captured.get())
+        sys.stdout.flush()
+
+
+def _keep_words(table: Table) -> None:
+    """Let no word and no number of a table be divided: lines may be longer than the screen."""
+    for column in table.columns:
+        cells = (column.header, *column.cells)
+        words = [word for cell in cells for word in str(cell).split()]
+        column.min_width = max(map(len, words), default=0)
 
 
 def number_table(*titles: str, left: int = 1) -> Table:
-    """Return an empty table whose first ``left`` columns are text and whose other columns are
-    numbers.
-    """
+    """Return an empty table of numbers; its first ``left`` columns are text."""
     table = Table(*titles[:left], box=None, pad_edge=False)
     for title in titles[left:]:
         table.add_column(title, justify="right")
@@ -106,8 +103,8 @@ def number_table(*titles: str, left: int = 1) -> Table:
 class RowByRow:
     """A table of numbers whose rows are printed one after another, as they are known.
 
-    The first column has the width of the longest name, and the others that of a large number or of
-    their title.
+    The first column is as wide as the longest name, and the others as a large number or as their
+    titles.
     """
 
     def __init__(self, titles: Sequence[str], names: Iterable[str], quiet: bool) -> None:
@@ -140,8 +137,9 @@ def progress_clock() -> float:
 
 @contextlib.contextmanager
 def progress_bar(quiet: bool, clock: Clock | None = None) -> Iterator[BeginProgress]:
-    """Show progress on stderr: bars on a terminal, otherwise a line every `LINE_EVERY_S`; and the
-    estimated time.
+    """Show progress on stderr, and the estimated time.
+
+    On a terminal progress is a bar, otherwise a line every `LINE_EVERY_S`.
 
     The context is a function that starts a bar with a title, and returns a function that sets the
     fraction done. The `clock` is `progress_clock` unless another is given.
@@ -149,6 +147,7 @@ def progress_bar(quiet: bool, clock: Clock | None = None) -> Iterator[BeginProgr
     if quiet:
         yield lambda _name: lambda _done: None
         return
+
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -164,14 +163,18 @@ def progress_bar(quiet: bool, clock: Clock | None = None) -> Iterator[BeginProgr
         disable=not sys.stderr.isatty(),
         redirect_stdout=sys.stdout.isatty(),
     )
-    with contextlib.nullcontext() if bars.disable else bars:
-        yield _Report(bars, clock or progress_clock).begin
+    begin = _Report(bars, clock or progress_clock).begin
+    if bars.disable:
+        yield begin
+    else:
+        with bars:
+            yield begin
 
 
 class _Report:
-    """Report the progress of bars, and once the time that all of them take together, if it is long.
+    """Report the progress of bars, and once the time that all take together, if it is long.
 
-    The time is that of the rate after the first report: kernels are loaded or compiled before it.
+    The time follows from the rate after the first report: kernels are loaded or compiled before it.
     """
 
     def __init__(self, bars: Progress, clock: Clock) -> None:
@@ -184,8 +187,9 @@ class _Report:
         self._is_told = False
 
     def begin(self, name: str) -> Callable[[float], None]:
-        """Start a bar, and after finished bars a new estimate; return the function that sets the
-        fraction done.
+        """Start a bar; return the function that sets the fraction done.
+
+        After all bars are finished, a new bar has a new estimate.
         """
         if all(done >= 1.0 for done in self._done.values()):
             self._done.clear()
@@ -204,16 +208,19 @@ class _Report:
         now_s = self._clock()
         share = sum(self._done.values()) / len(self._done)
         first_s, first_share = self._first = self._first or (now_s, share)
+
         left = ""
         if share > first_share and now_s >= first_s + ESTIMATE_AFTER_S:
-            left_s = (1.0 - share) * (now_s - first_s) / (share - first_share)
+            passed_s = now_s - first_s
+            left_s = (1.0 - share) * passed_s / (share - first_share)
             left = f", {duration_text(round(left_s))} left"
-            if not self._is_told and now_s - first_s + left_s > LONG_S:
-                what = f"{name}: " if len(self._done) == 1 else ""
-                self._bars.console.print(
-                    f"{what}estimated time {duration_text(round(now_s - first_s + left_s))}"
-                )
+            if not self._is_told and passed_s + left_s > LONG_S:
+                text = f"estimated time {duration_text(round(passed_s + left_s))}"
+                if len(self._done) == 1:
+                    text = f"{name}: {text}"
+                self._bars.console.print(text)
             self._is_told = True
+
         if self._bars.disable and now_s >= self._written_s + LINE_EVERY_S:
             self._written_s = now_s
             say(f"{name}: {100.0 * done:.0f} %{left}", quiet=False)
@@ -231,30 +238,36 @@ def parts_of(progress: Callable[[float], None], count: int) -> list[Callable[[fl
 
 
 def number(value: float | None) -> str:
-    """Return a number with three significant digits, from 100 to 1e9 with one decimal, for
-    tables.
+    """Return a number for tables, with three significant digits.
+
+    From 100 to 1e9 it has one decimal.
     """
     if value is None:
         return "-"
-    return f"{value:.1f}" if 100 <= abs(value) < 1e9 else f"{value:.3g}"
+    if 100 <= abs(value) < 1e9:
+        return f"{value:.1f}"
+    return f"{value:.3g}"
 
 
 def some_runs(count: int) -> str:
     """Return a number of runs as text: 1 run, 2 runs."""
-    return f"{count} run{'' if count == 1 else 's'}"
+    if count == 1:
+        return "1 run"
+    return f"{count} runs"
 
 
 def quantile_notes(runs: int, levels: Sequence[float], noises: int = 1) -> list[str]:
-    """Return a line about the quantiles that so many runs of a noise do not show; no line if they
-    show all.
+    """Return a line about the quantiles that so many runs of a noise do not show.
+
+    There is no line if they show all.
     """
     hidden = [level for level in levels if not shows(runs, level)]
     if not hidden:
         return []
+    verb = "is" if runs == 1 else "are"
+    names = ", ".join(map(level_name, hidden))
     needed = max(round(1.0 / min(level, 1.0 - level)) for level in hidden)
-    each = f" of each noise (--runs {noises * needed})" if noises > 1 else ""
-    too_few = (
-        f"{some_runs(runs)} {'is' if runs == 1 else 'are'} too few for "
-        f"{', '.join(map(level_name, hidden))}"
-    )
-    return [f"{too_few}; {needed} runs{each} show all quantiles"]
+    enough = f"{needed} runs"
+    if noises > 1:
+        enough += f" of each noise (--runs {noises * needed})"
+    return [f"{some_runs(runs)} {verb} too few for {names}; {enough} show all quantiles"]

@@ -1,5 +1,6 @@
-"""Units at the ends of names, ``range_km`` is the quantity ``range`` in kilometres, and units in
-tables and figures.
+"""Units at the ends of names, and units in tables and figures.
+
+The name ``range_km`` is the quantity ``range`` in kilometres.
 """
 
 from __future__ import annotations
@@ -38,8 +39,9 @@ UNITS = {
 
 
 def quantity_and_unit(name: str) -> tuple[str, str]:
-    """Return the quantity and the unit of a name, which is empty if it has none: `max_impulse` and
-    `m_s`.
+    """Return the quantity and the unit of a name, for example `max_impulse` and `m_s`.
+
+    The unit is empty if the name has none.
     """
     parts = name.split("_")
     for first in range(1, len(parts)):
@@ -50,8 +52,9 @@ def quantity_and_unit(name: str) -> tuple[str, str]:
 
 
 def units_like(name: str) -> list[str]:
-    """Return the units that the quantity of a name can have, the SI unit first; none if the name
-    has no unit.
+    """Return the units that the quantity of a name can have, the SI unit first.
+
+    There are none if the name has no unit.
     """
     unit = quantity_and_unit(name)[1]
     if not unit:
@@ -60,12 +63,14 @@ def units_like(name: str) -> list[str]:
 
 
 def si_factor(name: str, si_name: str) -> Decimal | None:
-    """Return the factor from a name's unit to that of another name; None unless both are the same
-    quantity.
+    """Return the factor from a name's unit to the unit of another name.
+
+    None unless both names are of the same quantity.
     """
     if name == si_name:
         return Decimal(1)
-    (quantity, unit), (wanted, si_unit) = quantity_and_unit(name), quantity_and_unit(si_name)
+    quantity, unit = quantity_and_unit(name)
+    wanted, si_unit = quantity_and_unit(si_name)
     if quantity != wanted or not unit or not si_unit or UNITS[unit][0] != UNITS[si_unit][0]:
         return None
     return UNITS[unit][1] / UNITS[si_unit][1]
@@ -85,15 +90,20 @@ def time_unit(span_s: float) -> Unit:
     """Return the unit for times up to a span."""
     if span_s > 10.0 * SECONDS["d"]:
         return "days", 1.0 / SECONDS["d"]
-    return ("h", 1.0 / S_PER_HOUR) if span_s > 4.0 * S_PER_HOUR else ("s", 1.0)
+    if span_s > 4.0 * S_PER_HOUR:
+        return "h", 1.0 / S_PER_HOUR
+    return "s", 1.0
 
 
 def duration_text(seconds: float) -> str:
-    """Return a time in the maximum unit of which it has exactly one or at least two: ``2.5 min``,
-    ``100 s``.
+    """Return a time as text, for example ``2.5 min`` or ``100 s``.
+
+    The unit is the largest one of which the time has exactly one or at least two.
     """
-    fitting = [name for name, unit in SECONDS.items() if seconds == unit or seconds >= 2.0 * unit]
-    name = fitting[-1] if fitting else "s"
+    name = "s"
+    for each, unit in SECONDS.items():
+        if seconds == unit or seconds >= 2.0 * unit:
+            name = each
     return f"{seconds / SECONDS[name]:.3g} {name}"
 
 
@@ -119,8 +129,9 @@ _IN_PRINT = str.maketrans({"_": "/", "2": "\N{SUPERSCRIPT TWO}", "3": "\N{SUPERS
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """Return the words and the unit of a key or a column: ``impulse`` and ``m/s`` of
-    ``impulse_m_s``.
+    """Return the words and the unit of a key or a column.
+
+    For example ``impulse`` and ``m/s`` of ``impulse_m_s``.
     """
     quantity, unit = quantity_and_unit(name)
     return quantity.replace("_", " "), unit.translate(_IN_PRINT)
