@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import contextlib
-import inspect
 import os
 import sys
 from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib import import_module
 from importlib.metadata import version as installed_version
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any
 
 import typer
 
 from infoset.experiments.campaigns.command import CampaignOptions, ReportOptions, Sweep
 from infoset.experiments.common.errors import InputError, on_a_screen
+from infoset.experiments.common.options import command_of
 from infoset.experiments.file_commands import problems, scenarios
 from infoset.experiments.interception.command import (
     Adversary,
@@ -48,38 +48,33 @@ EXTRAS = {
 BACKEND = "MPLBACKEND"
 """Environment variable with the backend of Matplotlib."""
 RUNS: dict[type, str] = {}
-"""The module in `infoset.experiments` whose function ``run`` takes the options, by the class of the
-options.
+"""The module in `infoset.experiments` of each command, by the class of its options.
+
+The function ``run`` of the module takes the options.
 """
 
 
 def _add(name: str, options: type, run: str, *, example: str) -> None:
     """Add a command.
 
-    The fields of the dataclass `options`, declared with ``Annotated[type, typer.Option(...)]``, are
-    its options and arguments, and its docstring is the help; the first sentence stands in the list
-    of commands. The module `run` is imported when the command runs, so that ``--help`` does not
-    wait for it.
+    The fields of the dataclass `options` are its options and arguments, see `command_of`, and its
+    docstring is the help; the first sentence stands in the list of commands. The module `run` is
+    imported when the command runs, so that ``--help`` does not wait for it.
     """
     RUNS[options] = f"infoset.experiments.{run}"
-    hints = get_type_hints(options, include_extras=True)
 
-    def command(**values: Any) -> None:
+    def run_it(given: Any) -> None:
         from infoset.kernels import NOTICE  # loads Numba
 
         try:
             with NOTICE.of(f"infoset {name}"):
-                import_module(RUNS[options]).run(options(**values))
+                import_module(RUNS[options]).run(given)
         except KeyboardInterrupt as interrupt:
             typer.echo("interrupted" + "".join(map(str, interrupt.args)), err=True)
             raise
 
-    parameters = inspect.signature(options).parameters.values()
-    command.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
-        [parameter.replace(annotation=hints[parameter.name]) for parameter in parameters]
-    )
-    command.__annotations__ = hints
-    app.command(name, help=options.__doc__, epilog=f"Example: infoset {name} {example}")(command)
+    epilog = f"Example: infoset {name} {example}"
+    app.command(name, help=options.__doc__, epilog=epilog)(command_of(options, run_it))
 
 
 _add(
@@ -195,10 +190,10 @@ def commands() -> Any:
 
 @contextlib.contextmanager
 def _agg_backend() -> Iterator[None]:
-    """Let Matplotlib, when a command imports it, use Agg: a backend of the user's that is missing
-    stops the import.
+    """Let Matplotlib use Agg while a command runs.
 
-    A notebook, for example, sets its backend for all processes that it starts.
+    A backend of the user's that is missing would stop the import of Matplotlib. A notebook, for
+    example, sets its backend for all processes that it starts.
     """
     before = os.environ.get(BACKEND)
     os.environ[BACKEND] = "agg"

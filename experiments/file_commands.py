@@ -1,13 +1,15 @@
-"""The commands `infoset scenarios` and `infoset problems`, which list, show, copy and check
-files.
+"""The commands `infoset scenarios` and `infoset problems`.
+
+They list, show, copy and check files.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, NamedTuple
 
 import typer
 
@@ -18,7 +20,7 @@ from infoset.experiments.common.built_in_files import (
     built_in,
     built_in_files,
 )
-from infoset.experiments.common.options import AsJson, Overwrite, Quiet, Settings
+from infoset.experiments.common.options import AsJson, Overwrite, Quiet, Settings, command_of
 
 BuiltInName = Annotated[str, typer.Argument(metavar="NAME", help="A built-in name.")]
 FileName = Annotated[str, typer.Argument(metavar="FILE", help="A file, or a built-in name.")]
@@ -73,8 +75,9 @@ NewFile = Annotated[Path, typer.Argument(metavar="FILE", help="The file to write
 
 
 def _commands(noun: str, of_what: str, example: str) -> typer.Typer:
-    """Return the commands for the files of a noun, scenario or problem; `example` is a built-in
-    name.
+    """Return the commands for the files of a noun, scenario or problem.
+
+    `example` is a built-in name.
     """
     name = f"infoset {noun}s"
     kinds = [SCENARIO] if noun == SCENARIO else [*PROBLEMS]
@@ -131,13 +134,12 @@ def _commands(noun: str, of_what: str, example: str) -> typer.Typer:
 
 
 def _named(text: str, name: str, like: str) -> str:
-    """Return the text of a copy with another name and description: those of the results."""
+    """Return the text of a copy with another name and description, which its results have."""
     if not re.fullmatch(r"\w[\w .-]{0,99}", name):  # "-" among others
         return text
+    description = f'description = "Copy of {like}, changed"'
     text = re.sub(r'(?m)^name = ".*"', f'name = "{name}"', text, count=1)
-    return re.sub(
-        r'(?m)^description = ".*"', f'description = "Copy of {like}, changed"', text, count=1
-    )
+    return re.sub(r'(?m)^description = ".*"', description, text, count=1)
 
 
 def _write(file: Path, text: str, note: str, overwrite: bool, quiet: bool) -> None:
@@ -162,13 +164,17 @@ def _print_list(files: Sequence[BuiltIn]) -> None:
     show([table], quiet=False)
 
 
-def _print_check(
-    file: str, settings: Sequence[str] | None, kinds: Sequence[str], json: bool, quiet: bool
-) -> None:
-    """Check a file of one of these kinds; print its name, fingerprint, schedule and warnings."""
-    from infoset.experiments.common.input_file import load_problem
-    from infoset.experiments.common.output import to_json
-    from infoset.experiments.common.screen import say_warnings
+class _Checked(NamedTuple):
+    """A file without errors: its fingerprint, its keys in JSON, and lines for the screen."""
+
+    name: str
+    fingerprint: str
+    keys: dict[str, object]
+    facts: Sequence[str] = ()
+    warnings: Sequence[str] = ()
+
+
+def _checked_scenario(file: str, settings: Sequence[str] | None) -> _Checked:
     from infoset.experiments.interception.scenario_file import (
         all_warnings,
         flight_facts,
@@ -177,66 +183,90 @@ def _print_check(
         schedule_json,
     )
     from infoset.sim.storage.codec import fingerprint
+
+    scenario = load_scenario(file, settings)
+    keys = {
+        "scenario_hash": fingerprint(scenario),
+        "schedule": schedule_json(scenario),
+        "possible_miss": possible_miss_json(scenario),
+    }
+    return _Checked(
+        scenario.name,
+        fingerprint(scenario),
+        keys,
+        flight_facts(scenario),
+        all_warnings(scenario),
+    )
+
+
+def _checked_problem(file: str, settings: Sequence[str] | None) -> _Checked:
+    from infoset.experiments.common.input_file import load_problem
+    from infoset.sim.storage.codec import fingerprint
+
+    problem = load_problem(file, settings)
+    keys = {"kind": problem.kind, "problem_hash": fingerprint(problem)}
+    return _Checked(problem.name, fingerprint(problem), keys)
+
+
+def _print_check(
+    file: str, settings: Sequence[str] | None, kinds: Sequence[str], json: bool, quiet: bool
+) -> None:
+    """Check a file of one of these kinds; print its name, fingerprint, schedule and warnings."""
+    from infoset.experiments.common.output import to_json
+    from infoset.experiments.common.screen import say_warnings
     from infoset.sim.versions import versions
 
-    read: Any
     if SCENARIO in kinds:
-        read = load_scenario(file, settings)
-        head: dict[str, Any] = {"scenario_hash": fingerprint(read)}
-        found = {"schedule": schedule_json(read), "possible_miss": possible_miss_json(read)}
-        warnings = all_warnings(read)
-        facts = flight_facts(read)
+        checked = _checked_scenario(file, settings)
     else:
-        read = load_problem(file, settings)
-        head = {"kind": read.kind, "problem_hash": fingerprint(read)}
-        found = {}
-        warnings = []
-        facts = []
+        checked = _checked_problem(file, settings)
     if json:
-        contents = {
-            "versions": versions(),
-            "name": read.name,
-            **head,
-            **found,
-            "warnings": warnings,
-        }
-        typer.echo(to_json(contents), nl=False)
+        keys = {"versions": versions(), "name": checked.name, **checked.keys}
+        typer.echo(to_json({**keys, "warnings": checked.warnings}), nl=False)
     elif not quiet:
-        typer.echo("\n".join([f"ok  {read.name}  {fingerprint(read)}", *facts]))
-    say_warnings(warnings, quiet or json)
+        typer.echo("\n".join([f"ok  {checked.name}  {checked.fingerprint}", *checked.facts]))
+    say_warnings(checked.warnings, quiet or json)
 
 
 scenarios = _commands(SCENARIO, "A scenario is an interception.", "own-scenario")
 
 
-@scenarios.command(
-    "from-states",
-    epilog="Example: infoset scenarios from-states two-states --sigma 3 --out mine.toml",
-)
-def from_states(
-    file: FileName,
-    out: Out,
-    like: LikeScenario = "dart-2022",
-    sigma: Sigmas = 3.0,
-    body_radius_m: BodyRadius = None,
-    disturbance: Disturbance = None,
-    files_in: FilesIn = None,
-    overwrite: Overwrite = False,
-    quiet: Quiet = False,
-) -> None:
+@dataclass(frozen=True)
+class FromStates:
     """Make a scenario from the states of a spacecraft and an object, and their covariance."""
+
+    file: FileName
+    out: Out
+    like: LikeScenario = "dart-2022"
+    sigma: Sigmas = 3.0
+    body_radius_m: BodyRadius = None
+    disturbance: Disturbance = None
+    files_in: FilesIn = None
+    overwrite: Overwrite = False
+    quiet: Quiet = False
+
+
+def _from_states(options: FromStates) -> None:
     from infoset.experiments.common.screen import say_warnings
     from infoset.experiments.interception.scenario_file import all_warnings, load_scenario
     from infoset.experiments.interception.trajectory_file import KnownTarget, scenario_of
 
-    model = load_scenario(like)
-    found = scenario_of(file, model, sigma, KnownTarget(body_radius_m, disturbance), files_in or ())
+    model = load_scenario(options.like)
+    target = KnownTarget(options.body_radius_m, options.disturbance)
+    found = scenario_of(options.file, model, options.sigma, target, options.files_in or ())
     note = (
         f"with the sensors and the engine of {model.name}; change them, then: infoset scenarios "
-        f"check {out}"
+        f"check {options.out}"
     )
-    _write(out, found.text, note, overwrite, quiet)
-    say_warnings([*found.warnings, *all_warnings(found.scenario)], quiet, found.notes)
+    _write(options.out, found.text, note, options.overwrite, options.quiet)
+    say_warnings([*found.warnings, *all_warnings(found.scenario)], options.quiet, found.notes)
+
+
+scenarios.command(
+    "from-states",
+    help=FromStates.__doc__,
+    epilog="Example: infoset scenarios from-states two-states --sigma 3 --out mine.toml",
+)(command_of(FromStates, _from_states))
 
 
 problems = _commands(
