@@ -155,8 +155,8 @@ def scenario_of(
     target : KnownTarget or None
         The size of the target, and the bound of its acceleration.
     folders : sequence of Path
-        Folders whose files the trajectory file may name; it may always name those below its own
-        folder.
+        Folders whose files the trajectory file may name; it may always name files below its
+        own folder.
 
     Raises
     ------
@@ -170,6 +170,7 @@ def scenario_of(
             f"--like: {like.name} is a scenario in a plane; take one in space, for example "
             "dart-2022"
         )
+
     target = target or KnownTarget()
     pair = _pair(trajectory, Path(file).parent, folders, source)
     _check_accuracy(pair, source)
@@ -183,6 +184,7 @@ def scenario_of(
             np.array(trajectory.pole),
             trajectory.flight_s,
         )
+
     with input_errors(f"{source} at {sigmas:g} sigma: uncertainty"):
         box = found.box(sigmas)
     with input_errors(f"{source} with the sensors and the engine of {like.name}"):
@@ -291,9 +293,8 @@ def _text(
     comments = _comments(like, sigmas)
     lines = []
     for line in to_toml(scenario).replace("], [", "],\n    [").splitlines():
-        if line in comments:
-            line += f"  # {comments[line]}"
-        lines.append(line)
+        comment = comments.get(line)
+        lines.append(f"{line}  # {comment}" if comment else line)
     return "\n".join([*(f"# {line}" for line in head), *lines]) + "\n"
 
 
@@ -397,6 +398,7 @@ def _spice_craft(
             with input_errors("epoch"):
                 time_s = float(converted(epoch, scale, KERNEL_SCALE))
         state = kernels.kernel_state(spice, body, time_s, trajectory.frame, trajectory.centre)
+
     return CraftState(
         state=state,
         source=f"spice {body}",
@@ -418,11 +420,13 @@ def _covariance(
         if craft.covariance is not None:
             found[craft.source] = craft.covariance
             texts.append(f"{craft.source} (axes: {craft.covariance_frame})")
+
     if not found:
         raise InputError(
             f"{source}: covariance: is missing, and the OEM files have none; write the table "
             "[covariance]"
         )
+
     named = " and ".join(texts)
     if len(found) == 1:
         note = f"covariance: that of {named}; the other state is taken as exact"
@@ -436,6 +440,7 @@ def _covariance(
     except ValueError as error:
         reason = str(error).removeprefix("Covariance: ")
         raise InputError(f"{source}: covariance of {' and '.join(found)}: {reason}") from None
+
     return covariance.matrix, [note]
 
 

@@ -223,6 +223,7 @@ def _segment_at(
             f"{source}: no segment holds the epoch: the usable spans are {spans}; take an epoch "
             "within one"
         )
+
     if len(inside) > 1:
         raise InputError(
             f"{source}: segments {inside[0].number} and {inside[1].number} both hold the epoch"
@@ -305,6 +306,7 @@ def _axes_of(
     name = covariance.frame
     if name is None:
         return np.eye(3)
+
     plain = name.upper().removesuffix("_INERTIAL")
     if plain in (*ALONG_RADIUS, *ALONG_VELOCITY):
         return _local_axes(state, where, along_radius=plain in ALONG_RADIUS)
@@ -313,6 +315,7 @@ def _axes_of(
         is_same = inertial_frame(name, segment.metadata.get("REF_FRAME_EPOCH")) == frame
     except ValueError:
         is_same = False
+
     if not is_same:
         raise InputError(
             f"{where}: COV_REF_FRAME {name} is neither the frame of the states nor one of "

@@ -97,6 +97,7 @@ def parse_epoch(text: str) -> Epoch:
     match = _EPOCH.fullmatch(text.strip())
     if match is None:
         raise ValueError("is not an epoch such as 2029-03-01T12:00:00.5 or 2029-060T12:00:00.5")
+
     year, month, day_of_month, day_of_year, hour, minute, second, suffix = match.groups()
     day = _day(int(year), month, day_of_month, day_of_year)
 
@@ -176,6 +177,7 @@ def _day(year: int, month: str | None, day_of_month: str | None, day_of_year: st
     number = int(day_of_year or 0)
     if not 1 <= year <= 9998 or number < 1:
         raise ValueError("is a date that does not exist")
+
     day = date(year, 1, 1) + timedelta(number - 1)
     if day.year != year:
         raise ValueError("is a date that does not exist")

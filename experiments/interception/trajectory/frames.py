@@ -91,6 +91,7 @@ def inertial_frame(name: str, epoch: str | None = None) -> Frame:
         raise ValueError(f"REF_FRAME {name} is a frame of an epoch, and REF_FRAME_EPOCH is missing")
     if of_date is not None or of_epoch is not None:
         return Frame(f"{of_date or of_epoch} at {epoch}")
+
     raise ValueError(
         f"REF_FRAME {name} is not a known inertial frame, it may rotate; convert the file to "
         "EME2000 or ICRF"

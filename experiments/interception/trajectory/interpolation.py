@@ -76,8 +76,8 @@ def interpolate(
     method, degree : str, int
         One of `METHODS`; degree + 1 states are used, or fewer if the table has no more.
     drift_s : callable
-        What is added to a time, s, to have the time with respect to which the velocities are
-        derivatives.
+        Function of a time; the velocities are derivatives with respect to the time plus its value,
+        s.
 
     Raises
     ------
@@ -97,6 +97,7 @@ def interpolate(
         return Interpolated(tabulated, "TABULATED", 0, np.zeros(2), tabulated, 0.0)
     if not 0 < after < len(times):
         raise ValueError("the epoch is outside the table of states")
+
     _check_gap(times, after)
 
     window = _window(times, after, degree + 1)
@@ -193,6 +194,7 @@ def _window(times: Sequence[Fraction], after: int, wanted: int) -> list[int]:
         if row < 0:
             break
         before.append(row)
+
     behind = [after]
     while len(behind) < wanted:
         row = bisect_left(times, times[behind[-1]] + apart)

@@ -25,8 +25,7 @@ from infoset.experiments.interception.trajectory.interpolation import (
 from infoset.limits import MAXIMUM
 
 MAX_OEM_BYTES = 20_000_000
-"""Size of the largest file that is read: 120 000 states of the usual length, 80 days in steps of a
-minute.
+"""Size of the largest file that is read: 120 000 states, 80 days in steps of a minute.
 
 The shortest possible states fill it with 400 000 of them, which take 300 MB and ten seconds.
 """
@@ -34,11 +33,14 @@ VERSIONS = ("1.0", "2.0", "3.0")
 NEEDED_KEYS = ("CENTER_NAME", "REF_FRAME", "TIME_SYSTEM")
 """Keywords without which the states of a segment have no meaning."""
 ROW_LENGTHS = (7, 10)
-"""Number of words of a state: epoch, position and velocity, and in some files the acceleration,
-which is not used.
+"""Number of words of a state: epoch, position, velocity, and in some files the acceleration.
+
+The acceleration is not used.
 """
 COMPONENTS = 6
+"""Number of components of position and velocity."""
 METRES_PER_KM = 1e3
+"""OEM files are in kilometres."""
 
 _PAIR = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)\s*=\s*(.*)")
 
@@ -184,10 +186,12 @@ class _Reading:
             raise self._fault(
                 f"{missing[0]} is missing in the metadata of segment {segment.number}"
             )
+
         try:
             segment.scale = known_scale(segment.metadata["TIME_SYSTEM"])
         except ValueError as error:
             raise self._fault(f"TIME_SYSTEM: {error}") from None
+
         segment.method, segment.degree = self._interpolation(segment.metadata)
         self._section = self._data
 
@@ -221,12 +225,14 @@ class _Reading:
             raise self._fault(
                 f"must be an epoch and 6 numbers, or 9 with the acceleration: {shown(line)}"
             )
+
         segment = self._segments[-1]
         seconds = self._seconds(words[0], segment.scale)
         if segment.seconds and seconds <= segment.seconds[-1]:
             raise self._fault(
                 "the epoch is not later than the one before; sort the states, each epoch once"
             )
+
         segment.seconds.append(seconds)
         self._rows.append(self._numbers(words[1 : 1 + COMPONENTS]))
 
@@ -238,6 +244,7 @@ class _Reading:
                 )
             self._section = self._data
             return
+
         if "=" in line:
             if self._entries:
                 raise self._fault(
@@ -254,6 +261,7 @@ class _Reading:
                 f"row {len(self._entries) + 1} of the covariance must have "
                 f"{len(self._entries) + 1} numbers"
             )
+
         self._entries.append(row)
         if len(self._entries) == COMPONENTS:
             self._end_covariance()
