@@ -24,7 +24,7 @@ from infoset.sim import Record
 DURATION_S = 8.0
 """Duration of an animation, s."""
 COLOURS = 16
-"""Number of colours of an image: the figures have fewer, and the file is a third as large."""
+"""Number of colours of an image: the panels have few, and more would make the file larger."""
 
 _SECTIONS = 7
 """Maximum number of sections of a set."""
@@ -62,6 +62,7 @@ def animate(
         else:
             axes.set_xlabel("time t, s")
         axes.set_ylabel("predicted miss π, m")
+
     level_predicted_miss(below)
     lines = [axes.axvline(float(chosen[0]), color=INK, linewidth=1.0) for axes in below]
 

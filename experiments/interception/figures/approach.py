@@ -1,6 +1,4 @@
-"""The approach of single engagements: the B-plane, and possible misses and impulses against the
-time before arrival.
-"""
+"""The approach of single engagements: B-plane, possible misses and impulses."""
 
 from __future__ import annotations
 
@@ -64,12 +62,12 @@ _MIN_SHOWN = 1e-3
 
 @style()
 def draw_approach(records: Sequence[Record]) -> Figure:
-    """Draw possible misses and impulses against the time before the nominal arrival, and in space
-    the B-plane.
+    """Draw possible misses and impulses over the time before the nominal arrival.
 
-    Each record has a row. The possible miss is the maximum distance of a point of the box of
-    predicted misses, which contains those of all sections. After an impulse that centres the box it
-    is half the diagonal of the box. Both end when the first section leaves at the range threshold.
+    In space the B-plane is drawn, too. Each record has a row. The possible miss is the maximum
+    distance of a point of the box of predicted misses, which contains the predicted misses of all
+    sections. After an impulse that centres the box it is half the diagonal of the box. Both end
+    when the first section leaves at the range threshold.
     """
     figure = new_figure(25.0 + 75.0 * len(records))
     rows = figure.subfigures(len(records), 1, squeeze=False)[:, 0]
@@ -90,6 +88,7 @@ def draw_approach(records: Sequence[Record]) -> Figure:
         name_events(possible, record.scenario)
         if record.scenario.is_spatial:
             _draw_b_plane(panels["plane"], record)
+
     legend_below(figure, 2)
     return figure
 
@@ -101,6 +100,8 @@ def _draw_possible(axes: Axes, record: Record) -> None:
     maximum = modulus(np.abs(misses).max(axis=-1).T)
     centred = modulus(0.5 * (misses[..., 1] - misses[..., 0]).T)
     true = modulus(true_predicted_misses(record).T)
+
+    # The axis shows all of them, and small values down to a share of the possible ones.
     levels = [
         level for level in (max_guarantee_m(record.result), record.scenario.radius_m) if level
     ]
@@ -135,9 +136,7 @@ def _draw_moduli(axes: Axes, record: Record) -> None:
 
 
 def _draw_b_plane(axes: Axes, record: Record) -> None:
-    """Draw the B-plane: the box of possible misses at the last decision, and the path of the true
-    predicted miss.
-    """
+    """Draw the B-plane: the possible misses at the last decision, and the true predicted miss."""
     known = complete_steps(record)
     end = record.result.lateral_miss_m[0]
     guaranteed = max_guarantee_m(record.result)
@@ -146,14 +145,8 @@ def _draw_b_plane(axes: Axes, record: Record) -> None:
     if len(known):
         y, z = record.predicted_miss_m[known[-1]]
         sizes.append(float(np.abs([y, z]).max()))
-        box = Rectangle(
-            (y[0], z[0]),
-            y[1] - y[0],
-            z[1] - z[0],
-            label="possible misses at the last decision",
-            **SET,
-        )
-        axes.add_patch(box)
+        label = "possible misses at the last decision"
+        axes.add_patch(Rectangle((y[0], z[0]), y[1] - y[0], z[1] - z[0], label=label, **SET))
     if radius is not None and radius <= RADIUS_SHOWN * max(sizes):
         sizes.append(radius)
     axes.plot(*true_predicted_misses(record).T, zorder=3.0, **_TRUE)

@@ -124,8 +124,9 @@ def ellipse(across_m: Floats, level: float, within_m: float = np.inf) -> Floats 
 
 @style()
 def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figure:
-    """Draw the miss of each run as a point in the plane across the approach, one panel for each
-    cloud.
+    """Draw the miss of each run as a point in the plane across the approach.
+
+    Each cloud has a panel.
 
     Ellipses contain 50 % and 99 % of the runs. The radii of the circles are the median and the 90 %
     quantile of the miss, and the maximum guaranteed miss. All panels have the same limits, unless
@@ -146,6 +147,7 @@ def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figu
     figure, grid = subplots(40.0 + 68.0 * rows, rows, columns, width_mm=56.0 * columns + 22.0)
     panels = first_panels(grid, len(halves))
     titles = []
+
     for place, (axes, each, half) in enumerate(
         zip(panels, itertools.cycle(clouds), halves, strict=False)
     ):
@@ -153,6 +155,7 @@ def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figu
         if place >= len(clouds):
             lines = [_AT_BODY_SCALE, lines[-1]]
         titles.append("\n".join([plain(each.title), *lines]))
+
     letters(panels, titles, fontsize="small")
 
     note = None
@@ -183,6 +186,7 @@ def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) ->
     if each.has_axes:
         axes.set(xlabel=r"$B\cdot T$, m", ylabel=r"$B\cdot R$, m", ylim=(half, -half))
     outside = int((np.abs(each.across_m) > half).any(axis=1).sum())
+
     if outside:
         place: dict[str, Any] = {
             "xycoords": "axes fraction",

@@ -34,6 +34,7 @@ _LOOKS = tuple(
 )
 _CORRECTED: dict[str, Any] = {"linewidth": 0.8, "linestyle": ":"}
 _COLUMN_MM = 88.0
+"""Width of the figure: one column of a page."""
 _WIDE = 8.0
 """Ratio of the maximum miss to the bound from which the axis of misses is logarithmic.
 

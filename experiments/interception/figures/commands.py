@@ -1,5 +1,6 @@
-"""The figures of the commands, in the order of their names, each drawn when the last one is
-written, and `plot`.
+"""The figures of the commands, in the order of their names, and `plot`.
+
+Each is drawn when the last one is written.
 """
 
 from __future__ import annotations
@@ -41,6 +42,7 @@ def draw_experiment(
     yield draw_corridor(curves, courses)
     if not scenario.is_spatial:
         return
+
     for noise in dict.fromkeys(curve.noise for curve in curves):
         clouds = []
         for curve in curves:
@@ -53,7 +55,7 @@ def draw_experiment(
 def draw_compared(scenario: Scenario, compared: Sequence[Comparison]) -> Iterator[Figure]:
     """Draw the comparison, and in space the misses across the approach for each noise.
 
-    With game noise, the misses are those of the worst tie rule of a run.
+    With game noise, each run has its worst tie rule.
     """
     yield draw_comparison(compared, scenario.radius_m)
     if not scenario.is_spatial:

@@ -25,26 +25,30 @@ from infoset.experiments.interception.study import Comparison
 from infoset.sim.statistics import shows
 
 _BINS = 48
-_HILL, _BAR = 0.62, 0.17
-"""Height of a histogram, and distance of the quantile bar below it, in rows."""
+"""Number of bins of a histogram: a panel has room for bars of a millimetre and a half."""
+_HILL = 0.62
+"""Height of a histogram, in rows."""
+_BAR = 0.17
+"""Distance of the quantile bar below the histogram, in rows."""
 _MARK: dict[str, Any] = {"color": INK, "linestyle": "none", "zorder": 4.0}
 
 
 @style()
 def draw_comparison(compared: Sequence[Comparison], radius_m: float | None = None) -> Figure:
-    """Draw the distributions of the miss (left) and of the impulse spent, one row per strategy in a
-    panel per noise.
+    """Draw the distributions of the miss (left) and of the impulse spent.
 
-    Misses are on a logarithmic axis, with a line at the radius of the body, m.
+    There is a panel per noise, with a row per strategy. Misses are on a logarithmic axis, with a
+    line at the radius of the body, m.
     """
     names = list(dict.fromkeys(each.strategy for each in compared))
     noises = {each.noise: each.noise_title for each in compared}
     height = len(noises) * (12.0 + 8.0 * len(names)) + 21.0
     figure, grid = subplots(height, len(noises), 2, sharex="col", sharey=True)
-    misses, impulses = (
-        [each.worst(name) for each in compared] for name in ("miss_m", "impulse_m_s")
-    )
-    edges = _logarithmic(misses), np.linspace(0.0, 1.04 * float(np.max(impulses)) or 1.0, _BINS + 1)
+    misses = [each.worst("miss_m") for each in compared]
+    impulses = [each.worst("impulse_m_s") for each in compared]
+    linear = np.linspace(0.0, 1.04 * float(np.max(impulses)) or 1.0, _BINS + 1)
+    edges = (_logarithmic(misses), linear)
+
     for column, samples, bins in zip(grid.T, (misses, impulses), edges, strict=True):
         for axes, noise in zip(column, noises, strict=True):
             for each, sample in zip(compared, samples, strict=True):
@@ -52,10 +56,12 @@ def draw_comparison(compared: Sequence[Comparison], radius_m: float | None = Non
                     _draw_strategy(axes, names.index(each.strategy), sample, bins)
             axes.set_xlim(bins[0], bins[-1])
             axes.grid(visible=False, axis="y")
+
     for axes in grid[:, 0]:
         axes.set_xscale("log")
         plain_ticks(axes.xaxis)
         draw_radius(axes, radius_m)
+
     for axes, label in zip(grid[-1], ("miss, m", "impulse spent, m/s"), strict=True):
         axes.set_xlabel(label)
     grid[0, 0].set(ylim=(len(names) - 0.62, -0.78), yticks=range(len(names)), yticklabels=names)
@@ -65,8 +71,9 @@ def draw_comparison(compared: Sequence[Comparison], radius_m: float | None = Non
 
 
 def _logarithmic(samples: Sequence[Floats]) -> Floats:
-    """Return the edges of the bins of misses, of which a few small values may be below the
-    first.
+    """Return the edges of the bins of misses.
+
+    A few small values may be below the first edge.
     """
     positive = [sample[sample > 0.0] for sample in samples if (sample > 0.0).any()]
     if not positive:
@@ -77,8 +84,9 @@ def _logarithmic(samples: Sequence[Floats]) -> Floats:
 
 
 def _draw_strategy(axes: Axes, place: int, sample: Floats, edges: Floats) -> None:
-    """Draw a histogram on the line of its strategy, and below it a bar with the quantiles that the
-    runs show.
+    """Draw a histogram on the line of its strategy, and below it a bar of quantiles.
+
+    Quantiles that the runs do not show are left out.
     """
     counts, _ = np.histogram(np.clip(sample, edges[0], edges[-1]), bins=edges)
     heights = place - _HILL * counts / counts.max()

@@ -44,9 +44,9 @@ _IMPULSES: tuple[tuple[float, str, dict[str, Any]], ...] = (
 def draw_corridor(curves: Sequence[Curve], courses: Sequence[Courses]) -> Figure:
     """Draw possible misses and impulses of each curve against the time before the nominal arrival.
 
-    The possible miss is the maximum without further impulses. Its quantiles are those of the runs
-    that still have a complete set (see `Courses`), and end when these are less than half of the
-    runs. Quantiles for which the runs are too few are not drawn.
+    The possible miss is the maximum without further impulses. Its quantiles are taken over the
+    runs that still have a complete set (see `Courses`), and end when these are less than half of
+    the runs. Quantiles for which the runs are too few are not drawn.
     """
     rows = -(-len(curves) // 2)
     columns = min(2, len(curves))
@@ -55,6 +55,7 @@ def draw_corridor(curves: Sequence[Curve], courses: Sequence[Courses]) -> Figure
     )
     above, below = (first_panels(part, len(curves)) for part in (grid[::2], grid[1::2]))
     titles = []
+
     for first, second, curve, course in zip(above, below, curves, courses, strict=True):
         _draw_possible(first, course)
         draw_levels(first, max_guarantee_m(curve.results), course.scenario.radius_m)
@@ -68,11 +69,13 @@ def draw_corridor(curves: Sequence[Curve], courses: Sequence[Courses]) -> Figure
         if len(curves) > 2:
             title += ", range sensor" if curve.range_sensor else ", no range sensor"
         titles.append(f"{title}, {some_runs(len(course.possible_m))}")
+
     letters(above, titles)
     for level in (above, below):
         limits = np.array([axes.get_ylim() for axes in level])
         for axes in level:
             axes.set_ylim(limits.min(), limits.max())
+
     legend_below(figure, 3)
     return figure
 

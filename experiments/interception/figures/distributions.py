@@ -89,6 +89,7 @@ def draw_distributions(
             runs.append(
                 Sample(title, {"color": CURVE_LOOKS[curve.number]["color"]}, miss_m, impulse_m_s)
             )
+
     return draw_samples(samples, radius_m, runs)
 
 
@@ -122,6 +123,7 @@ def draw_samples(
             dotted = sample.look | _DOTTED
             name = sample.guaranteed_name
             _draw_curve(left, sample.guaranteed_miss_m, dotted, name, banded=False)
+
     for run in runs:
         left.plot(run.miss_m, [0.0], label=run.name, **_RUN | run.look)
         right.plot(run.impulse_m_s, [0.0], **_RUN | run.look)
@@ -171,7 +173,7 @@ def axis_limit(samples: Sequence[Floats]) -> float:
 
 
 def _beyond(axes: Axes, name: str, samples: Sequence[Floats]) -> list[str]:
-    """Return a note with the number of values beyond a horizontal axis; none without such values."""
+    """Return a note with the number of values beyond a horizontal axis, if there are any."""
     count = sum(int((sample > axes.get_xlim()[1]).sum()) for sample in samples)
     if not count:
         return []
@@ -200,6 +202,7 @@ def _draw_curve(
     kept = np.unique(np.linspace(0, values.size - 1, min(values.size, MAX_POINTS)).astype(np.int64))
     rising = every.values[kept]
     end = max(float(values.max()), axes.get_xlim()[1])
+
     if banded:
         band: dict[str, Any] = {
             "facecolor": look["color"],
@@ -208,6 +211,7 @@ def _draw_curve(
             "step": "post",
         }
         axes.fill_between(rising, every.lower[kept], every.upper[kept], **band)
+
     shares = [0.0, *every.probability[kept], 1.0]
     axes.plot(
         [rising[0], *rising, end], shares, drawstyle="steps-post", zorder=3.0, label=label, **look

@@ -65,6 +65,7 @@ def draw_process(records: Sequence[Record]) -> Figure:
     figure = new_figure(190.0)
     parts = figure.subfigures(1, len(records), squeeze=False)[0]
     grids = []
+
     for part, record, title in zip(parts, records, record_titles(records), strict=True):
         part.suptitle(plain(f"{title}\n{textwrap.fill(outcome_title(record), 44)}"))
         traces = traces_of([record])
@@ -102,6 +103,7 @@ def _draw_column(column: Sequence[Axes], trace: Trace, clock: Clock, impulse_m_s
         _draw_sight(angle, trace, clock, "angle")
         _draw_sight(rate, trace, clock, "rate")
         miss.set_xlabel("time t, s")
+
     _draw_impulse(impulse, trace, clock, impulse_m_s)
     draw_predicted_miss(miss, trace, clock)
 
@@ -261,6 +263,7 @@ def _level(row: Sequence[Axes], traces: Sequence[Trace], sensor: str) -> None:
         shown = ranges >= RANGE_SHARE * ranges.max()
         steps, measured = _measured(trace, sensor)
         values += [_true(trace, sensor)[shown], measured[shown[steps]]]
+
     far = np.concatenate(values)
     # Values without extent have a margin, too.
     margin = 0.12 * float(np.ptp(far)) or 0.1 * float(np.abs(far).max()) or 1.0

@@ -47,6 +47,7 @@ _SQUARE: dict[str, Any] = {
     "markersize": 5.5,
 }
 _SECTIONS = 5
+"""Maximum number of sections of a plane: more would hide each other."""
 _RATES = ("µrad/s", "nrad/s")
 """Units of rates; the second one is for small numbers."""
 _ANGLES = ("mrad", "µrad")
@@ -82,12 +83,14 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
     columns = len(rows[0])
     width_mm = WIDTH_MM if columns > 1 else 100.0
     figure, grid = subplots(15.0 + 60.0 * len(rows), len(rows), columns, width_mm=width_mm)
+
     for row, planes in zip(grid, rows, strict=True):
         for axes, plane in zip(row, planes, strict=True):
             draw_plane(axes, plane)
         level_planes(row, planes)
         for axes, plane in zip(row, planes, strict=True):
             _shade_allowed(axes, plane)
+
     titles = [plane.title for planes in rows for plane in planes]
     if columns > 2:
         letters([*grid.flat], [title.replace(", ", ",\n") for title in titles], fontsize=7.0)
@@ -176,6 +179,7 @@ def planes_at(records: Sequence[Record], time_s: float, sections: int) -> list[P
             Plane(title, noise, record, axis, step, chosen)
             for axis in range(len(record.scenario.set_model.axes))
         ]
+
     return planes
 
 

@@ -22,13 +22,15 @@ MAX_VECTORS = 2000
 """Number of points above which they are pixels in the PDF file."""
 
 _TICKS_S = (0.01, *SECONDS.values())
+"""Ticks of the time before the arrival."""
 _MORE_TICKS_S = (0.1, 10.0, 10.0 * SECONDS["min"], 6.0 * SECONDS["h"], 10.0 * SECONDS["d"])
-"""Ticks of the time before the arrival, and those that have a label only in a short flight."""
+"""Ticks that have a label only in a short flight: in a long one the labels would overlap."""
 _LONG = 1000.0
 """Ratio of the first and the last time from which a flight is long."""
 _MIN_DISC = 0.02
-"""Share of the axes below which the disc of a body is not drawn: it would be hidden by the mark of
-its centre.
+"""Share of the axes below which the disc of a body is not drawn.
+
+The mark of its centre would hide it.
 """
 
 
@@ -114,6 +116,7 @@ def count_down(column: Sequence[Axes], scenario: Scenario) -> None:
     if begin_s < _LONG * end_s:
         ticks = [*ticks, *more]
         more = []
+
     for axes in column:
         axes.set_xscale("log")
         axes.set_xlim(1.1 * begin_s, end_s)
@@ -123,6 +126,7 @@ def count_down(column: Sequence[Axes], scenario: Scenario) -> None:
         axes.xaxis.set_minor_formatter(NullFormatter())
         for time_s in marks(scenario).values():
             axes.axvline(time_s, zorder=1.5, label="times of the schedule", **EVENT)
+
     column[-1].set_xlabel("time to go")
 
 
