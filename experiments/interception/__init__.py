@@ -1,3 +1,1 @@
-"""The interception of an asteroid: scenario and record files, commands, figures, page and printed
-numbers.
-"""
+"""The interception of an asteroid: files, commands, figures, page and printed numbers."""

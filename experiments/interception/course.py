@@ -123,6 +123,7 @@ def marks(scenario: Scenario) -> dict[str, float]:
     planned = schedule(scenario)
     if planned is None:
         return {}
+
     times = {}
     if sensor.first_image_s is not None and planned.images_s:
         times["first image"] = planned.images_s[0]
@@ -193,6 +194,7 @@ class Courses:
                 scheduled = scenario.impulse_steps or ()
             steps = np.unique([*by_logarithm, *evenly(every, half), *scheduled])
             self.steps = steps.astype(np.int64)
+
         self.possible_m = np.full((min(runs, MAX_COURSES), len(self.steps)), np.nan)
         self.impulse_m_s = np.zeros_like(self.possible_m)
 

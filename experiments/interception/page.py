@@ -147,6 +147,7 @@ def _facts(record: Record, kept: Sequence[int]) -> dict[str, object]:
         facts += f"; the page has {len(kept)} of {record.steps} steps"
     range_sensor = scenario.range_sensor
     rate_sensor = scenario.rate_sensor
+
     return {
         "outcome": outcome_title(record),
         "facts": facts,
@@ -212,6 +213,7 @@ def _axis_data(record: Record, axis: int, kept: Sequence[int]) -> dict[str, obje
         if kind.is_lateral:
             measured = record.measured.get(kind.name, unknown)
             data[f"measured_{kind.quantity}"] = _known(measured[kept, axis])
+
     fired = np.flatnonzero(modulus(record.impulse_m_s.T))
     return data | {
         "true_angle_rad": angles[kept].tolist(),
@@ -264,6 +266,7 @@ def computed_again(
     before = {}
     misses_m = {}
     sets = replayed(record.scenario, record.measured, record.impulse_m_s)
+
     # The sets before and after the measurement of a step follow each other.
     for number, information in enumerate(sets):
         step, is_measured = divmod(number, 2)
@@ -272,6 +275,7 @@ def computed_again(
             misses_m[step] = intervals[:, 0, information.feasible[0]]
         elif not is_measured and {step - 1, step} & wanted:
             before[step] = tuple(information.sections())
+
     return before, misses_m
 
 
@@ -301,6 +305,7 @@ def packed_outlines(outlines: Sequence[Floats], tolerance: float = 0.0) -> dict[
         share, line = shapely.get_coordinates(shapely.simplify(lines, tolerance), return_index=True)
         share = share[np.append(line[1:] == line[:-1], False)]
         counts = np.bincount(line) - 1
+
     return {
         "boxes": _packed(np.concatenate([minimum, maximum], axis=1), "<f8"),
         "counts": _packed(counts, "<u4"),

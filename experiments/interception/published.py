@@ -62,6 +62,7 @@ def compute(progress: Progress) -> dict[str, Sequence[Ours | float]]:
             *np.quantile(found.miss_m, (0.5, 0.9)),
             np.quantile(found.impulse_m_s, 0.5),
         ]
+
     return numbers
 
 

@@ -1,7 +1,7 @@
 """Records of engagements as `.npz` files: arrays without pickle, and a JSON header.
 
-The lateral axes of arrays are those of `SetModel.axes`, in their order. NaN is a value that is not
-known. The sets are not stored: they follow from the measurements and the impulses.
+The lateral axes of arrays are in the order of `SetModel.axes`. NaN is a value that is not known.
+The sets are not stored: they follow from the measurements and the impulses.
 """
 
 from __future__ import annotations
@@ -169,7 +169,7 @@ def _to_arrays(record: Record) -> Arrays:
 
 
 def _read_arrays(content: bytes) -> Arrays:
-    """Read the arrays of an archive, whose directory is checked before a member is read."""
+    """Read the arrays of an archive, after its directory is checked."""
     # Entries of the directory; the bytes of numbers may look like an entry, too.
     if content.count(b"PK\x01\x02") > 2 * len(MEMBERS):
         raise ValueError("it has more members than a record")
@@ -207,6 +207,7 @@ def _check(arrays: Arrays, axes: int) -> None:
         "axes + 1": axes + 1,
         "bytes": arrays["header"].size,
     }
+
     for name, member in MEMBERS.items():
         values = arrays[name]
         shape = tuple(sizes.get(size, size) for size in member.shape)
@@ -253,6 +254,7 @@ def replayed(
         name: np.asarray(~np.isnan(values.reshape(len(values), -1)).any(axis=1))
         for name, values in measured.items()
     }
+
     for step, impulse in enumerate(impulse_m_s):
         yield information
         values = {
@@ -265,6 +267,7 @@ def replayed(
         information.shift(impulse[:, None])
         information.drop_below_threshold()
         information.predict()
+
     yield information
 
 
@@ -281,6 +284,7 @@ def _to_record(header: Header, arrays: Arrays) -> Record:
         "outcomes": (header.outcome,),
         "causes": (header.cause,),
     }
+
     for name, column in _RESULT.items():
         unknown = np.isnan(arrays[name])
         values: NDArray[Any] = np.where(unknown, 0.0, arrays[name]).astype(column.kind)

@@ -30,7 +30,7 @@ KEYS = {
     MissCause.SATURATED: (IMPULSE, PIXEL, SCALE),
     MissCause.GUIDANCE: (),
 }
-"""Keys whose change can remove a cause; another strategy is no key."""
+"""Keys whose change can remove a cause; another strategy is not a key."""
 MAX_DOUBLINGS = 10
 """Maximum number of doublings, or halvings, of a value: a factor of 1000 is another mission."""
 NEAR = 1.02
@@ -54,8 +54,8 @@ class Remedy:
         Value nearest to `now`, of three digits, at which it does not; None if no value up to
         `not_enough` is enough.
     hits : HitEstimate or None
-        Of as many other runs with `enough`: the value was chosen for the first ones, so their share
-        of hits is no estimate.
+        Hits of as many other runs with `enough`. The value was chosen for the first ones, so their
+        share of hits is biased.
     missed : mapping of str to int
         Misses of these other runs by cause.
     """
@@ -90,9 +90,9 @@ class Remedy:
 def find_remedies(task: Task, results: Results, progress: Progress) -> list[Remedy]:
     """Return the remedies of all causes in the results of a task.
 
-    The keys are those that its scenario has. A maximum impulse for the cause `engine` follows in
-    closed form, because its authority is proportional to it. The other values are found by
-    bisection: all runs are simulated again with each value.
+    Keys that its scenario does not have are left out. A maximum impulse for the cause `engine`
+    follows in closed form, because its authority is proportional to it. The other values are found
+    by bisection: all runs are simulated again with each value.
     """
     wanted = [
         (cause, key)
@@ -170,12 +170,14 @@ def _search(
         not_enough = enough
     else:
         return not_enough, None
+
     while max(enough, not_enough) > NEAR * min(enough, not_enough):
         middle = _rounded(math.sqrt(enough * not_enough))
         if occurs(middle):
             not_enough = middle
         else:
             enough = middle
+
     return not_enough, enough
 
 

@@ -61,6 +61,7 @@ def save(
         text = results.to_csv()
     else:
         raise InputError(f"{file}: results are written as .json or .csv; for example results.json")
+
     write_file(file, text, overwrite=overwrite)
 
 
@@ -85,6 +86,7 @@ def load_results(path: str | os.PathLike[str]) -> Results:
         )
     except (ValueError, TypeError, OverflowError, RecursionError) as error:
         reason = on_a_screen(str(error)[:LONGEST_REASON])
+
     raise InputError(
         f"{file}: are not readable results: {reason}; infoset.save(results, 'FILE.json') makes them"
     )

@@ -40,8 +40,9 @@ FEW_TIMES = 3
 STEP_COST_S = 1e-5
 """Typical time of a step of a run along one axis, s."""
 LARGEST_BODY_M = 20_000.0
-"""Radius, m, above that of all near-Earth asteroids: (1036) Ganymed, the largest one, has about 18
-km.
+"""Radius, m, above which a warning reports it.
+
+The largest near-Earth asteroid, (1036) Ganymed, has a radius of about 18 km.
 """
 SMALL_ANGLE_RAD = 0.01
 """Largest line-of-sight angle for the model `paper`, which replaces tangents by their angles."""
@@ -50,7 +51,7 @@ SMALL_ANGLE_RAD = 0.01
 def load_scenario(
     name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None
 ) -> Scenario:
-    """Read a built-in scenario or a scenario file; the parameters are those of `read_file`.
+    """Read a built-in scenario or a scenario file; the parameters are as in `read_file`.
 
     Raise `InputError` if there is no such scenario or file, or it is invalid, or gravity has no
     bound in it.
@@ -93,6 +94,7 @@ def scenario_with(options: Any) -> Scenario:
             f"--range-sensor: the scenario {scenario.name} has no [range_sensor]; add that table "
             "to its file"
         )
+
     if range_sensor is False:
         scenario = replace(scenario, range_sensor=None)
     if model is not None:
@@ -205,6 +207,7 @@ def _target_warnings(scenario: Scenario) -> list[str]:
                 f"target.{key}, {acceleration:g}, exceeds information_set.{bound_key}, {bound:g}: "
                 "the guaranteed model does not allow for it and may lose the true state"
             )
+
     # Without a key for y, both axes have the same line.
     return list(dict.fromkeys(lines))
 
@@ -214,6 +217,7 @@ def flight_facts(scenario: Scenario) -> list[str]:
     found = feasibility(scenario)
     if found is None:
         return []
+
     lines = [
         (
             f"flight: {duration_text(scenario.nominal_arrival_s)} in {found.steps} steps of "
@@ -229,6 +233,7 @@ def flight_facts(scenario: Scenario) -> list[str]:
     possible = found.possible_miss
     if possible is None:
         return lines
+
     if possible.images_m is not None:
         lines.append(
             "miss that the images alone leave possible, with errors at their bounds (closed "
@@ -249,6 +254,7 @@ def schedule_lines(scenario: Scenario) -> list[str]:
     times = schedule(scenario)
     if times is None:
         return []
+
     lines = [
         (
             f"images: {_span(times.images_s)}; {times.images_before_last_decision} before the "
@@ -262,11 +268,13 @@ def schedule_lines(scenario: Scenario) -> list[str]:
         by_key.setdefault(each.key, []).append(
             f"{_seconds(each.scheduled_s)} s instead of {_seconds(each.asked_s)} s"
         )
+
     for key, texts in by_key.items():
         line = f"{key}: {'; '.join(texts[:FEW_TIMES])}"
         if len(texts) > FEW_TIMES:
             line += f", and {len(texts) - FEW_TIMES} more"
         lines.append(f"{line} (nearest possible times)")
+
     return lines
 
 
@@ -344,6 +352,7 @@ def _authority_warnings(scenario: Scenario, found: Feasibility) -> Iterator[str]
     if scenario.body:
         aim = "hit"
     before = 0.0
+
     for share, corrected_m, name, key in (
         (found.beyond_engine, found.engine_corrects_m, "engine", "max_impulse_m_s"),
         (found.beyond_budget, found.budget_corrects_m, "budget", "budget_m_s"),
@@ -364,6 +373,7 @@ def _body_warnings(scenario: Scenario, found: Feasibility) -> Iterator[str]:
     radius_m = scenario.radius_m
     if radius_m is None:
         return
+
     possible = found.possible_miss
     if possible is not None and possible.images_and_speeds_m > radius_m:
         yield (
@@ -372,6 +382,7 @@ def _body_warnings(scenario: Scenario, found: Feasibility) -> Iterator[str]:
             f"{radius_m:g}: no hit is certain before the flight; smaller errors of the images or a "
             "later last impulse would change it"
         )
+
     if found.unguided_miss_m <= radius_m:
         yield (
             f"body.radius_m is {radius_m:g}, and the starts of [dispersion] miss by at most "

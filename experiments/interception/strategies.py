@@ -52,12 +52,14 @@ def chosen_strategies(scenario: Scenario, names: str | None) -> Mapping[str, Str
     if names is not None:
         texts = [part.strip() for part in names.split(",")]
     chosen: dict[str, Strategy | None] = {}
+
     for text in texts:
         own = own_strategy(text, "--strategies")
         if own is None:
             chosen[choice("--strategies", text, valid)] = None
         else:
             chosen[strategy_name(scenario, own)] = own
+
     return chosen
 
 
@@ -137,6 +139,7 @@ def _load(
             f"{option}: {shown(text)} must be FILE.py:CLASS, the path of a file that exists and "
             "its class"
         )
+
     # The newest class is the last one, which `own_code_errors` examines first.
     _LOADED.pop((file, class_name), None)
     _LOADED[file, class_name] = option
@@ -145,10 +148,12 @@ def _load(
             sys.path.append(str(file.parent))
         importlib.invalidate_caches()
         module = importlib.import_module(file.stem)
+
     if Path(module.__file__ or "").resolve() != file:
         raise InputError(
             f"{option}: {file.name} has the name of another Python module; rename the file"
         )
+
     # Kept by the module: the file may change after its import.
     digest = vars(module).setdefault(
         "_sha256_at_import", hashlib.sha256(file.read_bytes()).hexdigest()
@@ -161,6 +166,7 @@ def _load(
             f"{option}: {name} has no class {shown(class_name)} with the {needed} "
             f"{' and '.join(methods)}; check the name"
         )
+
     found = f"{file.name}:{class_name} sha256:{digest[:16]}"
     if version not in (None, found):
         raise InputError(f"{option}: {text} has changed since the command started; run it again")

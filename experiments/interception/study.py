@@ -175,6 +175,7 @@ def compared_scenarios(
                     flown[name, noise, tie] = replace(noisy, tie=tie)
             else:
                 flown[name, noise, None] = noisy
+
     return flown
 
 
@@ -241,6 +242,7 @@ def set_warnings(model: Model, counts: SetCounts) -> list[str]:
             f"warning: model paper: {failures}; the quantiles include these failures of the model; "
             "for quantiles without them, use --model guaranteed"
         ]
+
     return [
         f"warning: model guaranteed: {failures}, so an assumption of the model does not hold: the "
         "noise exceeds the bounds of the sensors, or the scenario exceeds those of the model; "

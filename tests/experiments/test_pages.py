@@ -20,8 +20,8 @@ from hypothesis import strategies as st
 from infoset import InitialSet, Model, RateSensor, Recovery
 from infoset.experiments.common.page_document import embedded_json, page
 from infoset.experiments.interception.page import (
-    STEPS_OF_A_BOX,
     OUTLINE_TOLERANCE,
+    STEPS_OF_A_BOX,
     computed_again,
     interception_page,
     packed_outlines,
@@ -118,7 +118,7 @@ def test_replaying_gives_the_recorded_sets_bit_for_bit(name: str) -> None:
 
 
 @pytest.mark.parametrize("kind", list(Model))
-def test_what_was_before_holds_what_is_after(kind: Model) -> None:
+def test_predicted_section_contains_the_measured_section(kind: Model) -> None:
     scenario = load_scenario("asteroid-1997")
     initial = InitialSet.BOX if kind is Model.GUARANTEED else InitialSet.RECTANGLE
     model = replace(scenario.set_model, model=kind, initial_set=initial)

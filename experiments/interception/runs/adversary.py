@@ -55,6 +55,7 @@ def run(options: Adversary) -> None:
             work.written.save("steps.csv", steps_csv([record]))
             work.written.save(RECORD, record_bytes(record), "--record")
             draw_engagements([record], work.written, work.begin)
+
     show(_parts(scenario, worst, options, elapsed_s), options.quiet or work.written.stdout_taken)
 
 
@@ -150,6 +151,7 @@ def _parts(
         "simulated truth: the strategy cannot guarantee a smaller miss, and greater misses may "
         "exist"
     )
+
     if not is_same:
         emptied = max(found.sets_emptied for found in worst.engagements)
         note = (

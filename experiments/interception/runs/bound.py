@@ -96,6 +96,7 @@ def run(options: Bound) -> None:
     strategies: Mapping[str, Strategy | None] = {}
     if options.budget > 0 or options.strategies is not None:
         strategies = chosen_strategies(scenario, options.strategies)
+
     with work_of(options, scenario, figure_files(FIGURE), notes=notes) as work:
         # The bound is printed at once, before the strategies are simulated.
         lower = lower_bound(scenario, progress=work.begin("lower bound"))
@@ -114,6 +115,7 @@ def run(options: Bound) -> None:
 
             worst_m = {strategy.name: strategy.worst_m for strategy in worst}
             work.written.figure(FIGURE, draw_bound(scenario, lower, worst_m))
+
     show(
         [
             *_value_lines(lower.bound_m, value, best),
@@ -137,6 +139,7 @@ def _worst_of_strategies(
     rows = RowByRow(STRATEGY_TITLES, strategies, quiet)
     reports = parts_of(progress, len(strategies))
     worst = []
+
     for (name, own), report in zip(strategies.items(), reports, strict=True):
         strategy = _simulate(scenario, lower, name, own, options, report)
         values = [
@@ -147,6 +150,7 @@ def _worst_of_strategies(
         ]
         rows.add(name, *map(number, values))
         worst.append(strategy)
+
     show([""], quiet)
     return worst
 
@@ -230,6 +234,7 @@ def _strategy_json(
         }
         for pair, flight in strategy.flights
     ]
+
     return {
         "name": strategy.name,
         "worst_found_m": strategy.worst_m,
@@ -360,6 +365,7 @@ def _bound_parts(scenario: Scenario, lower: LowerBound, nominal: TruthPair) -> I
         "range at t = 0\nkm",
         "equal measurements until\ns before arrival",
     )
+
     for pair in lower.pairs:
         equal_until = "one motion"
         if not pair.is_single:
@@ -370,6 +376,7 @@ def _bound_parts(scenario: Scenario, lower: LowerBound, nominal: TruthPair) -> I
             f"{pair.label_m / M_PER_KM:.1f}",
             equal_until,
         )
+
     yield bounds
     yield ""
 
@@ -386,6 +393,7 @@ def _notes(
         if not scenario.set_model.is_guaranteed:
             note += "; try --model guaranteed"
         yield note
+
     if any(pair.is_single for pair in lower.pairs):
         yield (
             "one motion: a start that all impulses together do not bring nearer, whatever is "

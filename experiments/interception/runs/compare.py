@@ -72,6 +72,7 @@ def run(options: Compare) -> None:
     strategies = chosen_strategies(scenario, options.strategies)
     noises = chosen_noises(options.noise)
     figures = [FIGURE, *b_plane_figures(scenario, noises)]
+
     with work_of(options, scenario, ["results.csv", *figure_files(*figures)], notes=notes) as work:
         wanted = compared_scenarios(scenario, strategies, noises)
         # Each strategy has a progress bar, of which its scenarios are equal parts.
@@ -103,6 +104,7 @@ def run(options: Compare) -> None:
             from infoset.experiments.interception.figures.commands import draw_compared
 
             work.written.draw(figures, draw_compared(scenario, compared), work.begin("figure"))
+
     show(_parts(scenario, compared), options.quiet or work.written.stdout_taken)
 
 
@@ -190,6 +192,7 @@ def _set_table(scenario: Scenario, compared: Sequence[Comparison]) -> Table:
     if scenario.body is not None:
         titles += [f"hit: miss at\nmost {scenario.body.radius_m:g} m", "95 % CI\nof a hit"]
     table = number_table("noise", "strategy", *titles, left=2)
+
     for comparison in compared:
         counts = _set_counts(comparison)
         row = [
@@ -201,6 +204,7 @@ def _set_table(scenario: Scenario, compared: Sequence[Comparison]) -> Table:
             row.append(f"{hits.hits} ({percent(hits.probability)})")
             row.append(f"{percent(hits.lower)} to {percent(hits.upper)}")
         table.add_row(comparison.noise, comparison.strategy, *row)
+
     return table
 
 
@@ -245,5 +249,6 @@ def _best(compared: Sequence[Comparison], noises: Sequence[str]) -> str:
     always = [name for name in near[noises[0]] if all(name in names for names in near.values())]
     if always:
         return f"{within} with every noise: {', '.join(always)}"
+
     by_noise = "; ".join(f"{', '.join(names)} with {noise}" for noise, names in near.items())
     return f"the best strategy depends on the noise; {within}: {by_noise}"

@@ -43,6 +43,7 @@ def run(options: Engage) -> None:
         *(f"record-{noise}.npz" for noise in noises),
         *figure_files(*engagement_figures(scenario)),
     ]
+
     with work_of(options, scenario, names, _record_files(options, noises)) as work:
         records = []
         summaries = {}
@@ -65,6 +66,7 @@ def run(options: Engage) -> None:
         for noise, record in zip(noises, records, strict=True):
             work.written.save(f"record-{noise}.npz", record_bytes(record), f"--record of {noise}")
         draw_engagements(records, work.written, work.begin)
+
     show(engagement_parts(records), options.quiet or work.written.stdout_taken)
 
 
@@ -137,6 +139,7 @@ def _step_rows(record: Record) -> list[dict[str, Cell]]:
         "measured_range_m": record.measured.get("range", unknown[:, 0]),
         "impulse_m_s": modulus(record.impulse_m_s.T),
     }
+
     for number, axis in enumerate(record.scenario.set_model.axes):
         columns |= {
             f"measured_angle_{axis}_rad": record.measured["angle"][:, number],
@@ -147,6 +150,7 @@ def _step_rows(record: Record) -> list[dict[str, Cell]]:
             f"predicted_miss_{axis}_lower_m": record.predicted_miss_m[:, number, 0],
             f"predicted_miss_{axis}_upper_m": record.predicted_miss_m[:, number, 1],
         }
+
     columns["truth_margin_m"] = record.truth_margin_m
 
     rows = []
@@ -156,4 +160,5 @@ def _step_rows(record: Record) -> list[dict[str, Cell]]:
             row[name] = None if np.isnan(values[step]) else float(values[step])
         row["sections"] = len(record.sections[step])
         rows.append(row)
+
     return rows

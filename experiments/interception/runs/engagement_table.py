@@ -41,6 +41,7 @@ def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
     lateral = sorted({axis for record in records for axis in record.scenario.set_model.axes})
     titles = []
     columns = []
+
     for record in records:
         title = record.noise_name
         if record.scenario.range_sensor is not None:
@@ -76,6 +77,7 @@ def _column(
             _, impulse_m_s = printed[record.noise_name]
         column["impulse that the paper prints, m/s"] = number(impulse_m_s)
     column[bound] = number(result["guaranteed_miss_m"])
+
     return column | {
         "outcome": _outcome(record),
         "true state inside the set\nat every step": _yes(result["truth_kept"]),

@@ -92,6 +92,7 @@ def run(options: Experiment) -> None:
         CORRIDOR,
         *b_plane_figures(scenario, noises),
     ]
+
     with work_of(options, scenario, ["results.csv", *figure_files(*figures)]) as work:
         if scenario.range_sensor is None:
             cases = f"{noise.name} and game noise only"
@@ -135,6 +136,7 @@ def run(options: Experiment) -> None:
             work.written.draw(
                 figures, draw_experiment(scenario, curves, courses), work.begin("figure")
             )
+
     show(_parts(scenario, curves, remedies), options.quiet or work.written.stdout_taken)
 
 
@@ -189,6 +191,7 @@ def _flights(
             observe=course.observe if options.out is not None else None,
         )
         flights.append(_Flight(curve, name, task, course))
+
     return flights
 
 
@@ -273,6 +276,7 @@ def _quantile_table(scenario: Scenario, curves: Sequence[Curve]) -> Table:
         if results.guaranteed_miss_m.count():
             bounds = summary(results.guaranteed_miss_m.compressed())
             table.add_row("", bound_name(scenario), *map(number, bounds.values()))
+
     return table
 
 
@@ -310,6 +314,7 @@ def burns_key(scenario: Scenario, results: Results) -> dict[str, list[dict[str, 
         return {}
     whole = float(results.burns_m_s.sum())
     burns = []
+
     for step, sizes in zip(scenario.impulse_steps or [], results.burns_m_s.T, strict=True):
         burn: dict[str, float | None] = {
             "before_arrival_s": scenario.nominal_arrival_s - step * scenario.set_model.step_s
@@ -317,6 +322,7 @@ def burns_key(scenario: Scenario, results: Results) -> dict[str, list[dict[str, 
         burn |= zip(LEVELS, shown_quantiles(sizes, [*LEVELS.values()]), strict=True)
         burn["share"] = float(sizes.sum()) / whole if whole > 0.0 else None
         burns.append(burn)
+
     return {"burns": burns}
 
 
@@ -336,4 +342,5 @@ def burn_table(scenario: Scenario, curves: Sequence[Curve]) -> Table:
                 *(number(burn[key]) for key in LEVELS),
                 number(None if share is None else 100.0 * share),
             )
+
     return table

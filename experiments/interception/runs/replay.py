@@ -24,10 +24,12 @@ def run(options: Replay) -> None:
         raise InputError(
             f"replay needs one record or two records, found {len(options.records)}; omit some"
         )
+
     with input_errors("--times", "; for example --times 0.5,40,90"):
         times_s = [float(time_s) for time_s in options.times.split(",") if time_s]
         if not all(0.0 <= time_s < math.inf for time_s in times_s):
             raise ValueError("times must be finite and not negative")
+
     # The scenario, on which the names of the figures depend, is known after the records are read,
     # which can take long.
     figures = figure_files(*dict.fromkeys([*FIGURES, *FIGURES_OF_PAPER]))
@@ -43,4 +45,5 @@ def run(options: Replay) -> None:
 
             written.deliver("--gif", animate(records, progress=begin(options.gif.name)))
         draw_engagements(records, written, begin, times_s)
+
     show(engagement_parts(records), options.quiet)

@@ -132,6 +132,7 @@ def allowance(scenario: Scenario) -> str | None:
             f"{along.disturbance_m_s2:g} and gravity {along.gravity_m_s2:.2g}, divided by 1 - "
             f"{along.speed_error:.4f})"
         )
+
     line = (
         f"the guaranteed model assumes: {', '.join(accelerations)}; relative error of the closing "
         f"speed at most {model.speed_error:.2%}, of impulses at most "

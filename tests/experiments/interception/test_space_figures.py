@@ -89,7 +89,7 @@ def test_with_several_results_of_a_run_the_worst_is_drawn(results: Results) -> N
     np.testing.assert_array_equal(worst.across_m[~worse], near.lateral_miss_m[~worse])
 
 
-def test_ellipses_contain_their_share_of_the_runs_and_are_not_beyond_the_guaranteed_miss() -> None:
+def test_ellipses_contain_their_share_of_the_runs_within_the_guaranteed_miss() -> None:
     across = np.random.default_rng(3).normal(size=(400, 2)) @ np.array([[3.0, 1.0], [0.0, 0.5]]) + [
         4.0,
         -2.0,
@@ -131,7 +131,7 @@ def test_wide_misses_have_a_panel_at_the_scale_of_the_body() -> None:
     assert far.get_xlabel() == "miss along y, km"
 
 
-def test_sets_much_smaller_than_others_have_their_own_limits(records: list[Record]) -> None:
+def test_planes_of_very_different_sets_have_individual_limits(records: list[Record]) -> None:
     random, game = records
     step = int(np.abs(random.time_s - 60.0).argmin())
     figure = draw_sets(records, [float(random.time_s[step])])
@@ -206,7 +206,7 @@ def test_approach_shows_possible_misses_and_the_schedule(records: list[Record]) 
 
 
 @pytest.mark.parametrize("name", ["asteroid-1997", "asteroid-1997-space"])
-def test_courses_are_those_of_single_engagements(
+def test_courses_equal_the_records_of_single_engagements(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys.modules["infoset.sim.simulate"], "ENGAGEMENTS_AT_ONCE", 2)
