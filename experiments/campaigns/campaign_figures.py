@@ -85,6 +85,7 @@ def _distributions(folder: CampaignFolder) -> list[Sample]:
                 guaranteed_name=f"{noise} noise: {bound}",
             )
         )
+
     return samples
 
 
@@ -109,6 +110,7 @@ def _clouds(folder: CampaignFolder) -> list[Cloud]:
                 has_axes=has_axes,
             )
         )
+
     return clouds
 
 
@@ -124,6 +126,7 @@ def draw_convergence(by_noise: dict[str, pd.DataFrame]) -> Figure:
         for axes, (quantity, label) in zip(row, _QUANTITIES.items(), strict=True):
             _draw_quantiles(axes, runs[quantity].to_numpy(), _look(noise)["color"])
             axes.set(xlabel="runs", ylabel=label)
+
     letters(panels.flat, [f"{noise} noise" for noise in by_noise for _ in _QUANTITIES])
 
     title = "bands: 95 % confidence intervals"
@@ -140,6 +143,7 @@ def _draw_quantiles(axes: Axes, sample: Floats, colour: str) -> None:
         np.geomspace(min(10, sample.size), sample.size, _LOOKS).astype(np.int64)
     ).tolist()
     looks = [estimate_quantiles(sample[:count], [*CONVERGING]) for count in counts]
+
     for index, (level, dashes) in enumerate(CONVERGING.items()):
         found = pd.DataFrame([look[index] for look in looks], index=counts, dtype=np.float64)
         found = found[[shows(count, level) for count in counts]]

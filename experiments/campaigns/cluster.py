@@ -39,6 +39,7 @@ def workers_of(
         raise InputError(
             "--workers and --dask (a cluster) cannot be combined; give only one of them"
         )
+
     workers = options.workers or os.cpu_count() or 1
     if options.dask is not None:
         with cluster(options.dask, note) as (executor, threads):

@@ -47,7 +47,7 @@ def scenario_of(options: FlightOptions) -> tuple[Scenario, list[str]]:
 
 
 def noise_of(options: FlightOptions) -> CampaignNoise | OwnNoise | None:
-    """Return the noise of the options; None is that of the scenario."""
+    """Return the noise of the options; None is the noise of the scenario."""
     if options.noise is None:
         return None
     names = [noise.value for noise in CampaignNoise if noise is not CampaignNoise.OWN]
@@ -72,7 +72,7 @@ def fly(
 
     note = partial(say, quiet=options.quiet)
     with (
-        workers_of(options, campaign.max_engagements, note) as (executor, workers),
+        workers_of(options, campaign.engagements, note) as (executor, workers),
         progress_bar(options.quiet) as begin,
     ):
         began_s = time.perf_counter()
@@ -83,6 +83,7 @@ def fly(
             progress=begin("campaign"),
             within_chunks=True,
         )
+
     return folder, warnings, time.perf_counter() - began_s
 
 

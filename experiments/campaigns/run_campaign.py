@@ -70,5 +70,6 @@ def run(options: CampaignOptions) -> None:
         written.save(SCENARIO_FILE, to_toml(scenario))
         written.save(SUMMARY, to_json(results), "--json")
         written.deliver("--csv", table.drop(columns="cell").to_csv(index=False))
+
     parts.append(f"to see the results: infoset report {stored.path}")
     show(parts, options.quiet or written.stdout_taken)

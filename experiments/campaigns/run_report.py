@@ -75,11 +75,13 @@ def _read(options: ReportOptions) -> CampaignFolder:
         raise InputError(
             f"{path}: is no folder; name the folder of infoset campaign or infoset sweep"
         )
+
     folder = CampaignFolder.read(path)
     if not folder.finished_runs:
         raise InputError(
             f"{path}: contains no runs yet; continue with: infoset {folder.manifest.kind} --resume"
         )
+
     if not folder.complete:
         wanted = f"{folder.wanted_runs} runs"
         if folder.manifest.until:
@@ -104,6 +106,7 @@ def _report_sweep(
             f"--require {required}: this sweep was simulated without the bound Phi; simulate it in "
             "a new folder with infoset sweep --guarantee, or give a bound of miss_m"
         )
+
     report = SweepReport(folder, sweep_table(folder, required))
     written.save("report.json", to_json(report.to_json()), "--json")
     written.deliver("--csv", report.table.rows.to_csv(index=False))
@@ -118,6 +121,7 @@ def _report_campaign(
         raise InputError(
             f"--require: is only for a sweep, and {folder.path} is a campaign; omit it"
         )
+
     table = summary(folder)
     related = correlations(folder)
     worst = worst_runs(folder, _scenario_file(folder, options.out))
@@ -173,5 +177,6 @@ def _parts(
         impulse = number(row["impulse_m_s"])
         how = ending(row["outcome"], row["hit"], row["cause"])
         yield f"  miss {miss} m, impulse {impulse} m/s, {how}: {row['replay']}"
+
     if not (folder.path / SCENARIO_FILE).is_file():
         yield f"(the folder has no {SCENARIO_FILE}, which these commands need; --out writes one)"

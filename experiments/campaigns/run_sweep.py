@@ -53,6 +53,7 @@ def run(options: Options) -> None:
         written.save(SCENARIO_FILE, to_toml(scenario))
         report.save(written)
         written.save("summary.json", summary, "--json")
+
     show(report.parts(), options.quiet or written.stdout_taken)
     if not report.is_drawn:
         say("no figure: a figure can show one or two keys only", options.quiet)

@@ -50,7 +50,7 @@ OUTCOMES = {outcome.value.replace("-", "_"): outcome.value for outcome in Outcom
 
 
 _SIGNED_ONLY = ("start_x_m", "start_vx_m_s")
-"""Components along the approach, whose moduli have no meaning of their own."""
+"""Components along the approach; their moduli have no correlations."""
 CI = ("95 % CI\nfrom", "\nto")
 """Titles of the ends of an interval in a table for the screen."""
 
@@ -82,6 +82,7 @@ def summary(
         values = folder.manifest.values_of(row["cell"])
         varied = {key: value for name, value in values.items() for key in tied_keys(name)}
         rows.append({"cell": row["cell"], **varied, **row})
+
     return pd.DataFrame(rows).astype({"hits": "Int64"})
 
 
@@ -146,6 +147,7 @@ def _quantiles(runs: pd.DataFrame, levels: Sequence[float]) -> dict[str, float]:
             row[name] = math.nan
         row[f"{name}_lower"] = or_nan(estimate.lower)
         row[f"{name}_upper"] = or_nan(estimate.upper)
+
     row[f"{quantity}_max"] = float(known.max())
     return row
 
@@ -182,6 +184,7 @@ def correlations(folder: CampaignFolder) -> pd.DataFrame:
                 lower, upper = correlation_interval(value, size, ranks=kind == "spearman")
                 row |= {kind: value, f"{kind}_lower": lower, f"{kind}_upper": upper}
             rows.append(row)
+
     return pd.DataFrame(rows)
 
 
@@ -202,6 +205,7 @@ def _correlations_with_miss(runs: pd.DataFrame) -> dict[str, Any]:
         found[name] = related(runs[name])
         if name not in _SIGNED_ONLY:
             found[f"|{name}|"] = related(runs[name].abs())
+
     return found
 
 

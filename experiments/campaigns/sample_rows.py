@@ -21,8 +21,9 @@ opens all files, which takes as long as reading a few of their columns, so the c
 campaigns are read together.
 """
 _BYTES = {float: 8, int: 8, bool: 2}
+"""Memory of a value by its kind; a flag can be unknown."""
 _TEXT_BYTES = 4
-"""Memory of a value by its kind; texts are stored as indices."""
+"""Memory of a text, which is stored as an index."""
 _BYTES_A_RUN = {column.name: _BYTES.get(column.kind, _TEXT_BYTES) for column in columns_of(Results)}
 
 
@@ -78,7 +79,7 @@ def fits(columns: Sequence[str], runs: int) -> bool:
 
 
 def _passes(steps: Sequence[Step], runs: int) -> Iterator[list[Step]]:
-    """Yield the steps whose columns are read together, in their order."""
+    """Yield groups of steps in their order; the columns of a group are read together."""
     together: list[Step] = []
     for step in steps:
         wanted = [*together, step]

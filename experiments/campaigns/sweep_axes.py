@@ -45,6 +45,7 @@ def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
             f"--vary: at most {MAX_AXES} keys can be varied at once, found {len(pieces)}; leave "
             "some out"
         )
+
     axes = tuple(_axis(piece.strip(), scenario) for piece in pieces)
 
     # A key may be varied once, also by the factor of its sensor.
@@ -54,6 +55,7 @@ def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
         for tied in tied_keys(axis.key):
             for key in bounds.get(tied, {tied: 0.0}):
                 varied.setdefault(key, []).append(tied)
+
     for names in varied.values():
         if len(names) > 1:
             raise InputError(
@@ -89,6 +91,7 @@ def sweep_cells(scenario: Scenario, axes: Sequence[Axis]) -> tuple[Scenario, ...
                 changes[key] = round(value)
         text = ", ".join(f"{key} = {value:.12g}" for key, value in changes.items())
         cells.append(changed(scenario, changes, f"{scenario.name} with {text}"))
+
     return tuple(cells)
 
 
@@ -118,6 +121,7 @@ def _axis(piece: str, scenario: Scenario) -> Axis:
             f"--vary: {shown(piece)} is not written as KEY=FROM:TO:COUNT or KEY=log:FROM:TO:COUNT; "
             "for example --vary angle_sensor.scale=1:8:8,thruster.max_impulse_m_s=2.5:20:8"
         )
+
     is_log = bool(match[1])
     first = float(match[2])
     last = float(match[3])
@@ -144,6 +148,7 @@ def _axis(piece: str, scenario: Scenario) -> Axis:
             f"--vary: {keys[0]}: {count} values in {shown(written)} are not all different; give "
             "fewer"
         )
+
     with input_errors("--vary"):
         return Axis("=".join(keys), tuple(values), "log" if is_log else "linear")
 
@@ -157,6 +162,7 @@ def _check_keys(keys: Sequence[str], factors: Sequence[str]) -> None:
             if guess := similar_key(key, known):
                 message += f"; did you mean {guess}?"
             raise InputError(message)
+
     if len({unit_of(key) for key in keys}) > 1:
         units = ", ".join(f"{key} in {unit_of(key) or 'no unit'}" for key in keys)
         raise InputError(

@@ -1,7 +1,7 @@
 """Figures of a sweep: decisions and quantiles as lines (one key) or maps (two keys).
 
-The values of a key are drawn at the positions 0, 1, 2, ...: those of `--vary` are equally spaced on
-its scale, linear or logarithmic, and lines between them interpolate on this scale, as
+The values of a key are drawn at the positions 0, 1, 2, ...: the values of `--vary` are equally
+spaced on its scale, linear or logarithmic. Lines between them interpolate on this scale, as
 `sweep_table.limits` does.
 """
 
@@ -116,6 +116,7 @@ def _lines(table: SweepTable, cells: pd.DataFrame, shown: Sequence[QuantileName]
         _draw_requirement(axes, table.required, cells, quantity)
         _name_values(axes.xaxis, axis)
         axes.set(xlim=(-0.5, len(axis.values) - 0.5), ylabel=QUANTITY_NAMES[quantity])
+
     letters(panels)
     legend_below(
         figure, 4, title="bars: 95 % confidence intervals; arrows: too few runs for an upper end"
@@ -203,10 +204,12 @@ def _maps(table: SweepTable, cells: pd.DataFrame, shown: Sequence[QuantileName])
         _draw_heat(figure, axes, _grid(table, cells[column]))
         name, unit = QUANTITY_NAMES[quantile.quantity].split(", ")
         titles.append(f"{name}, {level_name(quantile.level)}, {unit}")
+
     for axes in panels:
         axes.grid(visible=False)
         _name_values(axes.xaxis, table.axes[0])
         _name_values(axes.yaxis, table.axes[1])
+
     letters(panels, titles)
 
     notes = []

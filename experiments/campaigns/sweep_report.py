@@ -87,6 +87,7 @@ class SweepReport:
             }
             for axis in self.table.axes
         ]
+
         return {
             **keys,
             "axes": axes,
@@ -102,6 +103,7 @@ class SweepReport:
         written.save(TABLE, self.table.rows.to_parquet(index=False))
         if not self.is_drawn or written.folder is None:
             return
+
         from infoset.experiments.campaigns.sweep_figures import draw_sweep
 
         required = self.table.required
@@ -167,6 +169,7 @@ class SweepReport:
                 f"{known} of {runs} runs have a value of {self.table.required.quantity}; the "
                 "others do not satisfy the bound"
             )
+
         if counts[Decision.UNDECIDED.value]:
             more = "--until decided (--max-runs, by default 2000)"
             if self.folder.manifest.until:
@@ -224,6 +227,7 @@ class SweepReport:
         keys = self.table.keys
         results = rows.columns[rows.columns.get_loc("noise") + 1 :].drop(["limit_bound"])
         lines = []
+
         for axis, key in zip(self.table.axes, keys, strict=True):
             others = [other for other in keys if other != key]
             fixed = rows.groupby(["noise", *others])[[*results]]

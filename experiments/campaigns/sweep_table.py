@@ -38,8 +38,8 @@ class SweepTable:
     Parameters
     ----------
     rows : DataFrame
-        A row for each cell and noise; the last of the axes varies fastest. The columns are those of
-        `run_tables.summary` and those of the decision: `requirement` (a value of `Decision`; none
+        A row for each cell and noise; the last of the axes varies fastest. The columns are the
+        columns of `run_tables.summary` and the decision: `requirement` (a value of `Decision`; none
         without runs), the required estimate with its interval, `required_value`, `_lower` and
         `_upper`, the runs with a value of the quantity, `required_known`, and the runs of all
         noises that would decide, `runs_needed` (NaN if more than `requirement.MAX_RUNS_NEEDED`).
@@ -95,6 +95,7 @@ def _decision(
         **dict.fromkeys((*_ESTIMATE, "runs_needed"), math.nan),
     }
     values = required.numbers(runs[required.quantity])
+
     if values.size:
         verdict = judge(values, required, watched=folder.manifest.is_watched)
         row["requirement"] = verdict.decision.value
