@@ -55,11 +55,11 @@ def names_in(folder: Path) -> list[str]:
     return sorted(each.name for each in folder.iterdir())
 
 
-def test_version(infoset: Command) -> None:
+def test_version_option_prints_the_version(infoset: Command) -> None:
     assert infoset("--version") == (0, f"infoset {versions()['infoset']}\n", "")
 
 
-def test_help_imports_nothing_heavy_and_no_command_imports_what_draws_before_it_draws() -> None:
+def test_help_and_commands_without_figures_do_not_import_heavy_libraries() -> None:
     heavy = [
         "numpy",
         "numba",
@@ -121,7 +121,7 @@ def test_help_imports_nothing_heavy_and_no_command_imports_what_draws_before_it_
         ),
     ],
 )
-def test_what_is_wrong_is_one_message_before_the_work(
+def test_wrong_option_is_refused_with_one_message_before_the_work(
     line: str, part: str, infoset: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
@@ -166,14 +166,16 @@ def test_experiment_as_json(infoset: Command, tmp_path: Path) -> None:
     assert names_in(tmp_path) == []
 
 
-def test_without_a_range_sensor_there_are_two_curves_and_it_is_said(infoset: Command) -> None:
+def test_experiment_without_range_sensor_has_two_curves_and_a_line_about_it(
+    infoset: Command,
+) -> None:
     code, out, err = infoset("experiment", "asteroid-1997-single", "--runs", 1, "--json", "-")
     assert code == 0
     assert [curve["published_curve"] for curve in json.loads(out)["curves"]] == [1, 3]
     assert "no [range_sensor]: curves 1 and 3 only" in err
 
 
-def test_warnings_are_said_and_written(infoset: Command, tmp_path: Path) -> None:
+def test_warnings_are_printed_and_are_in_the_json(infoset: Command, tmp_path: Path) -> None:
     file = tmp_path / "wide.toml"
     file.write_text(scenario_text("asteroid-1997-single").replace("z_km = -8.0", "z_km = -10.5"))
     code, out, err = infoset("engage", file, "--json", "-")
@@ -294,7 +296,7 @@ def test_engage_under_both_noises(infoset: Command, tmp_path: Path) -> None:
     ("option", "name"),
     [("--json", "x.json"), ("--csv", "x.csv"), ("--record", "x.npz"), ("--out", "x")],
 )
-def test_nothing_is_replaced_unless_told(
+def test_existing_file_is_replaced_only_with_overwrite(
     option: str, name: str, infoset: Command, brief_file: Path, tmp_path: Path
 ) -> None:
     target = tmp_path / name
@@ -346,7 +348,9 @@ def test_results_that_are_not_finite_are_refused(
     assert "not finite" in infoset.refused("experiment", "--runs", 1)
 
 
-def test_interrupted(infoset: Command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_interrupted_command_exits_with_130_and_one_line(
+    infoset: Command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
@@ -358,7 +362,7 @@ def test_interrupted(infoset: Command, monkeypatch: pytest.MonkeyPatch, tmp_path
 
 
 @pytest.mark.thorough
-def test_a_reader_that_leaves_is_no_error() -> None:
+def test_closed_pipe_on_stdout_ends_the_command_without_an_error() -> None:
     # Ample output, and a reader that closes at once.
     process = subprocess.Popen(
         [sys.executable, "-m", "infoset", "engage", "--json", "-", "--quiet"],
@@ -388,7 +392,7 @@ def test_a_log_has_lines_of_progress(capsys: pytest.CaptureFixture[str]) -> None
     assert capsys.readouterr().err == "patient: estimated time 90 s\npatient: 50 %, 1 min left\n"
 
 
-def test_a_long_command_says_its_time_once_and_the_time_left(
+def test_long_command_prints_its_time_once_and_the_time_left(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     now_s = 0.0
@@ -408,7 +412,7 @@ def test_a_long_command_says_its_time_once_and_the_time_left(
     assert capsys.readouterr().err == "two: 40 %, 113 s left\n"
 
 
-def test_a_short_command_says_no_time(capsys: pytest.CaptureFixture[str]) -> None:
+def test_short_command_prints_no_time(capsys: pytest.CaptureFixture[str]) -> None:
     now_s = 0.0
     with screen.progress_bar(quiet=False, clock=lambda: now_s) as begin:
         report = begin("one")
@@ -421,7 +425,7 @@ def test_a_short_command_says_no_time(capsys: pytest.CaptureFixture[str]) -> Non
 @pytest.mark.parametrize(
     "error", [OSError(28, "No space left on device", "k.nbi"), MemoryError("Unable to allocate")]
 )
-def test_errors_of_the_system_are_messages(
+def test_error_of_the_system_is_one_message(
     error: Exception, infoset: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object) -> None:

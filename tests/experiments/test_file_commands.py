@@ -34,7 +34,7 @@ TIMES = ["camera.first_image_s", "thruster.impulses_s"]
 
 
 @pytest.mark.parametrize("noun", MINE)
-def test_the_list_has_every_built_in_file(noun: str, infoset: Command) -> None:
+def test_list_has_every_built_in_file(noun: str, infoset: Command) -> None:
     files = [file for file in FILES.values() if (file.kind == SCENARIO) == (noun == "scenarios")]
     names = [file.name for file in files]
     code, out, err = infoset(noun)
@@ -143,7 +143,7 @@ def test_check_takes_settings(
 
 
 @pytest.mark.parametrize("noun", MINE)
-def test_a_file_is_replaced_only_if_asked(noun: str, infoset: Command) -> None:
+def test_file_is_replaced_only_with_overwrite(noun: str, infoset: Command) -> None:
     file = Path("mine.toml")
     file.write_text("precious")
     assert "--overwrite" in infoset.refused(noun, "new", file)
@@ -175,7 +175,9 @@ def test_a_file_is_replaced_only_if_asked(noun: str, infoset: Command) -> None:
         ("replay empty", "empty: is not a readable record"),
     ],
 )
-def test_what_is_wrong_is_one_message(line: str, message: str, infoset: Command) -> None:
+def test_wrong_file_or_option_is_refused_with_one_message(
+    line: str, message: str, infoset: Command
+) -> None:
     contents = {
         "file": b"",
         "empty": b"",
@@ -189,7 +191,7 @@ def test_what_is_wrong_is_one_message(line: str, message: str, infoset: Command)
     assert message in infoset.refused(*arguments)
 
 
-def test_no_more_than_the_limit_is_read(tmp_path: Path) -> None:
+def test_file_beyond_the_size_limit_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "x.toml"
     file.write_bytes(b"x" * 10)
     assert read_input(file, 10) == b"x" * 10

@@ -71,7 +71,7 @@ def test_a_nominal_arrival_that_is_far_too_late_is_checked_at_once() -> None:
     )
 
 
-def test_the_closed_form_is_not_that_of_a_camera_that_loses_images() -> None:
+def test_closed_form_is_missing_for_a_camera_that_loses_images() -> None:
     scenario = load_scenario("dart-2022")
     lossy = replace(scenario.set_model.angle_sensor, miss_probability=0.5)
     with pytest.raises(ValueError, match="loses no image"):
@@ -130,18 +130,17 @@ def test_a_sweep_names_keys_without_an_effect_and_its_adversary(infoset: Command
         (99, 100, "for 99 % with 95 % confidence: at least 473 runs with at most 1 miss; "),
     ],
 )
-def test_what_shows_a_greater_probability_is_said(hits: int, runs: int, text: str) -> None:
+def test_outlook_names_the_runs_that_show_a_greater_probability(
+    hits: int, runs: int, text: str
+) -> None:
     outlook = outlook_text(estimate_hits(hits, runs))
     assert outlook.startswith(text)
     share = "0.999" if "99.9" in text else "0.99"
-    assert (
-        f'infoset sweep --vary KEY=FROM:TO:COUNT --require "hit>={share}" --until decided decides it'
-        in outlook
-    )
+    assert f'--require "hit>={share}" --until decided decides it' in outlook
 
 
 @pytest.mark.parametrize(("hits", "runs"), [(50, 100), (0, 10), (1900, 2000)])
-def test_samples_that_exclude_the_probability_need_no_more_runs(hits: int, runs: int) -> None:
+def test_outlook_is_empty_if_the_sample_excludes_the_probability(hits: int, runs: int) -> None:
     assert outlook_text(estimate_hits(hits, runs)) == ""
 
 
@@ -156,7 +155,7 @@ def test_the_sweep_needs_the_runs_that_the_outlook_names() -> None:
     )
 
 
-def test_an_experiment_with_a_body_says_what_would_show_more(infoset: Command, file: Path) -> None:
+def test_experiment_with_a_body_prints_the_outlook(infoset: Command, file: Path) -> None:
     code, out, _ = infoset("experiment", file, "--runs", 4, "--set", "body.radius_m=1e5")
     assert code == 0
     lines = out.splitlines()
@@ -207,14 +206,14 @@ def test_scenarios_of_the_paper_keep_its_words(infoset: Command, tmp_path: Path)
     assert (tmp_path / "flight" / "figure-2-process.png").exists()
 
 
-def test_both_noises_have_their_printed_impulses_and_others_none(infoset: Command) -> None:
+def test_printed_impulses_are_shown_for_the_two_noises_of_the_paper(infoset: Command) -> None:
     _, out, _ = infoset("engage", "asteroid-1997-single", "--noise", "both")
     assert re.search(r"impulse that the paper prints, m/s +244\.7 +521\.7\n", out)
     _, out, _ = infoset("engage", "asteroid-1997-single", "--noise", "gaussian")
     assert re.search(r"impulse that the paper prints, m/s +-\n", out)
 
 
-def test_an_engagement_of_another_scenario_has_no_printed_impulse(
+def test_printed_impulses_are_shown_only_for_the_scenario_of_the_paper(
     infoset: Command, file: Path
 ) -> None:
     assert "the paper prints" not in infoset("engage", file)[1]

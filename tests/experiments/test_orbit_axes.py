@@ -10,7 +10,7 @@ from infoset.experiments.common.input_file import load_problem
 from tests.experiments.command_line import Command
 
 
-def test_the_papers_axes() -> None:
+def test_axes_of_the_papers_are_converted_both_ways() -> None:
     # 7 m outward, 3 m ahead, 2 m along the normal; the papers have x against the motion, y outward.
     assert to_paper([7.0, 3.0, 2.0, 0.7, 0.3, 0.2]).tolist() == [-3.0, 7.0, 2.0, -0.3, 0.7, 0.2]
     assert from_paper([[-3.0, 7.0, 2.0], [3.0, 0.0, 0.0]]).tolist() == [

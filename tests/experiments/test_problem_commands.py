@@ -55,7 +55,7 @@ def test_the_folder_has_the_problem_the_results_and_the_figures(
 
 
 @pytest.mark.parametrize("command", [arguments[0] for arguments in COMMANDS.values()])
-def test_an_unknown_problem_is_refused_with_one_message(
+def test_unknown_problem_is_refused_with_one_message(
     command: str, infoset: Command, tmp_path: Path
 ) -> None:
     err = infoset.refused(command, "bad\x1b[31mname", "--json", "x.json")

@@ -43,7 +43,7 @@ def only(*numbers: NumberComparison) -> Callable[[Paper, Progress], tuple[Number
     ("text", "unit"),
     [("0.0690", 1e-4), ("-2018.0", 0.1), ("80", 1.0), ("5.58794e-8", 1e-13), ("1.20e3", 10.0)],
 )
-def test_the_last_digit_of_what_is_printed(text: str, unit: float) -> None:
+def test_last_digit_is_the_unit_of_the_last_printed_digit(text: str, unit: float) -> None:
     assert last_digit(text) == pytest.approx(unit, rel=1e-12)
 
 
@@ -79,12 +79,14 @@ def test_the_last_digit_of_what_is_printed(text: str, unit: float) -> None:
         (Ours(1.5, spread=(0.1, 5.8)), {"printed": "5.9"}, NumberVerdict.DISAGREED),
     ],
 )
-def test_verdicts(ours: Ours, known: dict[str, Any], verdict: NumberVerdict) -> None:
+def test_verdict_follows_from_the_band_of_the_printed_number(
+    ours: Ours, known: dict[str, Any], verdict: NumberVerdict
+) -> None:
     assert NumberComparison(replace(X, **known), ours).verdict is verdict
 
 
 @pytest.mark.parametrize("name", PAPERS)
-def test_the_file_of_a_paper(name: str) -> None:
+def test_file_of_a_paper_is_read_with_its_defaults_and_notes(name: str) -> None:
     """No name stands twice, digits are numbers, and a number that may differ has the reason."""
     paper = read_paper(name)
     numbers = [number for numbers in paper.tables.values() for number in numbers]
@@ -95,7 +97,7 @@ def test_the_file_of_a_paper(name: str) -> None:
         assert number.note or (number.corrected is None and number.unexplained == 0.0), number.name
 
 
-def test_every_number_of_a_file_needs_one_of_ours() -> None:
+def test_comparison_needs_a_computed_number_for_each_printed_one() -> None:
     paper = Paper("pareto", "a paper", (), {"table 1": (X, X)}, {})
     assert [each.ours.value for each in paper.compare({"table 1": [1.25, 1.5]})] == [1.25, 1.5]
     with pytest.raises(ValueError, match="shorter"):
@@ -150,7 +152,7 @@ def test_the_start_velocities_of_the_encounter_are_the_least_squares_fit() -> No
     assert np.abs(differences(printed, paper)).max() > 2.0
 
 
-def test_json_and_text_of_one_paper(infoset: Command, tmp_path: Path) -> None:
+def test_reproduce_prints_one_paper_as_json_and_as_text(infoset: Command, tmp_path: Path) -> None:
     file = tmp_path / "numbers.json"
     code, out, _ = infoset("reproduce", "--paper", "pareto", "--json", file)
     assert code == 0
@@ -181,7 +183,7 @@ def test_json_and_text_of_one_paper(infoset: Command, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("ours", [1.3, math.nan])
-def test_a_number_that_should_agree_and_does_not(
+def test_disagreeing_number_is_named_and_the_exit_code_is_1(
     ours: float, infoset: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     numbers = (

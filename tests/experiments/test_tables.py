@@ -30,7 +30,7 @@ from tests.experiments.command_line import Command
         ("multipoint asteroid-tour", [r"^target +meet +days ", r"^Itokawa +flyby +265 "]),
     ],
 )
-def test_tables_have_units(line: str, patterns: list[str], infoset: Command) -> None:
+def test_tables_of_a_command_have_units(line: str, patterns: list[str], infoset: Command) -> None:
     code, out, _ = infoset(*line.split())
     assert code == 0
     for pattern in patterns:

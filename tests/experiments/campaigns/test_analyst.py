@@ -33,7 +33,7 @@ def command(page: str) -> list[str]:
 
 
 @pytest.mark.skipif(not (ROOT / "docs").is_dir(), reason="the wheel has no pages")
-def test_the_readme_asks_what_the_page_answers() -> None:
+def test_readme_and_page_have_the_same_question() -> None:
     asked = command("docs/requirements.md")
     assert asked == command("README.md")
     assert asked[asked.index("--require") + 1] == "hit>=0.95"

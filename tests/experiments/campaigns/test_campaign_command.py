@@ -103,7 +103,7 @@ def test_a_campaign_into_a_folder(
     assert "  seed: 4 in the folder, 3 now" in err
 
 
-def test_the_options_are_those_of_the_engagements(
+def test_options_of_a_campaign_are_applied_to_its_engagements(
     infoset: Infoset, file: Path, tmp_path: Path
 ) -> None:
     options = (
@@ -184,7 +184,9 @@ def test_a_strategy_of_a_file_in_threads_and_processes(
     )
 
 
-def test_until_stops_and_goes_on(infoset: Infoset, file: Path, tmp_path: Path) -> None:
+def test_campaign_with_until_stops_and_is_continued_by_a_stricter_rule(
+    infoset: Infoset, file: Path, tmp_path: Path
+) -> None:
     asked = (
         "campaign",
         file,
@@ -223,7 +225,7 @@ def test_until_stops_and_goes_on(infoset: Infoset, file: Path, tmp_path: Path) -
         (["--out", "/dev/null/x"], "/dev/null/x"),
     ],
 )
-def test_what_is_wrong_is_said_before_the_work(
+def test_wrong_option_is_refused_before_the_work(
     arguments: list[object],
     part: str,
     infoset: Infoset,
@@ -245,7 +247,7 @@ def test_what_is_wrong_is_said_before_the_work(
     ("library", "extra"),
     [("pyarrow", "campaign"), ("pandas", "campaign"), ("distributed", "distributed")],
 )
-def test_without_an_extra_it_says_which(
+def test_missing_library_is_refused_with_the_name_of_its_extra(
     library: str, extra: str, infoset: Infoset, file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from infoset.sim import storage

@@ -27,7 +27,7 @@ Infoset = Callable[..., tuple[int, str, str]]
     ("address", "is_open"),
     [("tcp://127.0.0.1:1", False), ("tls://10.0.0.1:8786", False), ("tcp://10.0.0.1:8786", True)],
 )
-def test_no_scheduler_is_one_message_and_an_open_one_is_warned_of(
+def test_missing_scheduler_is_refused_and_unencrypted_address_has_a_warning(
     address: str, is_open: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     notes: list[str] = []
@@ -82,10 +82,8 @@ class Processes:
         return process
 
     def worker(self, **environment: str) -> subprocess.Popen[bytes]:
-        return self.start(
-            "worker", self.address, "--nworkers", "1", "--nthreads", "1", "--no-nanny", "--local-directory", "space",
-            **environment,
-        )  # fmt: skip
+        options = ["--nworkers", "1", "--nthreads", "1", "--no-nanny", "--local-directory", "space"]
+        return self.start("worker", self.address, *options, **environment)
 
     def wait_for(self, workers: int) -> None:
         """Wait until the workers have come, or gone."""
@@ -121,7 +119,7 @@ def kill_after(shards: Path, number: int, process: subprocess.Popen[bytes]) -> t
 
 @pytest.mark.thorough
 @pytest.mark.filterwarnings("default")
-def test_two_workers_give_the_same_bits_and_one_that_ends_loses_nothing(
+def test_two_workers_give_the_same_bits_also_if_one_ends(
     infoset: Infoset, brief: Scenario, file: Path, processes: Processes, tmp_path: Path
 ) -> None:
     workers = [processes.worker(), processes.worker()]
@@ -144,7 +142,7 @@ def test_two_workers_give_the_same_bits_and_one_that_ends_loses_nothing(
 
 @pytest.mark.thorough
 @pytest.mark.filterwarnings("default")
-def test_a_scheduler_that_ends_is_one_message_and_the_campaign_goes_on_without(
+def test_campaign_is_resumed_without_a_scheduler_that_ended(
     brief: Scenario, file: Path, processes: Processes, tmp_path: Path
 ) -> None:
     processes.worker()
@@ -178,7 +176,7 @@ def test_a_scheduler_that_ends_is_one_message_and_the_campaign_goes_on_without(
 
 @pytest.mark.thorough
 @pytest.mark.filterwarnings("default")
-def test_no_workers_and_workers_of_another_version(
+def test_scheduler_without_workers_or_with_other_versions_is_refused(
     infoset: Infoset, file: Path, processes: Processes, tmp_path: Path
 ) -> None:
     asked = ("campaign", file, "--runs", 16, "--out", "runs", "--dask", processes.address)

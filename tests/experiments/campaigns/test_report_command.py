@@ -41,7 +41,7 @@ def folder(brief: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.usefixtures("unrendered")
-def test_a_report_of_files_alone(
+def test_report_of_a_campaign_reads_only_its_files(
     infoset: Command, brief: Scenario, folder: Path, tmp_path: Path
 ) -> None:
     before = sorted(each.name for each in folder.iterdir())
@@ -96,7 +96,7 @@ def test_a_report_of_files_alone(
         (["runs", "--require", "miss_m p90<10"], "--require: is only for a sweep"),
     ],
 )
-def test_what_cannot_be_reported(
+def test_report_of_a_wrong_folder_or_requirement_is_refused(
     arguments: list[str], part: str, infoset: Command, folder: Path, tmp_path: Path
 ) -> None:
     (tmp_path / "runs").symlink_to(folder)
@@ -139,7 +139,7 @@ def test_report_reads_only_columns_within_the_memory_limit(
     assert all(columns[0] == "noise" and len(columns) <= 3 for columns in steps)
 
 
-def test_worst_runs_are_those_of_all_runs_also_with_equal_misses(
+def test_worst_runs_have_the_largest_misses_of_all_runs_also_with_equal_misses(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stored = CampaignFolder.read(folder)
@@ -186,7 +186,7 @@ def correlated(runs: pd.DataFrame) -> dict[str, dict[str, Any]]:
     return {row["component"]: row for row in rows}
 
 
-def test_correlations_by_hand() -> None:
+def test_correlations_equal_the_definitions_of_pearson_and_spearman() -> None:
     rising = np.arange(50.0)
     start = {
         "start_z_m": rising - 20.0,

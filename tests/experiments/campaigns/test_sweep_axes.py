@@ -22,7 +22,7 @@ def asteroid() -> Scenario:
     return load_scenario("asteroid-1997")
 
 
-def test_the_issues_example(asteroid: Scenario) -> None:
+def test_two_axes_are_read_in_the_order_written(asteroid: Scenario) -> None:
     text = "angle_sensor.error_at_nominal_range_rad=0.5e-4:5e-4:8,thruster.max_impulse_m_s=2:20:7"
     first, second = axes = sweep_axes(text, asteroid)
     assert (first.key, second.key) == (
@@ -48,7 +48,7 @@ def test_the_issues_example(asteroid: Scenario) -> None:
     assert back == {asteroid}  # nothing else has changed
 
 
-def test_units_are_those_of_the_file(asteroid: Scenario) -> None:
+def test_varied_values_have_the_units_of_the_file(asteroid: Scenario) -> None:
     axes = sweep_axes("information_set.range_threshold_km=3:7:3,sun.direction_deg=0:90:2", asteroid)
     cells = sweep_cells(asteroid, axes)
     assert [each.set_model.range_threshold_m for each in cells[::2]] == [3e3, 5e3, 7e3]
@@ -103,7 +103,10 @@ def test_values_rise_evenly_between_the_ends_as_written(
 
 
 def test_keys_with_the_same_values(asteroid: Scenario) -> None:
-    tied = "angle_sensor.error_at_zero_range_rad=angle_sensor.error_at_nominal_range_rad=log:1e-4:4e-4:3"
+    tied = (
+        "angle_sensor.error_at_zero_range_rad=angle_sensor.error_at_nominal_range_rad="
+        "log:1e-4:4e-4:3"
+    )
     (axis,) = sweep_axes(tied, asteroid)
     assert axis == Axis(tied.rpartition("=")[0], (1e-4, 2e-4, 4e-4), "log")
     for cell, value in zip(sweep_cells(asteroid, (axis,)), axis.values, strict=True):
@@ -173,7 +176,7 @@ RISING = "must go from a smaller to a greater value, with a count from 2 to 1000
         ),
     ],
 )
-def test_what_cannot_be_varied(text: str, part: str, asteroid: Scenario) -> None:
+def test_wrong_axis_is_refused(text: str, part: str, asteroid: Scenario) -> None:
     with pytest.raises(InputError) as refused:
         sweep_cells(asteroid, sweep_axes(text, asteroid))
     assert part in str(refused.value)

@@ -100,7 +100,7 @@ def test_a_sweep_of_one_key_mixed_and_resumed(infoset: Command, file: Path, tmp_
     assert "axes: " in err
 
 
-def test_the_report_of_a_sweep_is_from_its_files_alone(
+def test_report_of_a_sweep_reads_only_its_files(
     infoset: Command, swept: Path, tmp_path: Path
 ) -> None:
     out_folder = tmp_path / "report"
@@ -146,7 +146,7 @@ def test_the_report_of_a_sweep_is_from_its_files_alone(
         (["--max-runs", 30], "--max-runs is the limit of --until; add --until decided"),
     ],
 )
-def test_what_is_wrong_is_said_before_the_work(
+def test_wrong_option_is_refused_before_the_work(
     arguments: list[str],
     part: str,
     infoset: Command,
@@ -206,7 +206,7 @@ def test_runs_are_added_until_each_cell_is_decided(
 
 
 @pytest.mark.parametrize("until", [(), ("--until", "decided", "--max-runs", 60)])
-def test_runs_without_a_guarantee_do_not_meet_a_bound_of_it(
+def test_bound_of_the_guarantee_is_not_met_by_runs_without_guarantee(
     until: tuple[object, ...], infoset: Command, file: Path, tmp_path: Path
 ) -> None:
     """The sets of most runs become empty: the others alone have bounds, which all meet the
@@ -236,7 +236,7 @@ def test_runs_without_a_guarantee_do_not_meet_a_bound_of_it(
     assert cells[0]["miss_m_p90"] is not None
 
 
-def test_needed_runs_count_those_of_both_noises(infoset: Command, file: Path) -> None:
+def test_needed_runs_are_the_runs_of_both_noises(infoset: Command, file: Path) -> None:
     asked = (
         "sweep",
         file,
@@ -256,7 +256,7 @@ def test_needed_runs_count_those_of_both_noises(infoset: Command, file: Path) ->
 
 
 @pytest.mark.thorough
-def test_runs_that_are_added_by_hand_are_judged_like_those_of_until(
+def test_sweep_with_added_runs_is_judged_as_watched(
     infoset: Command, file: Path, tmp_path: Path
 ) -> None:
     asked = (
@@ -335,7 +335,7 @@ def test_a_required_probability_of_a_hit(infoset: Command, file: Path, tmp_path:
     )
 
 
-def test_an_unfinished_sweep_is_reported_as_far_as_it_is(
+def test_report_of_an_unfinished_sweep_has_its_stored_cells(
     infoset: Command, swept: Path, tmp_path: Path
 ) -> None:
     shutil.copytree(swept, tmp_path / "two")

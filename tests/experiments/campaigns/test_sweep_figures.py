@@ -63,7 +63,7 @@ def made_table(
     return SweepTable(tuple(axes), ("game",), required, pd.DataFrame(rows))
 
 
-def test_one_key_has_lines_over_the_decisions() -> None:
+def test_sweep_of_one_key_is_drawn_as_lines_over_the_decisions() -> None:
     axis = Axis("thruster.max_impulse_m_s", (2.0, 4.0, 8.0, 16.0))
     table = made_table([axis], REQUIRED, lambda impulse: 40.0 / impulse)
     figure = draw_sweep(table, SHOWN, "game")
@@ -76,7 +76,7 @@ def test_one_key_has_lines_over_the_decisions() -> None:
     assert table.rows["miss_m_p50"].tolist() in drawn
 
 
-def test_the_limit_of_two_keys_is_a_line() -> None:
+def test_limit_of_a_sweep_of_two_keys_is_drawn_as_a_line() -> None:
     axes = (
         Axis("camera.pixel_error_rad", tuple(np.geomspace(1e-6, 5e-5, 8).tolist()), "log"),
         Axis("thruster.last_impulse_s", tuple(np.geomspace(30.0, 900.0, 8).tolist()), "log"),

@@ -146,7 +146,7 @@ def test_the_limit_of_hits_along_the_radius_is_the_quantile_of_the_miss(
 
 
 @pytest.mark.thorough
-def test_the_limit_of_hits_is_that_of_a_fine_sweep(tmp_path: Path) -> None:
+def test_limit_of_hits_is_confirmed_by_a_finer_sweep(tmp_path: Path) -> None:
     """An interpolated probability gave 1.4e-5 rad, just above the last cell that meets the
     requirement.
     """
@@ -169,7 +169,7 @@ def test_the_limit_of_hits_is_that_of_a_fine_sweep(tmp_path: Path) -> None:
     assert fine["met"] < coarse["interpolated"] < fine["not_met"]
 
 
-def test_the_columns_are_those_of_the_simulated_cells(brief: Scenario, tmp_path: Path) -> None:
+def test_table_has_the_results_of_each_simulated_cell(brief: Scenario, tmp_path: Path) -> None:
     axes = (
         Axis("thruster.max_impulse_m_s", (2.0, 8.0)),
         Axis("thruster.budget_m_s", (10.0, 500.0)),

@@ -40,7 +40,7 @@ def test_pdfs_have_truetype_fonts_and_pngs_200_dpi(monkeypatch: pytest.MonkeyPat
 
 
 @style()
-def test_a_legend_is_not_wider_than_its_figure() -> None:
+def test_legend_fits_the_width_of_its_figure() -> None:
     figure, ((axes,),) = subplots(40.0)
     for number in range(6):
         axes.plot([0.0, 1.0], [0.0, number], label=f"{number}: {'long ' * 8}")
@@ -93,7 +93,7 @@ def drawn_with(settings: str, folder: Path) -> str:
     return done.stdout
 
 
-def test_the_users_matplotlibrc_changes_no_byte_of_a_figure(tmp_path: Path) -> None:
+def test_figures_do_not_depend_on_the_matplotlibrc_of_the_user(tmp_path: Path) -> None:
     assert drawn_with(HOSTILE, tmp_path / "hostile") == drawn_with("", tmp_path / "plain") != ""
 
 
@@ -128,7 +128,7 @@ FIGURES = [
 
 
 @pytest.mark.parametrize("name", FIGURES)
-def test_whatever_makes_axes_is_drawn_in_the_style(name: str) -> None:
+def test_every_function_that_makes_axes_has_the_style(name: str) -> None:
     """A function that begins a figure has the decorator of the style; its helpers are called within
     it.
     """

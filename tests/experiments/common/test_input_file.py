@@ -107,7 +107,7 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)
-def test_a_mistake_gets_one_message(mistake: str) -> None:
+def test_each_mistake_in_a_file_has_one_message(mistake: str) -> None:
     old, new, message = MISTAKES[mistake]
     with pytest.raises(InputError) as caught:
         read_text(Scenario, TEXT.replace(old, new, 1), "mine.toml")
@@ -134,14 +134,14 @@ def test_a_mistake_gets_one_message(mistake: str) -> None:
         ),
     ],
 )
-def test_a_wrong_setting_gets_one_message(setting: str, message: str) -> None:
+def test_each_wrong_setting_has_one_message(setting: str, message: str) -> None:
     with pytest.raises(InputError) as caught:
         load_scenario("asteroid-1997", [setting])
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
-def test_all_mistakes_of_a_file_are_listed_one_a_line() -> None:
+def test_all_mistakes_of_a_file_are_listed() -> None:
     names = ("misspelt", "reversed pair", "bool", "wrong unit")
     text = TEXT
     for name in names[:3]:
@@ -173,7 +173,7 @@ def test_hostile_files_are_refused_with_short_lines(text: str, message: str) -> 
 
 
 @pytest.mark.parametrize("content", [b"", b"\xff\xfe", b"PK\x03\x04", b"x" * 200_000])
-def test_files_that_are_no_text_are_refused(content: bytes, tmp_path: Path) -> None:
+def test_binary_file_is_refused(content: bytes, tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_bytes(content)
     with pytest.raises(InputError, match=r"mine\.toml: "):
         read_file(Scenario, tmp_path / "mine.toml")
@@ -285,7 +285,7 @@ def test_numbers_of_numpy_are_written_as_numbers(name: str) -> None:
     assert read_text(type(value), to_toml(same), name) == value
 
 
-def test_numbers_of_numpy_become_those_of_python_in_a_scenario() -> None:
+def test_numpy_numbers_become_python_numbers_in_a_scenario() -> None:
     scenario = with_numpy_numbers(load_scenario("dart-2022"))
 
     assert type(scenario.step_s) is float
@@ -349,7 +349,7 @@ def test_only_keys_of_many_parts_are_refused_before_they_are_parsed() -> None:
     assert 100 < refused < 500
 
 
-def test_a_long_array_on_one_line_is_read() -> None:
+def test_long_array_on_one_line_is_read() -> None:
     times_s = [round(99.5 - 0.5 * place, 1) for place in range(190)]
     line = f"impulses_s = {times_s}"
     assert len(line) > 1000

@@ -134,7 +134,7 @@ def test_the_worst_in_space_as_json_table_and_record(
 
 
 @pytest.mark.thorough
-def test_both_max_misses_are_those_of_bound(
+def test_adversary_with_fixed_truth_finds_the_misses_of_bound(
     infoset: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The same strategy, seed, budget and model: bound and adversary print the same two numbers."""
@@ -167,7 +167,7 @@ def test_both_max_misses_are_those_of_bound(
         (["asteroid-1997-single", "--range-sensor"], "has no [range_sensor]"),
     ],
 )
-def test_what_is_refused_before_anything_is_flown(
+def test_wrong_option_is_refused_before_the_search(
     arguments: list[str], message: str, infoset: Command
 ) -> None:
     Path("there.npz").write_text("something")
@@ -175,7 +175,7 @@ def test_what_is_refused_before_anything_is_flown(
     assert Path("there.npz").read_text() == "something"
 
 
-def test_where_every_set_becomes_empty_one_search_has_no_result(
+def test_search_with_kept_sets_has_no_result_if_every_set_becomes_empty(
     infoset: Command, tmp_path: Path
 ) -> None:
     text = scenario_text("asteroid-1997").replace(

@@ -57,7 +57,7 @@ def test_compare_as_json(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_model_of_the_paper_has_no_bound(infoset: Command, brief_file: Path) -> None:
+def test_compare_in_the_model_paper_has_no_bound_phi(infoset: Command, brief_file: Path) -> None:
     for each in infoset.json("compare", brief_file, *TWO, "--runs", 3, "--model", "paper")[
         "strategies"
     ]:
@@ -65,7 +65,7 @@ def test_the_model_of_the_paper_has_no_bound(infoset: Command, brief_file: Path)
         assert each["phi_held"] is None
 
 
-def test_the_figures_are_those_of_the_simulator_and_the_worst_tie_rule_counts(
+def test_compare_equals_the_simulator_with_the_worst_tie_rule_of_each_run(
     infoset: Command, brief: Scenario, brief_file: Path
 ) -> None:
     found = infoset.json(

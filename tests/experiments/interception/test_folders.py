@@ -36,7 +36,9 @@ STUDIES = {
 
 @pytest.mark.parametrize("command", STUDIES)
 @pytest.mark.usefixtures("unrendered")
-def test_the_folder_of_a_study(command: str, infoset: Command, brief_file: Path) -> None:
+def test_folder_of_a_study_has_all_its_files(
+    command: str, infoset: Command, brief_file: Path
+) -> None:
     options, figures, files = STUDIES[command]
     asked = (command, brief_file, *options, "--out", "out")
     assert infoset(*asked, "--json", "beside.json", "-q")[0] == 0

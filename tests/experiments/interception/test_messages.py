@@ -16,7 +16,7 @@ from tests.built_in import scenario_text
 
 
 @pytest.mark.parametrize("name", ["dart-2022", "haiv-2013"])
-def test_a_speed_near_that_of_light_is_called_that(name: str) -> None:
+def test_speed_near_the_speed_of_light_is_refused_with_this_reason(name: str) -> None:
     with pytest.raises(
         InputError, match="closing_speed_km_s: is more than a hundredth of the speed of light"
     ) as caught:
@@ -42,7 +42,7 @@ def test_a_speed_near_that_of_light_is_called_that(name: str) -> None:
         ),
     ],
 )
-def test_a_huge_body_is_questioned(name: str, radius: str, part: str) -> None:
+def test_huge_body_has_a_warning(name: str, radius: str, part: str) -> None:
     scenario = load_scenario(name, f"body.{radius}".split())
     lines = [line for line in all_warnings(scenario) if "body.radius_m is" in line]
     assert len(lines) == 1
@@ -52,14 +52,14 @@ def test_a_huge_body_is_questioned(name: str, radius: str, part: str) -> None:
 @pytest.mark.parametrize(
     "name", [file.name for file in built_in_files().values() if file.kind == "scenario"]
 )
-def test_no_body_of_a_built_in_scenario_is_questioned(name: str) -> None:
+def test_body_of_a_built_in_scenario_has_no_warning(name: str) -> None:
     assert not [
         line for line in all_warnings(load_scenario(name)) if "check the unit of the radius" in line
     ]
 
 
 @pytest.mark.parametrize("key", ["pixel_error_mas", "pixel_error_m", "pixel_error"])
-def test_a_key_in_a_wrong_unit_gets_the_list_of_units(key: str, tmp_path: Path) -> None:
+def test_key_in_a_wrong_unit_is_refused_with_the_list_of_units(key: str, tmp_path: Path) -> None:
     units = "did you mean pixel_error_rad? It can end in rad, mrad, urad, deg, arcsec"
     file = tmp_path / "mine.toml"
     file.write_text(scenario_text("haiv-2013").replace("pixel_error_rad", key))
@@ -70,7 +70,7 @@ def test_a_key_in_a_wrong_unit_gets_the_list_of_units(key: str, tmp_path: Path) 
         load_scenario("haiv-2013", [f"camera.{key}=3"])
 
 
-def test_an_asymmetric_covariance_is_called_that(tmp_path: Path) -> None:
+def test_asymmetric_covariance_is_refused_with_this_reason(tmp_path: Path) -> None:
     rows = np.eye(6)
     rows[1, 5] = 0.5
     text = f"[covariance]\nmatrix_km2 = {rows.tolist()}\n\n[camera]"

@@ -44,7 +44,7 @@ def counts(
     return {cause.value: causes[cause] for cause in MissCause}
 
 
-def test_experiment_says_why_runs_miss_and_what_would_help(
+def test_experiment_prints_causes_of_misses_and_remedies(
     infoset: Command, weak: Scenario, tmp_path: Path
 ) -> None:
     file = tmp_path / "weak.toml"

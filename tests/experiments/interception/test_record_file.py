@@ -163,7 +163,7 @@ def test_a_record_comes_back_bit_for_bit(name: str, tmp_path: Path) -> None:
         assert found.strategy == f"{Idle.__module__}.Idle"
 
 
-def test_what_is_not_known_comes_back_as_not_known(record: Record, tmp_path: Path) -> None:
+def test_unknown_values_are_unknown_after_reading(record: Record, tmp_path: Path) -> None:
     begun = first_steps(record, 3)
     unknown = np.ma.MaskedArray([0.0], mask=[True])
     result = dataclasses.replace(record.result, guaranteed_miss_m=unknown, truth_margin_m=unknown)
@@ -194,7 +194,7 @@ def test_the_file_is_an_archive_of_numpy_that_depends_on_the_record_only(
         assert arrays["header"].size < record_file.MAX_HEADER_BYTES / 100
 
 
-def test_a_file_that_is_too_large_is_not_read(
+def test_file_beyond_the_size_limit_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(record_file, "MAX_FILE_BYTES", 10)
@@ -209,7 +209,7 @@ def archive(**arrays: Any) -> bytes:
     return out.getvalue()
 
 
-def test_what_is_no_record(content: bytes, tmp_path: Path) -> None:
+def test_file_of_another_kind_is_refused(content: bytes, tmp_path: Path) -> None:
     foreign = [
         b"",
         b"x",
@@ -259,42 +259,72 @@ def new(name: str, values: Callable[[Any], Any]) -> Change:
     return lambda arrays: arrays.update({name: values(arrays[name])})
 
 
+def without_steps(arrays: Arrays) -> None:
+    for name, values in arrays.items():
+        if name not in ("json", "header"):
+            arrays[name] = values[:0]
+
+
+def scenario_without(arrays: Arrays, table: str) -> None:
+    arrays["json"]["scenario"].pop(table)
+
+
 CHANGES: list[tuple[Change, str]] = [
+    # members
     (lambda arrays: arrays.update(extra=np.zeros(3)), "its members are not those of a record"),
     (lambda arrays: arrays.pop("time_s"), "its members are not those of a record"),
+    # the header
     (lambda arrays: arrays.update(json=b"{"), ""),
     (lambda arrays: arrays.update(json=b"[" * 100_000), ""),
-    (lambda arrays: arrays.update(json=b" " * (record_file.MAX_HEADER_BYTES + 1)), "its header is too long"),
+    (
+        lambda arrays: arrays.update(json=b" " * (record_file.MAX_HEADER_BYTES + 1)),
+        "its header is too long",
+    ),
     (lambda arrays: arrays["json"].pop("seed"), "seed: Field required"),
-    (lambda arrays: arrays["json"]["scenario"].pop("thruster"), "scenario.thruster: Field required"),
-    (lambda arrays: arrays["json"]["scenario"].update(nominal_range_m=-1.0), "scenario.nominal_range_m: "),
+    (lambda arrays: scenario_without(arrays, "thruster"), "scenario.thruster: Field required"),
+    (
+        lambda arrays: arrays["json"]["scenario"].update(nominal_range_m=-1.0),
+        "scenario.nominal_range_m: ",
+    ),
     (header(more=1), "more: "),
-    *((header(seed=seed), "seed: ") for seed in (-1, True, 0.5)),
+    (header(seed=-1), "seed: "),
+    (header(seed=True), "seed: "),
+    (header(seed=0.5), "seed: "),
     (header(run=2**63), "run: "),
-    *((header(strategy=text), "control characters") for text in ("\x1b[2J", "\ud800")),
+    (header(strategy="\x1b[2J"), "control characters"),
+    (header(strategy="\ud800"), "control characters"),
     (header(outcome="won"), "outcome"),
     (header(inconsistency={"step": 6, "label_m": 1.0}), "not at a step"),
     (header(inconsistency={"step": 1, "label_m": 1e300}), "not at a step"),
-    *((put(name, 0, math.nan), f"{name} has a number beyond") for name in ("time_s", "impulse_m_s", "result_miss_m")),
-    *((put(name, 0, 1e300), f"{name} has a number beyond") for name in ("measured_angle_rad", "predicted_miss_m")),
+    # values
+    (put("time_s", 0, math.nan), "time_s has a number beyond"),
+    (put("impulse_m_s", 0, math.nan), "impulse_m_s has a number beyond"),
+    (put("result_miss_m", 0, math.nan), "result_miss_m has a number beyond"),
+    (put("measured_angle_rad", 0, 1e300), "measured_angle_rad has a number beyond"),
+    (put("predicted_miss_m", 0, 1e300), "predicted_miss_m has a number beyond"),
     (put("time_s", 3, 0.0), "time_s does not increase"),
-    *((new(name, lambda values: values[:-1]), "of shape") for name in ("impulse_m_s", "time_s")),
+    # shapes and types
+    (new("impulse_m_s", lambda values: values[:-1]), "of shape"),
+    (new("time_s", lambda values: values[:-1]), "of shape"),
     (new("time_s", lambda values: values.astype("<f4")), "time_s is <f4"),
     (new("time_s", lambda values: values.astype(object)), "allow_pickle=False"),
     (new("time_s", lambda values: np.float64(1.0)), "of shape ()"),
     (new("impulse_m_s", lambda values: values[:, :1]), "of shape (6, 1)"),
-    (lambda arrays: arrays.update({name: each[:0] for name, each in arrays.items() if name not in ("json", "header")}),
-     "shape"),
-]  # fmt: skip
+    (without_steps, "shape"),
+]
 
 
-def test_unchanged_it_is_read_and_changed_it_is_refused(
-    content: bytes, record: Record, tmp_path: Path
-) -> None:
+def test_record_written_again_is_read(content: bytes, record: Record, tmp_path: Path) -> None:
     (tmp_path / "x.npz").write_bytes(remade(content, lambda arrays: None))
+
     assert_same(load_record(tmp_path / "x.npz"), record)
-    for change, part in CHANGES:
-        assert part in refused(remade(content, change), tmp_path)
+
+
+@pytest.mark.parametrize(("change", "part"), CHANGES)
+def test_changed_record_is_refused(
+    change: Change, part: str, content: bytes, tmp_path: Path
+) -> None:
+    assert part in refused(remade(content, change), tmp_path)
 
 
 def array_bytes(head: bytes, data: bytes = b"") -> bytes:
@@ -315,7 +345,7 @@ MEMBERS = {
 
 
 @pytest.mark.parametrize("name", MEMBERS)
-def test_a_damaged_member(name: str, content: bytes, tmp_path: Path) -> None:
+def test_damaged_member_is_refused(name: str, content: bytes, tmp_path: Path) -> None:
     out = io.BytesIO()
     with zipfile.ZipFile(io.BytesIO(content)) as stored, zipfile.ZipFile(out, "w") as changed:
         for member in stored.namelist():
@@ -360,7 +390,7 @@ def test_record_of_too_many_sections_and_steps_is_refused(content: bytes, tmp_pa
     assert "it has 10000 sections in 51 steps, and their product may be at most 500000" in message
 
 
-def test_record_that_could_not_be_read_again_is_not_written(record: Record, tmp_path: Path) -> None:
+def test_record_too_large_to_be_read_is_not_written(record: Record, tmp_path: Path) -> None:
     settings = dataclasses.replace(record.scenario.information_set, sections=10_000)
     large = dataclasses.replace(
         record,

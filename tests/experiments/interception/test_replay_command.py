@@ -28,9 +28,7 @@ def file(record: Record, infoset: Command, tmp_path: Path) -> Path:
     return tmp_path / "a.npz"
 
 
-def test_a_page_is_written_whole_and_replaced_only_when_told(
-    file: Path, record: Record, infoset: Command
-) -> None:
+def test_page_is_replaced_only_with_overwrite(file: Path, record: Record, infoset: Command) -> None:
     record = first_steps(record, 20)
     file.unlink()
     write_record(record, file)
@@ -45,7 +43,7 @@ def test_a_page_is_written_whole_and_replaced_only_when_told(
     assert sorted(each.name for each in file.parent.iterdir()) == ["a.npz", "page.html"]
 
 
-def test_an_animation_has_a_picture_a_moment(record: Record, tmp_path: Path) -> None:
+def test_animation_has_one_frame_for_each_time(record: Record, tmp_path: Path) -> None:
     short = first_steps(record, 3)
     told: list[float] = []
     file = tmp_path / "a.gif"
@@ -62,7 +60,7 @@ def test_an_animation_has_a_picture_a_moment(record: Record, tmp_path: Path) -> 
 
 
 @pytest.mark.usefixtures("unrendered")
-def test_figure_3_at_other_times(file: Path, tmp_path: Path, infoset: Command) -> None:
+def test_replay_draws_figure_3_at_given_times(file: Path, tmp_path: Path, infoset: Command) -> None:
     assert infoset("replay", file, "--out", "sets", "--times", "2, 40,60,90", "-q")[0] == 0
     assert (tmp_path / "sets" / "figure-3-sets.png").is_file()
     assert "--times: could not convert" in infoset.refused(

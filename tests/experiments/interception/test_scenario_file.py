@@ -97,9 +97,7 @@ def test_built_in_is_sound_described_and_silent(name: str) -> None:
     assert read_text(Scenario, to_toml(scenario), name) == scenario
 
 
-def test_the_start_for_an_own_scenario_is_the_paper_s_in_the_guaranteed_model_with_the_strategy_for_it() -> (
-    None
-):
+def test_own_scenario_is_the_scenario_of_the_paper_in_the_guaranteed_model() -> None:
     own = load_scenario("own-scenario")
     paper = load_scenario("asteroid-1997")
     assert own.set_model == with_model(paper, Model.GUARANTEED).set_model
@@ -108,7 +106,7 @@ def test_the_start_for_an_own_scenario_is_the_paper_s_in_the_guaranteed_model_wi
     ) == (dataclasses.replace(paper, name="", description="", strategy="least-effort"))
 
 
-def test_the_start_for_an_own_scenario_has_every_key() -> None:
+def test_own_scenario_writes_every_key() -> None:
     text = scenario_text("own-scenario")
     keys = re.findall(r"^(?:# )?(\w+) = ", text, re.M)
     sensors = AngleSensor, Camera, RangeSensor, RateSensor
@@ -176,14 +174,14 @@ def test_the_start_for_an_own_scenario_has_every_key() -> None:
         ),
     ],
 )
-def test_values_that_contradict_each_other_are_refused(settings: list[str], problem: str) -> None:
+def test_contradicting_values_are_refused(settings: list[str], problem: str) -> None:
     with pytest.raises(InputError) as caught:
         changed(*settings)
     assert problem in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
-def test_a_strategy_must_exist() -> None:
+def test_unknown_strategy_is_refused() -> None:
     assert load_scenario("asteroid-1997", ["strategy=patient"]).strategy == "patient"
     with pytest.raises(InputError, match=r'strategy: there is no "patent"; did you mean patient\?'):
         load_scenario("asteroid-1997", ["strategy=patent"])
@@ -216,7 +214,7 @@ def test_steep_lines_of_sight_in_the_papers_model_are_warned_of() -> None:
     )
 
 
-def test_fingerprint_is_of_the_values_not_of_the_writing() -> None:
+def test_fingerprint_depends_only_on_the_values() -> None:
     scenario = load_scenario("asteroid-1997")
     expected = fingerprint(scenario)
     assert len(expected) == 16
@@ -253,7 +251,7 @@ def test_fingerprint_is_of_the_values_not_of_the_writing() -> None:
         ),
     ],
 )
-def test_warning(setting: str, part: str) -> None:
+def test_value_that_is_probably_not_intended_has_a_warning(setting: str, part: str) -> None:
     (warning,) = scenario_warnings(changed(setting))
     assert part in warning
 
@@ -290,7 +288,7 @@ def test_warning(setting: str, part: str) -> None:
         ("asteroid-1997", ["thruster.max_impulse_m_s=0.3"], "of them cannot have a miss of zero"),
     ],
 )
-def test_what_does_not_fit_the_flight_is_a_warning(
+def test_part_that_does_not_fit_the_flight_has_a_warning(
     name: str, settings: list[str], part: str
 ) -> None:
     assert feasibility_warnings(load_scenario(name)) == []

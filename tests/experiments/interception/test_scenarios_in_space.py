@@ -82,7 +82,8 @@ def test_every_key_of_space_is_read_and_written() -> None:
     )
     scenario = read_text(
         Scenario,
-        f'{text}\n[target]\nmanoeuvre = "constant"\nacceleration_m_s2 = 0.001\nacceleration_y_m_s2 = 0.002\n',
+        f'{text}\n[target]\nmanoeuvre = "constant"\n'
+        "acceleration_m_s2 = 0.001\nacceleration_y_m_s2 = 0.002\n",
         "mine.toml",
     )
     sensor = linear(scenario.angle_sensor)

@@ -39,7 +39,10 @@ class Mine:
 LIKE_RANDOM = """
 class Uniform:
     def measure(self, sight, predicted):
-        return {name: sensor.measured(sight, sight.uniform[name]) for name, sensor in sight.sensors.items()}
+        return {
+            name: sensor.measured(sight, sight.uniform[name])
+            for name, sensor in sight.sensors.items()
+        }
 
 class Half:
     def measure(self, sight, predicted):
@@ -79,9 +82,14 @@ def test_a_strategy_of_a_file_is_simulated_and_can_be_pickled(mine: Path, brief:
 
 @pytest.mark.parametrize(
     ("command", "option"),
-    [("engage", "--strategy"), ("experiment", "--strategy"), ("compare", "--strategies"), ("bound", "--strategies"),
-     ("adversary", "--strategy")],
-)  # fmt: skip
+    [
+        ("engage", "--strategy"),
+        ("experiment", "--strategy"),
+        ("compare", "--strategies"),
+        ("bound", "--strategies"),
+        ("adversary", "--strategy"),
+    ],
+)
 def test_every_command_takes_a_strategy_of_a_file(
     command: str,
     option: str,
@@ -137,7 +145,7 @@ def test_strategies_of_files_and_built_in_ones_are_compared(mine: Path, brief: S
         ("random.py:Mine", LIKE_PUBLISHED, "random.py has the name of another Python module"),
     ],
 )
-def test_what_is_wrong_with_a_file_is_one_message(
+def test_wrong_strategy_file_is_refused_with_one_message(
     text: str, code: str | None, part: str, mine: Path
 ) -> None:
     if code is not None:
@@ -159,7 +167,7 @@ def test_what_is_wrong_with_a_file_is_one_message(
         ("start", "raise RuntimeError('no state')", "line 3: RuntimeError: no state"),
     ],
 )
-def test_failures_of_a_flight_are_said_without_a_traceback(
+def test_error_of_a_strategy_during_a_run_is_printed_without_traceback(
     method: str, body: str, message: str, brief_file: Path, infoset: Command
 ) -> None:
     bodies = {"start": "return None", "decide": "return [[0.0]]"} | {method: body}
@@ -234,7 +242,7 @@ def test_every_command_that_draws_errors_takes_a_noise_of_a_file(
         assert "own_noise: " in infoset(*resumed)[2]
 
 
-def test_a_noise_of_a_file_can_be_pickled_and_its_mistakes_are_one_message(
+def test_noise_of_a_file_can_be_pickled_and_its_errors_have_one_message(
     brief: Scenario, brief_file: Path, infoset: Command
 ) -> None:
     Path("noisy.py").write_text(LIKE_RANDOM)
@@ -254,7 +262,9 @@ def test_a_noise_of_a_file_can_be_pickled_and_its_mistakes_are_one_message(
     )
 
 
-def test_compare_shows_what_depends_on_the_noise(brief_file: Path, infoset: Command) -> None:
+def test_compare_with_all_noises_prints_the_ratio_of_their_quantiles(
+    brief_file: Path, infoset: Command
+) -> None:
     options = (
         "--strategies",
         "patient,symmetric-miss",

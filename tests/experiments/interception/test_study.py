@@ -41,7 +41,7 @@ def sized(brief: Scenario, tmp_path: Path) -> Path:
     return file
 
 
-def test_a_better_range_sensor_looks_worse_in_the_paper_and_the_study_says_why(
+def test_lost_sets_of_a_better_range_sensor_have_a_warning_in_the_model_paper(
     infoset: Infoset,
 ) -> None:
     """On commit 652bf7c nothing tells the two apart: the quantiles of the better meter are those of
@@ -100,7 +100,7 @@ def test_the_json_of_an_experiment_has_its_hits(
 
 
 @pytest.mark.parametrize(("radius", "word"), [(1e5, "hit"), (1e-6, "missed")])
-def test_one_engagement_hits_or_misses(
+def test_engage_prints_whether_the_body_is_hit(
     infoset: Infoset, sized: Path, radius: float, word: str
 ) -> None:
     size = ("--set", f"body.radius_m={radius}", "--no-range-sensor")
@@ -114,7 +114,7 @@ def test_one_engagement_hits_or_misses(
     assert f" m/s, {word}" in Path("page.html").read_text()
 
 
-def test_counts_of_sets() -> None:
+def test_set_counts_add_up() -> None:
     kept = np.array([True, True, False, False])
     emptied = np.array([False, True, False, True])
     counts = set_counts(kept, emptied)
@@ -126,7 +126,7 @@ def test_counts_of_sets() -> None:
     )
 
 
-def test_shares_are_not_rounded_to_certainty(brief: Scenario) -> None:
+def test_percent_rounds_only_the_share_one_to_100(brief: Scenario) -> None:
     assert [percent(share) for share in (0.0, 0.5, 1.0, 1e-9)] == [
         "0 %",
         "50 %",

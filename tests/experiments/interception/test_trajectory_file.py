@@ -209,7 +209,7 @@ SUN = "gravitational_parameter_km3_s2 = 1.327e11"
         (toml(CRAFT, BODY, SIGMAS).replace("trajectory", "states"), 'kind: must be "trajectory"'),
     ],
 )
-def test_a_wrong_trajectory_is_refused_with_what_to_do(
+def test_wrong_trajectory_is_refused_with_a_remedy(
     text: str, problem: str, infoset: Command
 ) -> None:
     Path("states.toml").write_text(text)
@@ -277,7 +277,7 @@ def oem_trajectory(folder: Path, **changes: str) -> Path:
     return folder / "states.toml"
 
 
-def test_two_oem_files_one_of_another_program(tmp_path: Path) -> None:
+def test_two_oem_files_of_different_programs_make_a_scenario(tmp_path: Path) -> None:
     """The satellite's file has the higher terms of the Earth's gravity, so the states meet within
     some metres.
     """
@@ -322,7 +322,9 @@ def test_oem_files_that_do_not_fit_are_refused(
     )
 
 
-def test_without_the_extra_it_is_named(infoset: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_kernels_without_spiceypy_are_refused_with_the_name_of_the_extra(
+    infoset: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setitem(__import__("sys").modules, "spiceypy", None)
     Path("states.toml").write_text(
         with_source(toml(CRAFT, BODY, SIGMAS, 'epoch = "2020-06-01"'), 'spice = "-135"')
@@ -479,7 +481,7 @@ def test_oem_file_beside_a_kernel_is_read_at_the_same_time(tmp_path: Path) -> No
         (("both.bsp", "missing.bsp"), '"missing.bsp": cannot be read'),
     ],
 )
-def test_kernels_with_other_axes_are_refused(
+def test_kernels_and_oem_file_with_different_axes_are_refused(
     change: tuple[str, str], problem: str, infoset: Command
 ) -> None:
     write_kernel(Path())
@@ -495,7 +497,7 @@ def test_kernels_with_other_axes_are_refused(
     assert problem in infoset.refused("scenarios", "from-states", "states.toml", "--out", "-")
 
 
-def test_what_describes_another_target_is_not_taken(infoset: Command) -> None:
+def test_target_of_the_model_scenario_is_dropped(infoset: Command) -> None:
     code, _, err = infoset("scenarios", "from-states", "two-states", "--out", "mine.toml")
     text = Path("mine.toml").read_text()
     scenario = load_scenario("mine.toml")
@@ -533,7 +535,7 @@ def test_target_of_the_options_is_taken(infoset: Command) -> None:
 @pytest.mark.parametrize(
     "options", [("--body-radius-m", "0"), ("--disturbance", "-1"), ("--disturbance", "nan")]
 )
-def test_target_that_is_none_is_refused(options: tuple[str, str], infoset: Command) -> None:
+def test_impossible_target_is_refused(options: tuple[str, str], infoset: Command) -> None:
     infoset.refused("scenarios", "from-states", "two-states", "--out", "mine.toml", *options)
 
 
@@ -568,7 +570,7 @@ def test_covariances_of_both_files_are_added(tmp_path: Path) -> None:
     assert f"covariance: the sum of those of {own} and {other}, taken as independent" in found.notes
 
 
-def test_covariance_of_one_file_is_used_and_said(tmp_path: Path) -> None:
+def test_covariance_of_one_file_is_used_with_a_note(tmp_path: Path) -> None:
     file = without_covariance(meeting_oem(tmp_path, covariance=BLOCK))
     (tmp_path / "object.oem").write_text(
         (tmp_path / "object.oem").read_text().split("COVARIANCE_START")[0]

@@ -65,7 +65,7 @@ def found(
     )
 
 
-def test_state_is_that_of_the_orbit() -> None:
+def test_interpolated_state_is_on_the_orbit() -> None:
     craft = found(hourly(), epoch=parse_epoch("2029-03-01T05:40:00"))
 
     np.testing.assert_allclose(
@@ -113,7 +113,7 @@ def test_later_of_two_segments_that_meet_is_used() -> None:
     assert craft.origin.startswith("segment 2")
 
 
-def test_states_of_another_segment_are_not_used() -> None:
+def test_interpolation_uses_only_the_segment_of_the_epoch() -> None:
     wrong = circle([3600.0 * hour for hour in range(7, 13)]) * 2.0
 
     craft = found(
@@ -180,7 +180,7 @@ def test_few_states_are_noted() -> None:
     ],
     ids=["units of velocity", "sign of velocity", "other scale"],
 )
-def test_states_that_are_no_two_body_motion_are_a_warning(wrong: object) -> None:
+def test_state_far_from_two_body_motion_has_a_warning(wrong: object) -> None:
     assert callable(wrong)
     states = wrong(circle([3600.0 * hour for hour in HOURS]))
 
@@ -204,7 +204,7 @@ def test_epoch_has_the_scale_of_all_files_or_needs_one() -> None:
         epoch_scale(EPOCH, [tdb, utc])
 
 
-def test_future_leap_seconds_are_one_note() -> None:
+def test_unknown_leap_seconds_have_one_note() -> None:
     (note,) = time_notes(EPOCH, "UTC", ["UTC", "TDB", "TDB"])
 
     assert "leap seconds of 2029-03-01 are not yet known" in note
@@ -292,7 +292,7 @@ def craft(source: str, centre: str | None, frame: str | None) -> CraftState:
     [("EARTH", "EME2000"), ("SUN", "ICRF")],
     ids=["another centre", "another frame"],
 )
-def test_craft_with_other_axes_are_refused(centre: str, frame: str) -> None:
+def test_craft_with_different_axes_are_refused(centre: str, frame: str) -> None:
     one = craft("a.oem", "SUN", "EME2000")
     other = craft("b.oem", centre, frame)
 
@@ -303,7 +303,7 @@ def test_craft_with_other_axes_are_refused(centre: str, frame: str) -> None:
         need_same_axes(one, other, "t.toml")
 
 
-def test_vectors_take_the_axes_of_the_other_craft_with_a_note() -> None:
+def test_vectors_without_frame_take_the_axes_of_the_file_with_a_note() -> None:
     one = craft("a.oem", "SUN", "EME2000")
     vectors = craft("t.toml", None, None)
 

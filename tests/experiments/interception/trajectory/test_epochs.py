@@ -26,11 +26,13 @@ DELTET/DELTA_T_A = 32.184
 DELTET/K = 1.657D-3
 DELTET/EB = 1.671D-2
 DELTET/M = ( 6.239996 1.99096871D-7 )
-DELTET/DELTA_AT = ( 10, @1972-JAN-1, 11, @1972-JUL-1, 12, @1973-JAN-1, 13, @1974-JAN-1, 14, @1975-JAN-1,
-15, @1976-JAN-1, 16, @1977-JAN-1, 17, @1978-JAN-1, 18, @1979-JAN-1, 19, @1980-JAN-1, 20, @1981-JUL-1,
-21, @1982-JUL-1, 22, @1983-JUL-1, 23, @1985-JUL-1, 24, @1988-JAN-1, 25, @1990-JAN-1, 26, @1991-JAN-1,
-27, @1992-JUL-1, 28, @1993-JUL-1, 29, @1994-JUL-1, 30, @1996-JAN-1, 31, @1997-JUL-1, 32, @1999-JAN-1,
-33, @2006-JAN-1, 34, @2009-JAN-1, 35, @2012-JUL-1, 36, @2015-JUL-1, 37, @2017-JAN-1 )
+DELTET/DELTA_AT = (
+10, @1972-JAN-1, 11, @1972-JUL-1, 12, @1973-JAN-1, 13, @1974-JAN-1, 14, @1975-JAN-1,
+15, @1976-JAN-1, 16, @1977-JAN-1, 17, @1978-JAN-1, 18, @1979-JAN-1, 19, @1980-JAN-1,
+20, @1981-JUL-1, 21, @1982-JUL-1, 22, @1983-JUL-1, 23, @1985-JUL-1, 24, @1988-JAN-1,
+25, @1990-JAN-1, 26, @1991-JAN-1, 27, @1992-JUL-1, 28, @1993-JUL-1, 29, @1994-JUL-1,
+30, @1996-JAN-1, 31, @1997-JUL-1, 32, @1999-JAN-1, 33, @2006-JAN-1, 34, @2009-JAN-1,
+35, @2012-JUL-1, 36, @2015-JUL-1, 37, @2017-JAN-1 )
 """
 
 
@@ -75,7 +77,7 @@ def test_epoch_is_read_with_all_its_digits(
         "٢٠٢٩-03-01T00:00:00",  # digits of another script
     ],
 )
-def test_text_that_is_no_epoch_is_refused(text: str) -> None:
+def test_malformed_epoch_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match=r"epoch|exist|leap second|scale"):
         parse_epoch(text)
 
@@ -121,7 +123,7 @@ def test_scales_with_constant_differences_are_converted_exactly(
 
 
 @pytest.mark.parametrize("year", range(1973, 2050, 3))
-def test_tdb_from_utc_is_that_of_spice(year: int, tmp_path: Path) -> None:
+def test_tdb_from_utc_equals_spice(year: int, tmp_path: Path) -> None:
     spice: Any = pytest.importorskip(
         "spiceypy", reason="needs the extra trajectory: pip install '.[trajectory]'"
     )

@@ -26,7 +26,7 @@ from infoset.experiments.interception.trajectory.frames import (
         ("tod", "TOD_EARTH"),
     ],
 )
-def test_names_of_one_frame_are_the_same(one: str, other: str) -> None:
+def test_synonymous_frame_names_give_equal_frames(one: str, other: str) -> None:
     assert is_same_frame(inertial_frame(one), inertial_frame(other))
 
 
@@ -40,7 +40,7 @@ def test_names_of_one_frame_are_the_same(one: str, other: str) -> None:
         ("B1950", "J2000"),
     ],
 )
-def test_different_frames_are_not_the_same(one: str, other: str) -> None:
+def test_different_frames_are_unequal(one: str, other: str) -> None:
     assert not is_same_frame(inertial_frame(one), inertial_frame(other))
 
 
@@ -110,10 +110,10 @@ def test_j2000_of_spice_is_both_eme2000_and_icrf(name: str) -> None:
         ("EMB", "Earth Barycenter"),
     ],
 )
-def test_names_of_one_centre_are_the_same(one: str, other: str) -> None:
+def test_synonymous_centre_names_give_one_name(one: str, other: str) -> None:
     assert centre_name(one) == centre_name(other)
 
 
-def test_barycentre_is_not_the_body() -> None:
+def test_barycentre_and_body_have_different_names() -> None:
     assert centre_name("MARS BARYCENTER") != centre_name("MARS")
     assert centre_name("SSB") != centre_name("SUN")

@@ -115,7 +115,7 @@ def random_times(
 
 @pytest.mark.parametrize("seed", range(20))
 @pytest.mark.parametrize("method", ["HERMITE", "LAGRANGE"])
-def test_polynomial_is_that_of_exact_rationals(method: str, seed: int) -> None:
+def test_polynomial_equals_exact_rational_interpolation(method: str, seed: int) -> None:
     """Random tables with equal steps, as near and as large as those of an orbit around the Sun."""
     generator = np.random.default_rng(seed)
     step = int(10 ** generator.uniform(1, 5))
@@ -178,7 +178,7 @@ def orbit(times: list[Fraction]) -> Floats:
 )
 @pytest.mark.parametrize("interval", range(-4, 4))
 @pytest.mark.parametrize("method", ["HERMITE", "LAGRANGE"])
-def test_state_beside_a_change_of_the_step_is_that_of_the_orbit(
+def test_state_near_a_change_of_the_step_is_on_the_orbit(
     method: str, interval: int, first: int, second: int
 ) -> None:
     """The error was 0.1 to 5 000 km: the window was that of the nearest mean time."""
@@ -218,7 +218,7 @@ def test_tabulated_epoch_is_the_tabulated_state(method: str, row: int) -> None:
     assert (found.method, found.nearest_s) == ("TABULATED", 0.0)
 
 
-def test_single_state_is_enough_for_its_own_epoch() -> None:
+def test_table_of_one_state_has_the_state_of_its_epoch() -> None:
     times = [Fraction(60)]
 
     assert (
@@ -254,7 +254,7 @@ def test_epoch_in_a_gap_is_refused() -> None:
         interpolate(epoch, times, orbit(times), "HERMITE", 7, without_drift)
 
 
-def test_twenty_steps_are_not_a_gap() -> None:
+def test_interval_of_twenty_steps_is_interpolated() -> None:
     times, epoch = gap_after(60, 60 * 20)
 
     found = interpolate(epoch, times, orbit(times), "HERMITE", 7, without_drift)
@@ -262,7 +262,7 @@ def test_twenty_steps_are_not_a_gap() -> None:
     assert np.linalg.norm(found.state - orbit([epoch])[0], axis=1)[0] < 1e-2
 
 
-def test_epoch_beside_a_gap_is_not_in_it() -> None:
+def test_epoch_next_to_a_gap_is_interpolated() -> None:
     times, _ = gap_after(60, 86400)
 
     found = interpolate(times[7] + 30, times, orbit(times), "HERMITE", 7, without_drift)

@@ -27,7 +27,7 @@ def refused(text: str | bytes) -> str:
     return message
 
 
-def test_states_and_epochs_are_those_of_the_file() -> None:
+def test_states_and_epochs_are_read_from_the_file() -> None:
     (found,) = read(SIMPLE)
 
     np.testing.assert_allclose(found.states, STATES, rtol=1e-15)
@@ -81,7 +81,7 @@ def test_accelerations_are_read_over() -> None:
     ],
     ids=["BOM", "Latin-1", "BOM and Latin-1", "UTF-8", "Windows"],
 )
-def test_encodings_of_other_programs_are_read(content: bytes) -> None:
+def test_latin_1_and_byte_order_mark_are_read(content: bytes) -> None:
     np.testing.assert_allclose(read(content)[0].states, STATES, rtol=1e-15)
 
 
@@ -108,7 +108,7 @@ def test_metadata_without_interpolation_have_hermite_of_degree_seven() -> None:
     assert (found.method, found.degree) == ("HERMITE", 7)
 
 
-def test_linear_interpolation_has_degree_one_whatever_the_file_says() -> None:
+def test_linear_interpolation_has_degree_one_for_any_written_degree() -> None:
     (found,) = read(
         HEADER + segment(EPOCHS, STATES, INTERPOLATION="LINEAR", INTERPOLATION_DEGREE="7")
     )
@@ -246,7 +246,7 @@ def test_message_names_the_line() -> None:
 
 
 @pytest.mark.parametrize("seed", range(200))
-def test_random_damage_is_read_or_refused_with_one_line(seed: int) -> None:
+def test_randomly_damaged_file_is_read_or_refused_with_one_line(seed: int) -> None:
     generator = np.random.default_rng(seed)
     content = bytearray((SIMPLE + COVARIANCE + segment(EPOCHS, STATES)).encode())
     for _ in range(int(generator.integers(1, 6))):
