@@ -6,7 +6,8 @@ from infoset.guidance.estimate import MissEstimate
 from infoset.guidance.game_noise import GameNoise
 from infoset.guidance.kalman import Kalman, KalmanBank
 from infoset.guidance.least_effort import LeastEffort
-from infoset.guidance.noise import LineOfSight, MeasurementNoise, NoiseKind, TieRule
+from infoset.guidance.noise import LineOfSight, MeasurementNoise, TieRule
+from infoset.guidance.noise_registry import NoiseKind
 from infoset.guidance.patient import Patient
 from infoset.guidance.predictive import Predictive
 from infoset.guidance.proportional_navigation import ProportionalNavigation

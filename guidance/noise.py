@@ -1,4 +1,4 @@
-"""The contract of measurement noise, and its kinds."""
+"""The contract of measurement noise, and checks of its errors and measurements."""
 
 from __future__ import annotations
 
@@ -13,19 +13,6 @@ from infoset.arrays import Floats
 from infoset.information_set import InformationSetView
 from infoset.limits import real_array, real_values, shown
 from infoset.sensors import Measurements, Sensor
-
-
-class NoiseKind(Enum):
-    """How measurement errors are chosen within their bounds.
-
-    RANDOM errors are uniform and independent, GAUSSIAN ones independent, CORRELATED ones Gaussian
-    and correlated in time; GAME errors are chosen against the guidance.
-    """
-
-    RANDOM = "random"
-    GAUSSIAN = "gaussian"
-    CORRELATED = "correlated"
-    GAME = "game"
 
 
 class TieRule(Enum):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -14,14 +13,12 @@ from infoset.engine.predicted_miss import PredictedMiss
 from infoset.guidance import (
     GameNoise,
     MeasurementNoise,
-    NoiseKind,
-    RandomNoise,
     Situation,
     Strategy,
     make_strategy,
 )
-from infoset.guidance.gaussian_noise import gaussian_noise
-from infoset.guidance.noise import NoiseSource
+from infoset.guidance.noise import NoiseSource, checked_measurements
+from infoset.guidance.noise_registry import NoiseBatch, make_noise
 from infoset.guidance.strategy import checked_impulses
 from infoset.guidance.thruster import modulus
 from infoset.information_set import InformationSet, InformationSetView
@@ -331,14 +328,14 @@ def _outcome(diverged: bool, lost: bool, spent: bool) -> Outcome:
 
 
 def _make_noise(scenario: Scenario, draws: Draws) -> MeasurementNoise:
-    if scenario.noise is NoiseKind.GAME:
-        side = constant_side(scenario.target, draws.target)
-        return GameNoise(scenario.tie, draws.tie, worst_shift_m(scenario), side)
-    if scenario.noise is NoiseKind.RANDOM:
-        return RandomNoise(draws.errors, draws.bias)
-    is_correlated = scenario.noise is NoiseKind.CORRELATED
-    correlation = math.exp(-scenario.step_s / scenario.correlation_time_s) if is_correlated else 0.0
-    return gaussian_noise(draws.errors, draws.bias, scenario.noise_sigma, correlation)
+    batch = NoiseBatch(
+        errors=draws.errors,
+        bias=draws.bias,
+        tie=draws.tie,
+        worst_shift_m=lambda: worst_shift_m(scenario),
+        target_side=lambda: constant_side(scenario.target, draws.target),
+    )
+    return make_noise(scenario.noise, scenario, batch)
 
 
 def _noise_of_batch(source: NoiseSource) -> MeasurementNoise:

@@ -42,15 +42,19 @@ and two checks a second take no measurable time.
 
 
 class CampaignNoise(Enum):
-    """Measurement noise of a campaign: a `NoiseKind`, MIXED, or OWN (the user's).
+    """Measurement noise of a campaign: a `NoiseKind`, or one of the two below.
 
-    MIXED is random noise in even runs and game noise in odd ones.
+    MIXED is random noise in even runs and game noise in odd ones, OWN a noise of the user's own.
     """
 
-    RANDOM = "random"
-    GAUSSIAN = "gaussian"
-    CORRELATED = "correlated"
-    GAME = "game"
+    RANDOM: CampaignNoise
+    GAME: CampaignNoise
+
+    # All kinds become members, so that a new kind is added in `NoiseKind` only.
+    _ignore_ = "_members _kind"
+    _members = vars()
+    for _kind in NoiseKind:
+        _members[_kind.name] = _kind.value
     MIXED = "mixed"
     OWN = "own"
 

@@ -12,7 +12,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from infoset.arrays import Floats
-from infoset.guidance.noise import NoiseKind, NoiseSource, TieRule
+from infoset.guidance.noise import NoiseSource, TieRule
+from infoset.guidance.noise_registry import NoiseKind
 from infoset.guidance.strategy import Strategy
 from infoset.guidance.thruster import Thruster
 from infoset.limits import (

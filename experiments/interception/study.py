@@ -12,8 +12,8 @@ from infoset.arrays import Flags, Floats
 from infoset.experiments.common.screen import some_runs
 from infoset.experiments.common.units import length_text
 from infoset.guidance import NoiseKind, Strategy, TieRule
-from infoset.guidance.gaussian_noise import share_cut
 from infoset.guidance.noise import NoiseSource
+from infoset.guidance.noise_registry import noise_note
 from infoset.model import Model
 from infoset.sim import HitEstimate, MissCause, Results, Scenario, estimate_hits
 from infoset.sim.requirement import CONFIDENCE, HitRequirement, runs_needed
@@ -298,22 +298,11 @@ def random_note(scenario: Scenario) -> str:
 def noise_notes(scenario: Scenario, noises: Iterable[str], rule: str | None = None) -> list[str]:
     """Return a line for each noise that says how its results are to be read.
 
-    Random noise and the user's own noises have none. `rule` is passed to `game_note`.
+    `rule` is an argument of `game_note`.
     """
-    sigma = scenario.noise_sigma
-    gaussian = (
-        f"the standard deviation is {sigma:.3g} of the bound, where the errors are truncated; this "
-        f"cuts {percent(share_cut(sigma))} of a Gaussian"
-    )
-    known = {
-        NoiseKind.GAUSSIAN.value: f"gaussian noise: {gaussian}",
-        NoiseKind.CORRELATED.value: (
-            f"correlated noise: {gaussian}; the time constant of the correlation is "
-            f"{scenario.correlation_time_s:.4g} s"
-        ),
-        NoiseKind.GAME.value: game_note(scenario, rule),
-    }
-    return [known[noise] for noise in noises if noise in known]
+    notes = {kind.value: noise_note(kind, scenario) for kind in NoiseKind}
+    notes[NoiseKind.GAME.value] = game_note(scenario, rule)
+    return [note for noise in noises if (note := notes.get(noise)) is not None]
 
 
 def hit_text(hits: HitEstimate | None, scenario: Scenario) -> str:

@@ -15,7 +15,7 @@ from infoset.experiments.interception.scenario_file import (
     scenario_warnings,
     with_model,
 )
-from infoset.guidance.noise import NoiseKind, TieRule
+from infoset.guidance import NoiseKind, TieRule
 from infoset.guidance.thruster import Thruster
 from infoset.model import Model, SetModel, SetSettings, StateBox
 from infoset.sensors import AngleSensor, Camera, RangeSensor, RateSensor
