@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 from infoset.arrays import Flags, Floats
 from infoset.engine.predicted_miss import PredictedMiss
 from infoset.guidance import (
-    GameNoise,
     MeasurementNoise,
     Situation,
     Strategy,
     make_strategy,
 )
-from infoset.guidance.noise import NoiseSource, checked_measurements
+from infoset.guidance.noise import NoiseSource
 from infoset.guidance.noise_registry import NoiseBatch, make_noise
 from infoset.guidance.strategy import checked_impulses
 from infoset.guidance.thruster import modulus

@@ -72,7 +72,7 @@ def fly(
 
     note = partial(say, quiet=options.quiet)
     with (
-        workers_of(options, campaign.engagements, note) as (executor, workers),
+        workers_of(options, campaign.max_engagements, note) as (executor, workers),
         progress_bar(options.quiet) as begin,
     ):
         began_s = time.perf_counter()
