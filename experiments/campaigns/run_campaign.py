@@ -51,14 +51,14 @@ def run(options: CampaignOptions) -> None:
         results["elapsed_s"] = elapsed_s
         results["samples"] = records(table.drop(columns="cell"))
 
-        runs = some_runs(stored.finished_runs)
+        flown = some_runs(stored.finished_runs)
         limits = "95 % confidence limits"
         if manifest.stopped_after is not None:
-            runs += f" of {manifest.runs}, stopped by the rule {manifest.until}"
+            flown += f" of {manifest.runs}, stopped by the rule {manifest.until}"
             limits = "confidence limits"  # less than 95 %: see the note of the summary
         parts = [
             study_title(manifest.scenario, manifest.strategy, manifest.seed),
-            f"{runs}, {duration_text(elapsed_s)}; quantiles with {limits}",
+            f"{flown}, {duration_text(elapsed_s)}; quantiles with {limits}",
             *summary_parts(stored, table),
         ]
         if manifest.until is not None and manifest.stopped_after is None:
