@@ -125,7 +125,7 @@ LONGEST_NAME = 100
 LONGEST_DESCRIPTION = 300
 """Maximum length of a description: three lines of a screen."""
 NO_FIRST = ("", "-", ".", " ")
-"""Beginnings that the name of a file must not have: an option, a hidden file, nothing to see."""
+"""Beginnings that a name of files must not have: of options, of hidden files, and nothing."""
 NOT_IN_NAMES = set('/\\:*?"<>|$')
 """Characters that file systems or shells refuse or interpret in names of files."""
 LONGEST_SHOWN = 80

@@ -179,11 +179,15 @@ class SetQueries:
         Kumkov and Patsko (1997), equations (13) and (14).
         """
         exists, ends = self._state.widest(pending)
-        # The columns of an end are the predicted miss, and the state that reaches it.
-        lower_m, *lower_state = np.moveaxis(ends[..., 0, :], -1, 0)
-        upper_m, *upper_state = np.moveaxis(ends[..., 1, :], -1, 0)
+        # An end is the predicted miss, and the state that reaches it.
+        lower = ends[..., 0, :]
+        upper = ends[..., 1, :]
         return PredictedMiss(
-            exists, lower_m, upper_m, ExtremePoints(*lower_state), ExtremePoints(*upper_state)
+            exists,
+            lower[..., 0],
+            upper[..., 0],
+            ExtremePoints(lower[..., 1], lower[..., 2], lower[..., 3]),
+            ExtremePoints(upper[..., 1], upper[..., 2], upper[..., 3]),
         )
 
     def predicted_miss_by_section_m(self) -> tuple[Floats, Floats]:

@@ -387,18 +387,25 @@ def farthest_pair(points: Points, count: int) -> FarthestPair:
 
 @inlined
 def pass_edge(
-    nearest: float, inside: bool, start: Point, end: Point, x: float, y: float
+    nearest: float,
+    inside: bool,
+    start: tuple[float, float],
+    end: tuple[float, float],
+    x: float,
+    y: float,
 ) -> tuple[float, bool]:
     """Add an edge to the squared distance of (x, y) from the boundary, and to the parity inside.
 
     Without branches: a mispredicted branch costs more than a division.
     """
-    edge_x = end.x - start.x
-    edge_y = end.y - start.y
-    from_x = x - start.x
-    from_y = y - start.y
-    to_x = x - end.x
-    to_y = y - end.y
+    start_x, start_y = start
+    end_x, end_y = end
+    edge_x = end_x - start_x
+    edge_y = end_y - start_y
+    from_x = x - start_x
+    from_y = y - start_y
+    to_x = x - end_x
+    to_y = y - end_y
     offset = cross(edge_x, edge_y, from_x, from_y)
     squared_length = edge_x * edge_x + edge_y * edge_y
     along = from_x * edge_x + from_y * edge_y
@@ -411,8 +418,8 @@ def pass_edge(
     squared = squared if along > 0.0 else off_start
 
     # The parity changes if the ray from the point to the right crosses the edge.
-    rises = end.y > start.y
-    inside ^= ((end.y > y) != (start.y > y)) & ((offset > 0.0) == rises)
+    rises = end_y > start_y
+    inside ^= ((end_y > y) != (start_y > y)) & ((offset > 0.0) == rises)
     return min(nearest, squared), inside
 
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from infoset._compile import compiled, inlined
+from infoset._compile import compiled, inlined, pasted
 from infoset.arrays import Floats
 from infoset.geometry.double_words import two_product, two_sum
 from infoset.geometry.polygon import (
@@ -201,7 +201,7 @@ def hull(points: Points, count: int, out: Points) -> int:
     return made
 
 
-@compiled
+@pasted
 def extend(chain: Points, count: int, fewest: int, point: Point) -> int:
     """Append a point to a chain that turns left; return the new count.
 

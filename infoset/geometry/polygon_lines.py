@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from infoset._compile import compiled, inlined
-from infoset.arrays import Floats, Integers
+from infoset.arrays import Flags, Floats, Integers
 from infoset.geometry.double_words import two_product, two_sum
 from infoset.geometry.polygon import Point, Points, following, preceding, put, vertex
 from infoset.geometry.polygon_exact import exact_sum, hull, tidy
@@ -130,6 +130,7 @@ def intersect_lines(rows: Floats, out: Points) -> int:
 
     # The numbers of the borders in their order around the set, which begins as the box.
     chain = np.arange(count + 4)
+    outside = np.empty(count + 4, dtype=np.bool_)
     size = BOX_SIDES
     for k in range(BOX_SIDES, count):
         a, b, c = values[k]
@@ -138,12 +139,13 @@ def intersect_lines(rows: Floats, out: Points) -> int:
             continue
         if c == -np.inf or not has_direction:
             return 0
-        size = insert_border(values, lines, chain, size, k)
+        size = insert_border(values, lines, chain, size, k, outside)
         if size == 0:
             return 0
 
-    if (chain[:size] < BOX_SIDES).any():
-        return UNBOUNDED
+    for i in range(size):
+        if chain[i] < BOX_SIDES:
+            return UNBOUNDED
     return write_corners(values, lines, chain, size, out)
 
 
@@ -161,12 +163,14 @@ def lines_in_box(rows: Floats) -> Floats:
 
 
 @compiled
-def insert_border(values: Floats, lines: Floats, chain: Integers, size: int, k: int) -> int:
+def insert_border(
+    values: Floats, lines: Floats, chain: Integers, size: int, k: int, outside: Flags
+) -> int:
     """Cut a set by line k, in place: `chain` has the numbers of its borders. Return its new size.
 
-    Vertex i is between the borders i and i + 1; the size of the empty set is 0.
+    Vertex i is between the borders i and i + 1; the size of the empty set is 0. `outside` is a
+    working array.
     """
-    outside = np.empty(size, dtype=np.bool_)
     violated = 0
     for i in range(size):
         outside[i] = beyond(values, lines, chain[i], chain[following(i, size)], k) > 0.0
