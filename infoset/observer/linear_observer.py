@@ -323,11 +323,12 @@ class LinearObserver:
     initial : ConvexPolygons, Polytope or Zonotope
         Set of the state at step 0, before its measurement; for two states also one polygon for each
         run, shape (B,).
-    noise : array_like, shape (), (q,) or (K, q), or a set, or a sequence of sets
-        Half-widths of the box V, half-widths of each step, V, or V of each step. A set is a
-        ConvexPolygons, a Polytope or a Zonotope.
-    disturbance : array_like, shape (n,) or (K, n), or a set, or a sequence of sets
-        W, W of each step, or half-widths of a box W; without it (optional) the point 0.
+    noise : array_like, ConvexPolygons, Polytope or Zonotope, or a sequence of such sets
+        V, or V of each step. An array has half-widths of a box V, shape () or (q,), or of each
+        step, shape (K, q).
+    disturbance : ConvexPolygons, Polytope or Zonotope, a sequence of such sets, or array_like
+        W, or W of each step; without it (optional) the point 0. An array has half-widths of a box
+        W, shape (n,), or of each step, shape (K, n).
     input_matrix : array_like, shape (n, p) or (K, n, p), optional
         B.
     offset : array_like, shape (n,) or (K, n), optional
