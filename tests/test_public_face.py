@@ -74,7 +74,8 @@ def test_files_of_the_user_with_names_of_the_folders_are_not_imported(tmp_path: 
     (tmp_path / "experiments").mkdir()
     (tmp_path / "experiments" / "__init__.py").write_text("raise ImportError('folder of the user')")
     code = (
-        "import sys, infoset.experiments.cli, infoset.guidance, infoset.rendezvous.pareto, infoset.sim\n"
+        "import sys, infoset.experiments.cli, infoset.guidance, infoset.sim\n"
+        "import infoset.rendezvous.pareto\n"
         f"print(infoset.load_scenario('{ANY_SCENARIO}').name)\n"
         "print(*{'experiments', 'guidance', 'rendezvous', 'sim'} & set(sys.modules))"
     )

@@ -136,7 +136,7 @@ def refused(call: Callable[[], object], name: str) -> None:
 
 
 @pytest.mark.parametrize("sound", SOUND, ids=lambda sound: type(sound).__name__)
-def test_what_is_no_value_of_a_field(sound: Any) -> None:
+def test_field_with_an_invalid_value_is_refused(sound: Any) -> None:
     for field in fields(sound):
         value = getattr(sound, field.name)
         bad = list[Any]()
@@ -193,7 +193,9 @@ def test_what_is_no_value_of_a_field(sound: Any) -> None:
         (lambda: QuantileName("fuel", 0.5), "fuel"),
     ],
 )
-def test_values_that_contradict_each_other(change: Callable[[], object], name: str) -> None:
+def test_values_that_contradict_each_other_are_refused(
+    change: Callable[[], object], name: str
+) -> None:
     refused(change, name)
 
 
@@ -231,7 +233,7 @@ NO_ARRAYS: tuple[Any, ...] = (
         ),
     ],
 )
-def test_what_is_no_measurement_or_impulse(
+def test_invalid_measurement_or_impulse_is_refused(
     operation: Callable[[Any, Any], object], name: str
 ) -> None:
     for value in NO_ARRAYS:
@@ -239,7 +241,7 @@ def test_what_is_no_measurement_or_impulse(
 
 
 @pytest.mark.parametrize("value", [*NO_NUMBERS, -1e-9])
-def test_what_is_no_error_bound(value: Any) -> None:
+def test_invalid_error_bound_is_refused(value: Any) -> None:
     refused(lambda: information().measure_range(5.5e6, value), "relative_error")
     refused(lambda: information().measure_rate(0.0, value), "error_rad_s")
     refused(lambda: information().measure_range(5.5e6, 1.0), "relative_error")
@@ -247,7 +249,7 @@ def test_what_is_no_error_bound(value: Any) -> None:
 
 
 @pytest.mark.parametrize("value", NO_COUNTS)
-def test_what_is_no_count(value: Any) -> None:
+def test_invalid_count_is_refused(value: Any) -> None:
     scenario = load_scenario("asteroid-1997")
     refused(lambda: information(value), "batch")
     refused(lambda: information().sections(value), "engagement")
@@ -280,7 +282,7 @@ NO_POINTS = (
 
 
 @pytest.mark.parametrize("value", NO_POINTS)
-def test_what_is_no_point_of_a_polygon(value: Any) -> None:
+def test_invalid_point_of_a_polygon_is_refused(value: Any) -> None:
     polygon = square()
     several = value[None] if isinstance(value, np.ndarray) else [value]
     refused(lambda: ConvexPolygons(several, 1), "vertices")
@@ -330,7 +332,7 @@ class Returns:
         [[True]],
     ],
 )
-def test_what_a_strategy_must_not_want(wanted: Any, brief: Scenario) -> None:
+def test_invalid_impulses_of_a_strategy_are_refused(wanted: Any, brief: Scenario) -> None:
     refused(
         lambda: simulate(brief, 1, strategy=Returns(wanted)),
         "strategy Returns must return finite impulses",
@@ -358,11 +360,13 @@ def test_what_a_strategy_must_not_want(wanted: Any, brief: Scenario) -> None:
         ),
     ],
 )
-def test_what_a_noise_must_not_measure(measured: Any, name: str, brief: Scenario) -> None:
+def test_invalid_measurements_of_a_noise_are_refused(
+    measured: Any, name: str, brief: Scenario
+) -> None:
     refused(lambda: fly_one(brief, noise=Returns(measured)), name)
 
 
-def test_sensors_that_measure_now_and_then_are_asked_now_and_then(brief: Scenario) -> None:
+def test_noise_is_called_for_sensors_that_are_due_only(brief: Scenario) -> None:
     step_s = brief.set_model.step_s
     scenario = replace(
         brief, range_sensor=RangeSensor(2 * step_s, 0.05), rate_sensor=RateSensor(3 * step_s, 1e-4)

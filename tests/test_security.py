@@ -59,7 +59,7 @@ def trees(request: pytest.FixtureRequest) -> dict[Path, ast.Module]:
     return {file: ast.parse(file.read_text()) for file in SOURCES[request.param]}
 
 
-def test_nothing_that_runs_what_a_file_says(trees: dict[Path, ast.Module]) -> None:
+def test_functions_that_run_code_from_files_are_not_called(trees: dict[Path, ast.Module]) -> None:
     found = []
     for file, tree in trees.items():
         for node in ast.walk(tree):
@@ -104,7 +104,7 @@ def record() -> Record:
     return first_steps(whole, 6)
 
 
-def test_no_code_that_a_file_names_is_run(
+def test_code_named_in_a_file_is_not_run(
     record: Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A strategy that is a class in a Python file is loaded only if an option names it."""
@@ -136,7 +136,7 @@ def test_a_record_cannot_steer_the_terminal(
     assert "\x1b" not in told.out + told.err
 
 
-def test_keys_that_are_shown_cannot_steer_it_either(
+def test_keys_in_messages_cannot_steer_the_terminal(
     record: Record,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,

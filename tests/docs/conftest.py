@@ -10,7 +10,9 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 _BLOCK = re.compile(
-    r"(?:^<!-- (?P<comment>[^\n]*?) -->\n)?^(?P<fence>```+|~~~+)(?P<language>[^\n`]*)\n(?P<text>.*?)^(?P=fence)[ ]*$",
+    r"(?:^<!-- (?P<comment>[^\n]*?) -->\n)?"
+    r"^(?P<fence>```+|~~~+)(?P<language>[^\n`]*)\n"
+    r"(?P<text>.*?)^(?P=fence)[ ]*$",
     flags=re.DOTALL | re.MULTILINE,
 )
 _NOT_RUN = "not run: "

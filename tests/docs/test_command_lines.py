@@ -63,7 +63,9 @@ SLOW = (
 """Lines that run with -m thorough only."""
 
 ELSEWHERE = {
-    "python benchmarks/page_speed.py": "it takes minutes in a browser; tests/browser opens the same pages",
+    "python benchmarks/page_speed.py": (
+        "it takes minutes in a browser; tests/browser opens the same pages"
+    ),
 }
 """Lines in running text (without a comment above them) that are not run, and the reason."""
 
@@ -213,7 +215,7 @@ def test_all_lines_run_in_their_order(page: Page, folder: Path) -> None:
             run(line, folder)
 
 
-def test_blocks_that_are_not_run_say_why(pages: list[Page]) -> None:
+def test_blocks_that_are_not_run_have_a_reason(pages: list[Page]) -> None:
     left_out = {block.text: block for page in pages for block in page.blocks() if block.not_run}
     assert all(len(block.not_run.split()) >= 4 for block in left_out.values())
     # A further block that is not run must be listed here.

@@ -69,13 +69,19 @@ _IN_NAME = re.compile(
     r"_(m|s|rad|km|deg|kg|n|m_s|km_s|rad_s|m_s2|m2_s3|m3_s2|kg_s|per_m|per_s|mb)$"
 )
 _UNIT = re.compile(
-    r"(?<![\w^'’])(m|s|rad|km|deg|kg|N|MB|ms|m/s|km/s|rad/s|rad/m|m/s\^1\.5|m/s\^2|m/s\^3|m\^2/s\^3|m\^3/s\^2|kg/s|1/s)(?!\w)"
+    r"(?<![\w^'’])"
+    r"(m|s|rad|km|deg|kg|N|MB|ms|m/s|km/s|rad/s|rad/m"
+    r"|m/s\^1\.5|m/s\^2|m/s\^3|m\^2/s\^3|m\^3/s\^2|kg/s|1/s)"
+    r"(?!\w)"
 )
 _NUMBER = re.compile(r"\bfloat\b|Floats|ArrayLike|NDArray\[np\.float")
 _NONE_OR_GIVEN = re.compile(
-    r"share|fraction|[Rr]elative|probability|ratio|eccentricity|weights?\b|confidence|level|direction|zonal|scaled"
-    r"|[Ii]n [\[(][-\d]|between 0 and 1|0 to 1|unit (length|vector)|Unit vectors|dimensionless|nondimensional"
-    r"|standard deviations|units? of|own units|any units|permutation|matri|costate|states?\b|Gramian"
+    r"share|fraction|[Rr]elative|probability|ratio|eccentricity|weights?\b|confidence|level"
+    r"|direction|zonal|scaled"
+    r"|[Ii]n [\[(][-\d]|between 0 and 1|0 to 1|unit (length|vector)|Unit vectors"
+    r"|dimensionless|nondimensional"
+    r"|standard deviations|units? of|own units|any units|permutation|matri|costate|states?\b"
+    r"|Gramian"
     r"|[Ff]ree (terminal )?values"
 )
 """Words for numbers without a unit, or with a unit by convention of the reference: states are in m
@@ -237,7 +243,7 @@ def names_in_the_reference(package: str) -> set[str]:
 
 
 @pytest.mark.parametrize("package", RAISES_CHECKED)
-def test_what_is_raised_is_said(package: str) -> None:
+def test_raised_exceptions_are_documented(package: str) -> None:
     folder = Path(str(importlib.import_module(package).__file__)).parent
     modules = [each.relative_to(folder) for each in sorted(folder.rglob("*.py"))]
     assert modules

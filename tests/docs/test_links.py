@@ -45,7 +45,7 @@ def source_of(target: Path) -> Path | None:
     return None
 
 
-def test_links_lead_somewhere(page: Page) -> None:
+def test_targets_of_links_exist(page: Page) -> None:
     for link in _LINK.findall(page.prose()):
         if "://" in link:
             assert link in OUTSIDE, f"{page.name}: {link} is not among the addresses known here"

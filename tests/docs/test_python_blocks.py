@@ -43,7 +43,7 @@ def test_blocks_run(page: Page) -> None:
     run_blocks(page)
 
 
-def test_sessions_print_what_they_say(page: Page) -> None:
+def test_sessions_print_their_documented_output(page: Page) -> None:
     for block in page.blocks("pycon"):
         test = doctest.DocTestParser().get_doctest(block.text, {}, page.name, page.name, 0)
         result = doctest.DocTestRunner().run(test)

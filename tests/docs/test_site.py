@@ -98,7 +98,9 @@ def public_names() -> Iterator[str]:
         yield from (f"{package}.{name}" for name in importlib.import_module(package).__all__)
 
 
-def test_links_and_anchors_inside_lead_somewhere(site: Path, read: dict[Path, _Reader]) -> None:
+def test_targets_of_links_and_anchors_in_the_site_exist(
+    site: Path, read: dict[Path, _Reader]
+) -> None:
     seen = 0
     for page, reader in read.items():
         for link in reader.links:
@@ -136,7 +138,7 @@ def test_nothing_is_loaded_from_elsewhere(site: Path, read: dict[Path, _Reader])
         ), sheet
 
 
-def test_pictures_say_what_they_show(site: Path, read: dict[Path, _Reader]) -> None:
+def test_pictures_have_an_alternative_text(site: Path, read: dict[Path, _Reader]) -> None:
     for page, reader in read.items():
         # Thumbnails of the gallery have no text; their titles have the same content.
         titled = page == site / "gallery" / "index.html"

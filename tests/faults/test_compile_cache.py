@@ -59,7 +59,7 @@ def test_the_folder_of_the_environment_comes_first(
 
 @pytest.mark.usefixtures("nowhere")
 @pytest.mark.parametrize("compiled", [_compile.compiled, _compile_of_rendezvous.compiled])
-def test_a_kernel_that_cannot_be_stored_is_compiled_all_the_same(
+def test_kernel_is_compiled_if_it_cannot_be_stored(
     compiled: Callable[..., Callable[[float], float]],
 ) -> None:
     assert compiled(twice)(1.5) == 3.0
@@ -77,7 +77,8 @@ for texts in json.load(sys.stdin):
         path.write_text(text)
     for name in [name for name in sys.modules if name.partition(".")[0] == "infoset"]:
         del sys.modules[name]  # as in a new process, except that Numba is loaded already
-    sys.meta_path[:] = [finder for finder in sys.meta_path if not finder.__module__.startswith("infoset")]
+    others = [each for each in sys.meta_path if not each.__module__.startswith("infoset")]
+    sys.meta_path[:] = others
     importlib.invalidate_caches()
     from infoset import caller
     print(caller.call(1.0), sum(caller.call.stats.cache_hits.values()))
@@ -164,7 +165,7 @@ def environment_of(installation: Path, temporary: Path, home: Path) -> dict[str,
     }
 
 
-def test_no_folder_can_be_written(
+def test_kernels_work_if_no_folder_can_be_written(
     installation: Path, tmp_path: Path, ordinary: tuple[str, ...]
 ) -> None:
     """The library alone, as in a notebook: it works, and one line says what to do."""

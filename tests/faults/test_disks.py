@@ -28,12 +28,14 @@ COMMANDS = {
 
 
 @pytest.mark.parametrize("name", list(COMMANDS)[:-1])
-def test_a_full_disk(name: str, infoset: Command, file: Path, small_disk: Path) -> None:
+def test_full_disk_is_a_message_and_leaves_no_partial_file(
+    name: str, infoset: Command, file: Path, small_disk: Path
+) -> None:
     assert "No space left on device" in infoset(*COMMANDS[name], "--out", small_disk / "o")[2]
     need_whole(small_disk)
 
 
-def test_a_campaign_on_a_full_disk_goes_on(
+def test_campaign_is_resumed_after_a_full_disk(
     infoset: Command, brief: Scenario, file: Path, small_disk: Path
 ) -> None:
     subprocess.run(["mount", "-o", "remount,size=200k", small_disk], check=True)
@@ -65,7 +67,7 @@ def test_a_campaign_on_a_full_disk_goes_on(
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_a_folder_that_may_not_be_written(
+def test_folder_without_permission_is_a_message(
     name: str, file: Path, tmp_path: Path, ordinary: tuple[str, ...]
 ) -> None:
     sealed = tmp_path / "sealed"

@@ -26,7 +26,7 @@ CODES = (130, -signal.SIGINT)
 
 
 @pytest.mark.parametrize("command", ["campaign", "sweep"])
-def test_an_interrupt_says_how_to_go_on(
+def test_message_of_an_interrupt_says_how_to_continue(
     command: str, infoset: Command, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stored: list[int] = []
@@ -57,7 +57,9 @@ COMMANDS: dict[str, list[object]] = {
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_interrupted_at_random_moments(name: str, file: Path, tmp_path: Path) -> None:
+def test_command_interrupted_at_random_moments_leaves_whole_files(
+    name: str, file: Path, tmp_path: Path
+) -> None:
     command = [*COMMANDS[name], "--overwrite"]
     chance = random.Random(name)
     began_s = time.monotonic()

@@ -55,7 +55,7 @@ def with_room(room_bytes: int, *arguments: object, folder: Path) -> Left:
     return Left(done.returncode, done.stdout, done.stderr)
 
 
-def test_no_memory_is_a_message_that_says_how_to_go_on(
+def test_missing_memory_is_a_message_that_says_how_to_continue(
     infoset: Command, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     flown: list[Task] = []

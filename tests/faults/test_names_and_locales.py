@@ -49,7 +49,7 @@ def test_files_are_the_same_with_a_decimal_comma(
     [LONGEST, "with some spaces", "標的-🛰", 'quote\'s "and" $HOME', "-rf", "line\nbreak"],
     ids=ascii,
 )
-def test_a_folder_of_any_name(
+def test_folder_of_any_name_works(
     name: str, infoset: Command, file: Path, brief: Scenario, tmp_path: Path
 ) -> None:
     home = tmp_path / name
@@ -78,7 +78,7 @@ def test_a_folder_of_any_name(
 
 
 @pytest.mark.parametrize("name", ["n" * 256, "a/" * 2100], ids=["long", "deep"])
-def test_a_name_that_cannot_be(name: str, infoset: Command, file: Path) -> None:
+def test_file_name_that_cannot_exist_is_refused(name: str, infoset: Command, file: Path) -> None:
     for option in ("--out", "--json"):
         infoset.refused("engage", file, option, f"{name}.json", "-q")
     infoset.refused("engage", f"{name}.toml")

@@ -1,11 +1,10 @@
-"""Engagements in proportion to a few numbers, flown and looked at: what the tests of numbers under
-stress share.
-"""
+"""Engagements in proportion to a few numbers, for the tests of numbers under stress."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from infoset.sim.scenario import corners, of_model
 
 @dataclass(frozen=True)
 class Flight:
-    """What was seen of a batch, step by step, and what came of it."""
+    """Values of a batch, step by step, and its results."""
 
     lower_m: Floats
     upper_m: Floats
@@ -39,6 +38,17 @@ class Flight:
         return lengths, self.results.miss_m, self.impulse_m_s
 
 
+class Errors(NamedTuple):
+    """Errors of an engagement: of its angles and of its closing speed, as shares of them.
+
+    `camera` is whether a camera measures the angles, with the largest centroid error.
+    """
+
+    angle: float = 0.1
+    speed: float = 1e-3
+    camera: bool = False
+
+
 def engagement(
     angle_rad: float,
     range_m: float,
@@ -47,15 +57,10 @@ def engagement(
     step_s: float,
     model: Model = Model.GUARANTEED,
     *,
-    error: float = 0.1,
-    speed_error: float = 1e-3,
+    errors: Errors = Errors(),  # noqa: B008 (it cannot be changed)
     in_space: bool = False,
-    camera: bool = False,
 ) -> Scenario:
-    """An engagement whose numbers are all in proportion to an angle, a range, a speed and a step.
-
-    The centroid error of a camera is the largest one.
-    """
+    """An engagement with numbers in proportion to an angle, a range, a speed and a step."""
     slope = math.tan(angle_rad)
     z = range_m * slope
     v = 0.2 * speed_m_s * slope
@@ -63,13 +68,14 @@ def engagement(
         (-z, z),
         (0.9 * range_m, 1.1 * range_m),
         (-v, 0.7 * v),
-        (-speed_m_s * (1.0 + speed_error), -speed_m_s * (1.0 - speed_error)),
+        (-speed_m_s * (1.0 + errors.speed), -speed_m_s * (1.0 - errors.speed)),
     )
+    error_rad = errors.angle * angle_rad
     sensor: AngleSensor | Camera = AngleSensor(
-        step_s, error * angle_rad, 1.5 * error * angle_rad, range_m
+        step_s, error_rad, 1.5 * errors.angle * angle_rad, range_m
     )
-    if camera:
-        sensor = Camera(step_s, error * angle_rad, 0.001999 * range_m)
+    if errors.camera:
+        sensor = Camera(step_s, error_rad, 0.001999 * range_m)
     thruster = Thruster(10.0 * v, 1e-3 * v, 0.2 * v)
     disturbance = 0.01 * slope * speed_m_s**2 / range_m
     along_y = None
@@ -102,7 +108,7 @@ def engagement(
 
 
 def numbers(scenario: Scenario, seed: int, batch: int = 3) -> Draws:
-    """Random numbers of which half are at their bounds: what a guarantee must allow."""
+    """Random numbers of which half are at their bounds, as a guarantee must allow."""
     generator = np.random.default_rng(seed)
     steps = max_number_of_steps(scenario)
     minimum, maximum = corners(scenario.dispersion)

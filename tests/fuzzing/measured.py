@@ -32,7 +32,8 @@ for path in sys.argv[2:]:
         read(path)
     except InputError as error:
         message = str(error)
-    found.append({"message": message, "seconds": time.process_time() - begun, "megabytes": peak() - before})
+    seconds = time.process_time() - begun
+    found.append({"message": message, "seconds": seconds, "megabytes": peak() - before})
 print(json.dumps(found))
 """
 

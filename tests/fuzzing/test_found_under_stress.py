@@ -16,7 +16,7 @@ from infoset.sim.draws import draw
 from infoset.sim.engagement import Engagements, Step
 from infoset.sim.scenario import of_model
 
-from .flights import engagement, fly, numbers
+from .flights import Errors, engagement, fly, numbers
 
 pytestmark = pytest.mark.thorough
 
@@ -77,7 +77,7 @@ def rate_and_manoeuvre() -> Scenario:
     ],
     ids=["rising-error", "gravity-and-known-speed", "rate-and-manoeuvre", "sharp-sensor"],
 )
-def test_the_truth_is_kept(scenario: Scenario) -> None:
+def test_true_state_stays_inside_under_stress(scenario: Scenario) -> None:
     draws = draw(scenario, range(20), 0)
     extremal = replace(
         draws, errors={**draws.errors, "angle": np.where(draws.errors["angle"] < 0.0, -1.0, 1.0)}
@@ -92,7 +92,7 @@ def test_the_predicted_miss_covers_the_section() -> None:
     not the miss's.
     """
     step = 0.03162277660168379
-    scenario = engagement(1e-5, 1.0, 1.0, 1, step, Model.PAPER, error=0.1, speed_error=0.0)
+    scenario = engagement(1e-5, 1.0, 1.0, 1, step, Model.PAPER, errors=Errors(speed=0.0))
     scenario = replace(scenario, rate_sensor=RateSensor(step, 1.0000000000000002e-06))
     draws = numbers(scenario, 0)
     draws = replace(draws, errors={name: 0.99 * errors for name, errors in draws.errors.items()})

@@ -47,7 +47,7 @@ from infoset.sim import Manoeuvre, Outcome, Scenario, Sun, Target
 from infoset.sim.draws import Draws
 from infoset.sim.scenario import of_model
 
-from .flights import Flight, engagement, fly, mirrored, numbers, scaled
+from .flights import Errors, Flight, engagement, fly, mirrored, numbers, scaled
 
 pytestmark = pytest.mark.thorough
 
@@ -127,10 +127,10 @@ WHOLE_FLIGHTS = [
     st.booleans(),
     st.booleans(),
 )
-def test_whole_flights_work_however_few_their_steps(
+def test_whole_flights_work_with_any_number_of_steps(
     combination: Combination, in_space: bool, camera: bool
 ) -> None:
-    scenario = engagement(*combination, in_space=in_space, camera=camera)
+    scenario = engagement(*combination, errors=Errors(camera=camera), in_space=in_space)
     assert assert_works(scenario, numbers(scenario, 1, batch=2)).ended
 
 
@@ -149,16 +149,14 @@ def engagements(draw_value: st.DrawFn) -> Scenario:
     steps = 10.0 ** draw_value(st.floats(0.2, 1.5))
     step = range_m / speed / steps
     assume(STEPS_S[0] <= step <= STEPS_S[-1])
+    sections = draw_value(st.sampled_from([1, 2, 7, 29]))
+    errors = Errors(
+        angle=10.0 ** draw_value(st.floats(-3.0, -0.5)),
+        speed=draw_value(st.sampled_from([0.0, 1e-6, 1e-2, 0.3])),
+    )
+    in_space = draw_value(st.booleans())
     scenario = engagement(
-        angle,
-        range_m,
-        speed,
-        draw_value(st.sampled_from([1, 2, 7, 29])),
-        step,
-        model,
-        error=10.0 ** draw_value(st.floats(-3.0, -0.5)),
-        speed_error=draw_value(st.sampled_from([0.0, 1e-6, 1e-2, 0.3])),
-        in_space=draw_value(st.booleans()),
+        angle, range_m, speed, sections, step, model, errors=errors, in_space=in_space
     )
     rate = RateSensor(step, 0.1 * angle * speed / range_m)
     nu = scenario.set_model.disturbance_m_s2
@@ -267,9 +265,7 @@ def test_other_units_give_the_scaled_answer(
 @pytest.mark.parametrize("model", list(Model))
 @pytest.mark.parametrize("sections", [1, 5])
 @pytest.mark.parametrize("in_space", [False, True])
-def test_what_is_known_exactly_is_no_trouble(
-    exact: str, model: Model, sections: int, in_space: bool
-) -> None:
+def test_exactly_known_values_work(exact: str, model: Model, sections: int, in_space: bool) -> None:
     """Sections that are segments and points, labels that are one: the truth is in them up to
     rounding.
     """

@@ -100,7 +100,7 @@ def test_operations_commute_with_linear_maps(seed: int, space: int, kind: str) -
 
 @some
 @given(SEED, SPACE, st.floats(0.1, 1.0))
-def test_operations_are_monotone_and_include_what_they_must(
+def test_operations_are_monotone_and_include_their_arguments(
     seed: int, space: int, part: float
 ) -> None:
     outer = solid(seed, space)
@@ -129,7 +129,9 @@ def test_operations_are_monotone_and_include_what_they_must(
 
 @some
 @given(SEED, SPACE, KIND, st.floats(0.0, 1.0))
-def test_volumes(seed: int, space: int, kind: str, part: float) -> None:
+def test_volumes_of_sums_and_intersections_are_consistent(
+    seed: int, space: int, kind: str, part: float
+) -> None:
     one = solid(seed, space)
     other = solid(seed + 1, space)
     matrix = map_of(kind, seed, space)

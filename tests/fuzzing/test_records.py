@@ -76,7 +76,9 @@ def attack(content: bytes, record: Record, file: Path, times: int, seed: int) ->
     return refused
 
 
-def test_a_record_equals_itself_alone(record: Record, content: bytes, tmp_path: Path) -> None:
+def test_record_equals_itself_and_differs_after_the_least_change(
+    record: Record, content: bytes, tmp_path: Path
+) -> None:
     (tmp_path / "x.npz").write_bytes(content)
     found = load_record(tmp_path / "x.npz")
     assert same_records(found, record)
@@ -84,11 +86,13 @@ def test_a_record_equals_itself_alone(record: Record, content: bytes, tmp_path: 
     assert not same_records(found, record)
 
 
-def test_5000_damaged_records(content: bytes, record: Record, tmp_path: Path) -> None:
+def test_5000_damaged_records_are_refused(content: bytes, record: Record, tmp_path: Path) -> None:
     assert attack(content, record, tmp_path / "x.npz", 5000, seed=2) > 2500
 
 
-def test_damage_whose_sums_were_made_to_fit(content: bytes, tmp_path: Path) -> None:
+def test_damaged_record_with_correct_sums_is_read_or_refused(
+    content: bytes, tmp_path: Path
+) -> None:
     """It is another record then, valid or refused."""
     draw = random.Random(3)
 

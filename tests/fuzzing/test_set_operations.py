@@ -114,7 +114,7 @@ steps.
 
 @few
 @given(MODEL, STORY, PART, LABEL)
-def test_measuring_again_tells_nothing_new(
+def test_repeated_measurement_does_not_change_the_set(
     model: SetModel, events: list[tuple[float, float, float]], error: float, label: float
 ) -> None:
     information = tell(model, events)
@@ -166,7 +166,7 @@ def test_wider_bounds_give_larger_sets(
 
 @few
 @given(MODEL, STORY, LABEL, PART)
-def test_more_data_give_smaller_sets_in_whatever_order(
+def test_more_data_give_smaller_sets_in_any_order(
     model: SetModel, events: list[tuple[float, float, float]], label: float, error: float
 ) -> None:
     before = tell(model, events)

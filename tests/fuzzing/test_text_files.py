@@ -72,7 +72,7 @@ def attack(kind: str, times: int, seed: int, file: Path) -> int:
 
 
 @pytest.mark.parametrize("kind", FILES)
-def test_2000_mutated_files(kind: str, tmp_path: Path) -> None:
+def test_2000_mutated_files_are_read_or_refused(kind: str, tmp_path: Path) -> None:
     assert attack(kind, 2000, seed=2, file=tmp_path / "mutated.toml") > 800
 
 
@@ -101,7 +101,7 @@ def attack_settings(kind: str, times: int, seed: int) -> int:
 
 
 @pytest.mark.parametrize("kind", FILES)
-def test_5000_hostile_settings(kind: str) -> None:
+def test_5000_hostile_settings_are_applied_or_refused(kind: str) -> None:
     assert attack_settings(kind, 5000, seed=5) > 3000
 
 
@@ -166,7 +166,7 @@ LONG: dict[str, tuple[str, Callable[[str], str]]] = {
 
 
 @pytest.mark.parametrize("name", LONG)
-def test_as_much_text_as_is_read_takes_under_two_seconds(name: str, tmp_path: Path) -> None:
+def test_longest_text_that_is_read_takes_under_two_seconds(name: str, tmp_path: Path) -> None:
     kind, make = LONG[name]
     text = make(FILES[kind].texts[0])
     file = tmp_path / "long.toml"

@@ -61,7 +61,7 @@ def test_a_pair_moves_as_two_orbits_of_kepler(days: float) -> None:
     )  # of some million kilometres
 
 
-def test_the_transition_is_that_of_differences_and_symplectic() -> None:
+def test_transition_matrix_equals_finite_differences_and_is_symplectic() -> None:
     _, transition = propagate(MEETING, SUN, 20.0 * DAY)
     for component, step in enumerate([1e4] * 3 + [1e-2] * 3):
         ends = []
@@ -87,7 +87,7 @@ def test_the_closest_approach_is_nearer_than_its_neighbours() -> None:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_the_axes_are_those_of_published_definitions(seed: int) -> None:
+def test_approach_axes_equal_published_definitions(seed: int) -> None:
     """T in the reference plane, as in GMAT: (S_y, -S_x, 0); R completes S, T, R, toward the
     south.
     """
@@ -107,7 +107,7 @@ def test_b_points_from_the_object_to_the_spacecraft() -> None:
     np.testing.assert_allclose(b_plane(across, 0.5 * np.pi), [[-4.0, 3.0]])
 
 
-def test_without_gravity_b_is_the_part_of_the_position_across_the_velocity() -> None:
+def test_b_without_gravity_is_the_part_of_the_position_across_the_velocity() -> None:
     random = np.random.default_rng(3)
     for _ in range(20):
         velocity = random.normal(size=3) * 1e4

@@ -116,7 +116,9 @@ def test_a_later_impulse_corrects_the_rest(known: Scenario, strategy: str) -> No
 
 @pytest.mark.parametrize("delay_steps", [0, 3])
 @pytest.mark.parametrize("strategy", [*STRATEGIES, "kalman"])
-def test_no_impulse_after_the_cut_off(asteroid: Scenario, strategy: str, delay_steps: int) -> None:
+def test_impulses_are_zero_after_the_cut_off(
+    asteroid: Scenario, strategy: str, delay_steps: int
+) -> None:
     scenario = replace(
         with_thruster(asteroid, last_impulse_s=30.0, delay_steps=delay_steps), strategy=strategy
     )
@@ -199,8 +201,9 @@ def situation(lower: float, upper: float, **fields: Any) -> Situation:
 def test_patient_relies_on_the_later_impulses_of_the_schedule(
     later: list[float], budget: float, expected: float
 ) -> None:
-    """The excess over what later impulses can correct is corrected with 50 s left; the last impulse
-    acts as U_s.
+    """With 50 s left, the part of the miss that later impulses cannot correct is corrected.
+
+    The last impulse acts as U_s.
     """
     now = situation(
         0.0,
@@ -246,7 +249,7 @@ def test_a_strategy_sees_the_schedule(known: Scenario) -> None:
 
 
 @pytest.mark.parametrize("spatial", [False, True])
-def test_the_predicted_miss_after_pending_impulses_is_that_of_the_shifted_set(
+def test_predicted_miss_after_pending_impulses_equals_the_miss_of_the_shifted_set(
     asteroid: Scenario, spatial: bool
 ) -> None:
     """Without measurements and disturbances, the interval is the same before and after the impulses

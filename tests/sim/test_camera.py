@@ -31,9 +31,7 @@ FIRST_S, LAST_S, EVERY_S = 3600.0, 300.0, 30.0
 
 
 def camera_scenario(**fields: Any) -> Scenario:
-    """Return an engagement of one hour in a plane, with a camera; `fields` are those of the angle
-    sensor.
-    """
+    """Return an engagement of one hour in a plane, with a camera that has some `fields`."""
     law = {"centroid_error_m": CENTROID_M, **fields}
     camera = Camera(EVERY_S, PIXEL_RAD, **law)
     box = StateBox(
@@ -94,7 +92,7 @@ def widest_m(
     [30.0, 1200.0, *(pytest.param(each, marks=pytest.mark.thorough) for each in (300.0, 3000.0))],
 )
 @pytest.mark.parametrize("centroid_m", [0.0, 3.0, 50.0])
-def test_possible_miss_is_that_of_linear_programs(
+def test_possible_miss_equals_the_result_of_linear_programs(
     last_s: float, centroid_m: float, constant: bool
 ) -> None:
     """Exact measurements reach the closed form, and no admissible ones exceed it."""
@@ -159,7 +157,7 @@ def widest_with_disturbance_m(
         (2.7e-5, 900.0, 12.0, 1e-6),
     ],
 )
-def test_possible_miss_with_a_disturbance_is_that_of_a_linear_program(
+def test_possible_miss_with_a_disturbance_equals_the_result_of_a_linear_program(
     disturbance_m_s2: float, last_s: float, centroid_m: float, pixel: float, constant: bool
 ) -> None:
     """400 images in place of a continuous arc leave at most 0.3 % more."""
@@ -176,7 +174,7 @@ def test_possible_miss_with_a_disturbance_is_that_of_a_linear_program(
 @pytest.mark.parametrize(
     ("cut_off_s", "changing_m", "constant_m"), [(150, 37.2, 33.6), (900, 197.5, 186.3)]
 )
-def test_possible_misses_of_dart_are_those_of_pairs(
+def test_possible_misses_of_dart_equal_the_bounds_of_pairs(
     cut_off_s: float, changing_m: float, constant_m: float
 ) -> None:
     """The program of the pair at the nominal range is another way to the same number."""
@@ -214,7 +212,7 @@ def measured_set(centroid_m: float, alpha_rad: Callable[[float], float]) -> Info
 
 
 @pytest.mark.parametrize("centroid_m", [0.0, 12.0, 100.0])
-def test_the_set_has_the_possible_misses(centroid_m: float) -> None:
+def test_width_of_the_set_equals_the_possible_misses(centroid_m: float) -> None:
     """Exact images reach the closed form; images with errors at their bounds do not exceed it."""
     expected = possible_miss_m(SPEED_M_S, PIXEL_RAD, centroid_m, FIRST_S, LAST_S)
 
@@ -235,7 +233,7 @@ def test_the_set_has_the_possible_misses(centroid_m: float) -> None:
         assert lower <= 0.0 <= upper
 
 
-def test_closed_form_of_a_scenario_knows_schedule_delay_and_images() -> None:
+def test_closed_form_of_a_scenario_uses_schedule_delay_and_images() -> None:
     scenario = camera_scenario(first_image_s=2400.0, last_image_s=60.0)
     late = replace(
         scenario, thruster=replace(scenario.thruster, last_impulse_s=300.0, delay_steps=3)
@@ -362,7 +360,7 @@ def test_images_are_taken_from_the_first_to_the_last_and_measured_from_then_on()
     assert later.time_s[later.measures("angle")].tolist() == times_s[1:-1]
 
 
-def test_a_lost_image_is_no_value_of_the_record_and_no_cut() -> None:
+def test_lost_image_is_nan_in_the_record_and_does_not_cut_the_set() -> None:
     scenario = camera_scenario(miss_probability=0.4)
     record: Record = fly_one(scenario, 3)
     images = draw(scenario, [3], 0).images

@@ -30,6 +30,7 @@ from infoset.sim import (
     fly_one,
     simulate,
 )
+from infoset.sim.campaign import MAX_CHUNK
 from infoset.sim.parallel import Task, simulate_task, worker_processes
 from infoset.sim.scenario import of_model
 from infoset.sim.simulate import ENGAGEMENTS_AT_ONCE
@@ -76,7 +77,7 @@ def stop_after(chunks: int) -> Callable[[float], None]:
     return progress
 
 
-def test_rows_are_those_of_simulate_and_of_one_engagement(
+def test_rows_equal_results_of_simulate_and_of_fly_one(
     brief: Scenario, reference: pd.DataFrame
 ) -> None:
     assert reference["run"].tolist() == list(range(96))
@@ -93,7 +94,7 @@ def test_rows_are_those_of_simulate_and_of_one_engagement(
 
 
 @pytest.mark.parametrize(("workers", "chunk"), [(1, 7), (2, 16), (5, 30), (3, None)])
-def test_workers_and_chunks_change_no_bit(
+def test_runs_are_bit_identical_with_any_workers_and_chunks(
     workers: int, chunk: int | None, brief: Scenario, reference: pd.DataFrame, tmp_path: Path
 ) -> None:
     folder = mixed(brief, tmp_path, chunk=chunk).run(workers=workers)
@@ -111,7 +112,9 @@ def test_workers_and_chunks_change_no_bit(
 
 
 @pytest.mark.thorough
-def test_any_executor_will_do(brief: Scenario, reference: pd.DataFrame, tmp_path: Path) -> None:
+def test_runs_are_the_same_on_any_executor(
+    brief: Scenario, reference: pd.DataFrame, tmp_path: Path
+) -> None:
     with ThreadPoolExecutor(3) as pool:
         assert same(mixed(brief, tmp_path / "threads").run(pool).runs(), reference)
     shuffled = Shuffled()
@@ -131,7 +134,7 @@ def test_guaranteed_misses_are_unknown_where_they_are_not_computed(
     assert (computed["miss_m"] <= computed["guaranteed_miss_m"]).all()
 
 
-def test_a_campaign_that_is_broken_off_is_continued(
+def test_interrupted_campaign_is_continued_with_resume(
     brief: Scenario, reference: pd.DataFrame, tmp_path: Path
 ) -> None:
     campaign = mixed(brief, tmp_path)
@@ -344,7 +347,9 @@ def test_versions_of_packages_must_be_the_same(brief: Scenario, tmp_path: Path) 
         simulate_task(task)
 
 
-def test_a_scenario_comes_back_whole(brief: Scenario, ranging: Scenario, comet: Scenario) -> None:
+def test_scenario_read_from_a_manifest_equals_the_written_one(
+    brief: Scenario, ranging: Scenario, comet: Scenario
+) -> None:
     from infoset import RateSensor
     from infoset.sim import Manoeuvre, Target
     from infoset.sim.storage.codec import from_json, to_json
@@ -413,10 +418,12 @@ def test_two_campaigns_in_one_folder_at_once(brief: Scenario, tmp_path: Path) ->
     assert mixed(brief, tmp_path).run(resume=True).complete  # the lock has ended with its process
 
 
+RULE = StoppingRule(QuantileName("miss_m", 0.5), 1.5)
+
+
 @pytest.fixture
 def until(brief: Scenario, tmp_path: Path) -> Campaign:
-    rule = StoppingRule(QuantileName("miss_m", 0.5), 1.5)
-    runs = RunsUntil(rule, max_runs=200)
+    runs = RunsUntil(RULE, max_runs=200)
     return replace(mixed(brief, tmp_path / "stopped"), noise=None, runs=runs)
 
 
@@ -444,7 +451,7 @@ def test_a_rule_stops_at_the_same_run_with_any_workers(until: Campaign, tmp_path
     assert replace(again).run(resume=True).finished_runs == 200
 
 
-def test_a_rule_that_is_never_met_leaves_all_runs(until: Campaign) -> None:
+def test_campaign_has_all_runs_if_its_rule_is_never_met(until: Campaign) -> None:
     rule = StoppingRule(QuantileName("miss_m", 0.999), 1e-6)
     folder = replace(until, runs=RunsUntil(rule, max_runs=40)).run()
     assert (folder.finished_runs, folder.manifest.stopped_after) == (40, None)
@@ -463,17 +470,42 @@ def test_results_that_are_not_finite_are_not_stored(
     assert shards(tmp_path) == []
 
 
-def test_numbers_that_make_no_campaign(brief: Scenario, tmp_path: Path) -> None:
+def test_noise_of_another_type_is_refused(brief: Scenario, tmp_path: Path) -> None:
     with pytest.raises(
         TypeError, match="noise must be None, a CampaignNoise, or have the method measure"
     ):
         Campaign(brief, 4, tmp_path, noise="foo")  # type: ignore[arg-type]
-    batch = ENGAGEMENTS_AT_ONCE
-    sizes = [
-        mixed(brief, tmp_path, runs, None).manifest().chunk
-        for runs in (1, 256 * batch, 256 * batch + 1, 10**9)
-    ]
-    assert sizes == [batch, batch, 2 * batch, 4096 // batch * batch]
+
+
+@pytest.mark.parametrize(
+    ("runs", "batches"),
+    [
+        (1, 1),
+        (256 * ENGAGEMENTS_AT_ONCE, 1),
+        (256 * ENGAGEMENTS_AT_ONCE + 1, 2),
+        (10**9, MAX_CHUNK // ENGAGEMENTS_AT_ONCE),
+    ],
+)
+def test_default_chunk_is_whole_batches_and_grows_with_the_runs(
+    runs: int, batches: int, brief: Scenario, tmp_path: Path
+) -> None:
+    assert mixed(brief, tmp_path, runs, None).manifest().chunk == batches * ENGAGEMENTS_AT_ONCE
+
+
+@pytest.mark.parametrize(
+    ("rule", "max_runs", "min_runs", "error", "name"),
+    [
+        ("miss_m p99 ci<1", 10, 1, TypeError, "rule"),
+        (RULE, 10.0, 1, TypeError, "max_runs"),
+        (RULE, 10, 0, ValueError, "min_runs"),
+        (RULE, 10, 11, ValueError, "max_runs"),
+    ],
+)
+def test_runs_until_a_rule_are_refused_if_rule_or_limits_are_invalid(
+    rule: Any, max_runs: Any, min_runs: int, error: type[Exception], name: str
+) -> None:
+    with pytest.raises(error, match=f"^{name} "):
+        RunsUntil(rule, max_runs, min_runs)
 
 
 def test_cells_of_a_sweep_are_campaigns_of_their_scenarios(brief: Scenario, tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ ranges.
 
 
 def rates(sun: Sun | None, manoeuvre_m_s2: Floats) -> Callable[[float, Floats], Floats]:
-    """Rates of the relative motion and of that of the spacecraft, shape (4 axes,)."""
+    """Rates of the relative motion and of the spacecraft's motion, shape (4 axes,)."""
     axes = len(manoeuvre_m_s2) + 1
     acceleration = np.append(manoeuvre_m_s2, 0.0)
 

@@ -133,7 +133,7 @@ def test_the_truth_stays_in_its_section_in_the_models_own_dynamics(
     assert Outcome.SET_EMPTY not in results.outcomes
 
 
-def test_a_run_is_the_same_in_whatever_company(ranging: Scenario) -> None:
+def test_run_is_the_same_in_every_batch(ranging: Scenario) -> None:
     scenario = replace(ranging, noise=NoiseKind.GAME, tie=TieRule.RANDOM)
     together = simulate(scenario, 9, seed=4)
     alone = simulate(scenario, [7], seed=4)
@@ -150,7 +150,7 @@ class Silent:
         return np.zeros_like(situation.last_impulse_m_s)
 
 
-def test_without_control_the_miss_is_that_of_the_free_motion(asteroid: Scenario) -> None:
+def test_miss_without_control_equals_the_miss_of_the_free_motion(asteroid: Scenario) -> None:
     results = simulate(replace(asteroid, sun=None), 10, strategy=Silent())
     z, x = results.position_m.T
     vz, vx = results.velocity_m_s.T
@@ -167,7 +167,7 @@ class Broken:
         return np.full(3, np.nan)
 
 
-def test_a_strategy_that_returns_nonsense_is_named(asteroid: Scenario) -> None:
+def test_strategy_that_returns_invalid_impulses_is_named(asteroid: Scenario) -> None:
     with pytest.raises(
         ValueError, match=r"Broken must return finite impulses \(m/s\) of the shape \(1, 2\)"
     ):

@@ -28,7 +28,7 @@ CASES = Path(__file__).parent / "cases"
     ],
     ids=["engine", "cut-off", "budget"],
 )
-def test_the_starts_beyond_the_engine_and_the_budget_are_those_of_simulated_runs(
+def test_starts_beyond_engine_and_budget_equal_causes_of_simulated_runs(
     thruster: Thruster, brief: Scenario
 ) -> None:
     scenario = replace(brief, thruster=thruster, body=Body(5.0), sun=None)
@@ -76,7 +76,7 @@ def test_the_speeds_at_the_start_and_the_images_leave_the_miss_of_a_pair() -> No
 
 
 @pytest.mark.parametrize("setting", ["camera.miss_probability=0.1", None])
-def test_images_alone_have_no_closed_form_without_a_camera_that_loses_none(
+def test_closed_form_of_images_is_none_if_the_camera_loses_some(
     setting: str | None,
 ) -> None:
     scenario = (

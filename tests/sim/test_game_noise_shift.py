@@ -65,7 +65,7 @@ def test_a_target_at_the_bound_of_the_model_brings_every_run_to_the_closed_form(
 
 
 def test_without_a_disturbance_the_shift_is_a_straight_line_between_the_bounds() -> None:
-    """Its miss is that of the closed form."""
+    """The miss equals the closed form."""
     settings = [
         "camera.centroid_error_m=3",
         "information_set.disturbance_m_s2=0",

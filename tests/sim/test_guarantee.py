@@ -1,6 +1,4 @@
-"""The guaranteed model: no truth lost, no miss above Phi, whatever nature does within its
-bounds.
-"""
+"""The guaranteed model keeps the true state and the bound Phi for all errors within the bounds."""
 
 from __future__ import annotations
 
@@ -112,7 +110,7 @@ def test_nothing_breaks_the_guarantee_of_a_camera(
 
 
 @pytest.mark.thorough
-def test_the_test_can_fail(soundness: ModuleType, asteroid: Scenario) -> None:
+def test_broken_assumptions_are_detected(soundness: ModuleType, asteroid: Scenario) -> None:
     """A target that manoeuvres harder than its bound, and a truth faster than D, are caught."""
     scenario = guaranteed(asteroid)
     harder = replace(scenario, target=Target(Manoeuvre.BANG_BANG, 0.5, switching_period_s=5.0))
@@ -134,16 +132,14 @@ def hundred(two_hundred: Results) -> Results:
 
 
 def test_phi_is_tight(asteroid: Scenario, two_hundred: Results) -> None:
-    """Phi is a bound that says something: the medians of the theory, 13 m for random noise and 15
-    to 17.5 for game.
-    """
+    """Phi has the medians of the theory: 13 m for random noise and 15 to 17.5 m for game noise."""
     game = simulate(replace(guaranteed(asteroid), noise=NoiseKind.GAME), 200)
     for results, minimum, maximum in ((two_hundred, 12.0, 14.5), (game, 14.0, 17.5)):
         assert sound(results)
         assert minimum <= median(results.guaranteed_miss_m) <= maximum
 
 
-def test_gravity_is_bounded_by_what_the_theory_derives(asteroid: Scenario) -> None:
+def test_bound_of_gravity_equals_the_derived_formula(asteroid: Scenario) -> None:
     model = on_board_model(guaranteed(asteroid))
     plain = 1.5 * 1.324948e20 / 150e9**3 * 6301.3e3
     assert plain == pytest.approx(3.71e-7, rel=0.01)
@@ -279,7 +275,7 @@ class Faulty:
 @pytest.mark.parametrize("model", [Model.PAPER, Model.GUARANTEED])
 @pytest.mark.parametrize("fault", ["none", "outlier", "bias", "stuck", "dropout"])
 @pytest.mark.parametrize("meter", [False, pytest.param(True, marks=pytest.mark.thorough)])
-def test_faulty_sensors_are_told_and_survived(
+def test_faulty_sensors_are_reported_and_guidance_continues(
     asteroid: Scenario, ranging: Scenario, model: Model, fault: str, meter: bool
 ) -> None:
     scenario = ranging if meter else asteroid
@@ -314,8 +310,9 @@ def test_faulty_sensors_are_told_and_survived(
 
 
 def test_phi_follows_impulses_fired_after_labels_have_left(asteroid: Scenario) -> None:
-    """A threshold far out: labels leave eighty steps before they arrive, and what is fired
-    meanwhile still counts.
+    """With a distant threshold labels leave eighty steps before they arrive.
+
+    The impulses in these steps still count.
     """
     early = guaranteed(replace(asteroid, noise=NoiseKind.GAME))
     early = replace(early, **of_model(replace(early.set_model, range_threshold_m=2.4e6)))

@@ -1,4 +1,4 @@
-"""Engagements that broke the guarantee once, and the families they came from."""
+"""Scenarios whose guarantee failed in earlier versions, and random scenarios of their kinds."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import importlib.util
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -67,7 +68,7 @@ def sound(results: Results) -> bool:
         ("late-arrival-no-rate", 4029, NoiseKind.GAME, TieRule.UPPER, [99]),
     ],
 )
-def test_what_broke_the_guarantee_once(
+def test_scenarios_of_earlier_failures_keep_the_guarantee(
     case: str, seed: int, noise: NoiseKind, tie: TieRule, runs: list[int]
 ) -> None:
     scenario = replace(load_scenario(CASES / f"{case}.toml"), noise=noise, tie=tie)
@@ -97,18 +98,8 @@ def test_random_scenarios_keep_the_guarantee(
     assert total == soundness.Count(scenarios * batch)
 
 
-# Round numbers: truths and hypotheses come to a range of exactly zero at a step
-# -----------------------------------
-
-
-# The band of a measured rate
-# --------------------------------------------------------------------------------------------------
-
-
 def flat_law(error_rad: float, rising: bool) -> tuple[SetModel, SectionLaw]:
-    """A model whose error bound at zero range is half (rising) or twice that at the nominal
-    range.
-    """
+    """A model whose error bound at zero range is half (rising) or twice the nominal one."""
     box = StateBox((-1e4, 1e4), (4e5, 6e5), (-300.0, 300.0), (-5e3, -5e3))
     model = SetModel(
         5e3,
@@ -123,71 +114,104 @@ def flat_law(error_rad: float, rising: bool) -> tuple[SetModel, SectionLaw]:
     return model, section_laws(model)[0]
 
 
+class RateCase(NamedTuple):
+    """A measured rate after one measured angle: draws of errors are in units of their bounds.
+
+    The last angle was measured `ago` steps before the rate, or never: then the initial box stands
+    for it. `place` and `width` are the places of the label and of the window around it.
+    """
+
+    slope: float
+    v: float
+    ago: int
+    angle_draw: float
+    rate_draw: float
+    log_error: float
+    place: float
+    width: float
+    impulse: float
+    push: float
+    rising: bool
+    measured: bool
+
+
+class Truth(NamedTuple):
+    """The state at the measured rate, and the last angle before it."""
+
+    z_then: float
+    z: float
+    v: float
+    x: float
+    omega: float
+    sight: LastSight
+
+
+RATE_ERROR = 1e-9
 SIDES = st.sampled_from([-1.0, 1.0]) | st.floats(-1.0, 1.0)
+RATE_CASES = st.builds(
+    RateCase,
+    slope=st.floats(-0.02, 0.02),
+    v=st.floats(-40.0, 40.0),
+    ago=st.integers(0, 6),
+    angle_draw=SIDES,
+    rate_draw=SIDES,
+    log_error=st.floats(-8.0, -2.0),
+    place=st.floats(0.0, 1.0),
+    width=st.floats(0.0, 1.0),
+    impulse=st.floats(-5.0, 5.0),
+    push=SIDES,
+    rising=st.booleans(),
+    measured=st.booleans(),
+)
+
+
+def truth_of(case: RateCase, label: float, elapsed: int, model: SetModel, law: SectionLaw) -> Truth:
+    """Return the motion of a case in closed form.
+
+    An impulse with an error of execution is given in the middle between angle and rate, and the
+    disturbance is constant.
+    """
+    e = law.closing_speed
+    time = case.ago * law.step
+    x_then = label - e * law.step * (elapsed - case.ago)
+    z_then = case.slope * x_then
+    bound = model.angle_sensor.error_bound(x_then / math.cos(math.atan(case.slope)))
+    alpha = math.atan(case.slope) + case.angle_draw * bound
+
+    executed = case.impulse * (1.0 + 0.02 * case.angle_draw) if case.ago else 0.0
+    fired_after = (case.ago // 2) * law.step
+    acceleration = case.push * law.disturbance
+    v = case.v + acceleration * time - executed
+    z = z_then + case.v * time + 0.5 * acceleration * time**2 - executed * (time - fired_after)
+    x = label - e * law.step * elapsed
+    omega = (v + e * z / x) / x / (1.0 + (z / x) ** 2)
+
+    size = abs(case.impulse) if case.ago else 0.0
+    return Truth(z_then, z, v, x, omega, LastSight(case.measured, alpha, 0.0, case.ago, size))
 
 
 @settings(max_examples=300, deadline=None)
-@given(
-    st.floats(-0.02, 0.02),
-    st.floats(-40.0, 40.0),
-    st.integers(0, 6),
-    SIDES,
-    SIDES,
-    st.floats(-8.0, -2.0),
-    st.floats(0.0, 1.0),
-    st.floats(0.0, 1.0),
-    st.floats(-5.0, 5.0),
-    SIDES,
-    st.booleans(),
-    st.booleans(),
-)
-def test_a_rate_band_holds_the_truth_and_is_convex_over_its_window(
-    slope: float, v: float, ago: int, angle_draw: float, rate_draw: float,
-    log_error: float, place: float, width: float, impulse: float, push: float, rising: bool, measured: bool,
-) -> None:  # fmt: skip
+@given(RATE_CASES)
+def test_a_rate_band_holds_the_truth_and_is_convex_over_its_window(case: RateCase) -> None:
     """The measured rate of a motion in closed form admits its predicted miss, displaced by (13),
     for every window.
-
-    The last angle was measured `ago` steps before the rate, or never: then the initial box stands
-    for it.
     """
-    error = 10.0**log_error
-    model, law = flat_law(error, rising)
+    model, law = flat_law(10.0**case.log_error, case.rising)
     e = law.closing_speed
-    step = law.step
-    elapsed = 60 if measured else ago
-    label = 4.2e5 + 1.5e5 * place
-    near = label - 8e4 * width * place
-    far = label + 8e4 * width * (1.0 - place)
-    # The last angle, `ago` steps before; an impulse in the middle, with an error; a push all the
-    # way.
-    x_then = label - e * step * (elapsed - ago)
-    executed = impulse * (1.0 + 0.02 * angle_draw)
-    z_then = slope * x_then
-    bound = model.angle_sensor.error_bound(x_then / math.cos(math.atan(slope)))
-    alpha = math.atan(slope) + angle_draw * bound
-    fired_after = (ago // 2) * step if ago else 0.0
-    time = ago * step
-    acceleration = push * law.disturbance
-    v_now = v + acceleration * time - (executed if ago else 0.0)
-    z = (
-        z_then
-        + v * time
-        + 0.5 * acceleration * time**2
-        - (executed * (time - fired_after) if ago else 0.0)
-    )
-    x = label - e * step * elapsed
-    omega_true = (v_now + e * z / x) / x / (1.0 + (z / x) ** 2)
-    rate_error = 1e-9 * (1.0 + BOUND_SLACK)
-    omega = omega_true + rate_draw * 1e-9
-    size = abs(impulse) if ago else 0.0
-    sight = LastSight(measured, alpha, 0.0, ago, size)
-    if abs(v) + size + law.disturbance * time > 300.0 or abs(z_then) > 1e4:
+    elapsed = 60 if case.measured else case.ago
+    label = 4.2e5 + 1.5e5 * case.place
+    near = label - 8e4 * case.width * case.place
+    far = label + 8e4 * case.width * (1.0 - case.place)
+    truth = truth_of(case, label, elapsed, model, law)
+    farthest_v = abs(case.v) + truth.sight.fired + law.disturbance * case.ago * law.step
+    if farthest_v > 300.0 or abs(truth.z_then) > 1e4:
         return
-    window = windows.Window(near, far, impulse, abs(push), 0.0, 0.0)
-    rate = windows.Rate(omega, rate_error, sight)
-    steepest = kernels.max_slope(elapsed, sight, window, law)
-    assert abs(z / x) <= steepest * (1.0 + 1e-12)
+
+    window = windows.Window(near, far, case.impulse, abs(case.push), 0.0, 0.0)
+    rate_error = RATE_ERROR * (1.0 + BOUND_SLACK)
+    rate = windows.Rate(truth.omega + case.rate_draw * RATE_ERROR, rate_error, truth.sight)
+    steepest = kernels.max_slope(elapsed, truth.sight, window, law)
+    assert abs(truth.z / truth.x) <= steepest * (1.0 + 1e-12)
 
     def rate_band(label: float, window: windows.Window) -> tuple[float, float]:
         lower, upper = kernels.rate_band(label, elapsed, rate, 1.0 + steepest**2, window, law)
@@ -195,22 +219,24 @@ def test_a_rate_band_holds_the_truth_and_is_convex_over_its_window(
 
     lower, upper = rate_band(label, window)
     value = (
-        z
-        + v_now * x / e
-        + impulse * (label - 0.5 * (near + far)) / e
-        + push * 0.5 * (far - near) / e
+        truth.z
+        + truth.v * truth.x / e
+        + case.impulse * (label - 0.5 * (near + far)) / e
+        + case.push * 0.5 * (far - near) / e
     )
     rounding = 1e-9 * (abs(value) + abs(lower) + abs(upper) + 1.0)
     assert lower - rounding <= value <= upper + rounding
+
     bounds = np.array([rate_band(each, window) for each in np.linspace(near, far, 9)])
     bend = np.diff(bounds, n=2, axis=0)
     assert (bend[:, 0] >= -rounding).all()
     assert (bend[:, 1] <= rounding).all()
-    if ago == 0:
-        # A window of one label has nothing but the rate itself: its band is as wide as the sensor's
-        # error.
+
+    if case.ago == 0:
+        # In a window of one label the band is as wide as the error of the sensor.
         alone = rate_band(label, window._replace(near=label, far=label))
-        assert alone[1] - alone[0] <= 1.01 * 2.0 * (abs(omega) * 0.01 + rate_error) * x**2 / e
+        widest = 2.0 * (abs(rate.omega) * 0.01 + rate_error) * truth.x**2 / e
+        assert alone[1] - alone[0] <= 1.01 * widest
 
 
 def test_a_truth_inside_a_section_that_is_thinner_than_rounding_is_not_outside(
@@ -238,10 +264,6 @@ def test_a_truth_inside_a_section_that_is_thinner_than_rounding_is_not_outside(
         range_sensor=None,
     )
     assert sound(simulate(scenario, 50, seed=1))
-
-
-# Feasible labels that form two intervals
-# --------------------------------------------------------------------------------------------------
 
 
 def test_phi_covers_a_truth_that_passes_its_closest_approach_before_its_label_leaves(

@@ -178,8 +178,9 @@ def test_the_miss_is_exact_in_gravity_of_any_strength(flights: int) -> None:
 
 
 def test_the_motion_does_not_depend_on_the_batch_or_on_the_step() -> None:
-    """The length of a leap is that of the engagement: strong gravity, two starts together and
-    alone.
+    """The length of a leap depends on its engagement only.
+
+    In strong gravity two starts move together as each alone.
     """
     sun = Sun(3.986004418e14, 6.878e6, np.radians(100.0))
     position = np.array([[-20.0, 2.8e6], [5e4, 1.4e6]])

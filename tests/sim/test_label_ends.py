@@ -39,8 +39,9 @@ def fly(
 
 
 def without_control(asteroid: Scenario, kind: Model, x_m: tuple[float, float]) -> Scenario:
-    """A spacecraft without fuel in free space that measures nothing: angles err by more than the
-    box allows.
+    """A spacecraft in free space without fuel and without knowledge.
+
+    The errors of its angles are greater than the box.
     """
     box = StateBox(z_m=(-3e3, 2e3), x_m=x_m, vz_m_s=(-20.0, 10.0), vx_m_s=(-10e3, -10e3))
     return replace(
@@ -65,7 +66,9 @@ def without_control(asteroid: Scenario, kind: Model, x_m: tuple[float, float]) -
 
 
 @pytest.mark.parametrize("kind", list(Model))
-def test_without_control_any_corner_of_the_box_may_be_true(kind: Model, asteroid: Scenario) -> None:
+def test_any_state_miss_without_control_is_the_miss_of_a_corner_of_the_box(
+    kind: Model, asteroid: Scenario
+) -> None:
     """100 s at -20 m/s from -3 km end at -5 km, wherever the truth is."""
     scenario = without_control(asteroid, kind, (1e6, 1e6))
     results, any_state_m = fly(scenario, 3, noise=EXACT)
@@ -144,7 +147,7 @@ def test_after_a_cut_off_measurements_do_not_narrow_the_choice(asteroid: Scenari
     assert (any_state_m > results.guaranteed_miss_m).all()
 
 
-def test_where_the_set_is_lost_the_truth_counts(asteroid: Scenario) -> None:
+def test_any_state_miss_is_the_true_miss_if_the_set_became_empty(asteroid: Scenario) -> None:
     """A set that believes in 58 km/s, and truths that come at 110."""
     fast = replace(asteroid.dispersion, vx_m_s=(-110.1e3, -110e3))
     wrong = replace(

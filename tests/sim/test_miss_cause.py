@@ -67,7 +67,7 @@ def test_hits_and_bodies_without_a_size_have_no_cause(brief: Scenario) -> None:
 
 
 @pytest.mark.parametrize("name", ["asteroid-1997", "asteroid-1997-space", "haiv-2013"])
-def test_the_miss_without_impulses_is_that_of_a_flight_without_them(name: str) -> None:
+def test_unguided_miss_equals_the_miss_of_a_flight_without_impulses(name: str) -> None:
     guided, idle = (
         simulate(load_scenario(name), 5, strategy=each, guarantee=False) for each in (None, Idle())
     )
@@ -75,7 +75,7 @@ def test_the_miss_without_impulses_is_that_of_a_flight_without_them(name: str) -
     np.testing.assert_allclose(idle.unguided_miss_m, idle.miss_m, rtol=1e-5)
 
 
-def test_what_engine_and_budget_correct_is_the_sum_of_their_impulses(brief: Scenario) -> None:
+def test_corrections_of_engine_and_budget_are_sums_of_their_impulses(brief: Scenario) -> None:
     thruster = Thruster(
         20.0, 0.25, 7.5, execution_error_relative=0.1, last_impulse_s=2.0, delay_steps=3
     )
@@ -242,7 +242,7 @@ def _expected(
 
 
 @pytest.mark.thorough
-def test_causes_are_those_of_an_independent_computation(brief: Scenario) -> None:
+def test_causes_equal_an_independent_computation(brief: Scenario) -> None:
     rng = np.random.default_rng(40)
     counted = Counter[Any]()
     expected = Counter[Any]()

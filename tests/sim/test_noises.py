@@ -29,7 +29,7 @@ class Uniform:
 
 
 class Drift:
-    """Errors that grow with the time since the start: the object is that of one batch."""
+    """Errors that grow with the time since the start: an object serves one batch only."""
 
     def __init__(self) -> None:
         self.steps = 0
@@ -89,7 +89,7 @@ def test_a_noise_of_the_user_is_made_for_each_batch(
     assert np.array_equal(simulate_task(task).miss_m, expected.miss_m)
 
 
-def test_what_is_no_noise_is_refused(brief: Scenario) -> None:
+def test_noise_without_the_method_measure_is_refused(brief: Scenario) -> None:
     with pytest.raises(
         ValueError,
         match="no noise is called 'gauss'; there are: random, gaussian, correlated, game",
@@ -102,7 +102,7 @@ def test_what_is_no_noise_is_refused(brief: Scenario) -> None:
         simulate(brief, 2, noise=scripted)
 
 
-def test_names_of_noises_are_those_of_campaigns() -> None:
+def test_campaign_noises_have_the_names_of_noise_kinds() -> None:
     assert {kind.value for kind in NoiseKind} == {kind.value for kind in CampaignNoise} - {
         "mixed",
         "own",

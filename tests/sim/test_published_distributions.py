@@ -17,14 +17,14 @@ from infoset.sim.scenario import of_model
 pytestmark = pytest.mark.thorough
 
 
-def test_random_noise(asteroid: Scenario) -> None:
+def test_distribution_with_random_noise_agrees_with_the_paper(asteroid: Scenario) -> None:
     results = simulate(asteroid, 1000)
     assert 1.0 <= np.quantile(results.miss_m, 0.5) <= 1.4
     assert 3.2 <= np.quantile(results.miss_m, 0.9) <= 4.2
     assert 160.0 <= np.quantile(results.impulse_m_s, 0.5) <= 172.0
 
 
-def test_game_noise(asteroid: Scenario) -> None:
+def test_distribution_with_game_noise_agrees_with_the_paper(asteroid: Scenario) -> None:
     results = simulate(replace(asteroid, noise=NoiseKind.GAME), 1000)
     assert 11.5 <= np.quantile(results.miss_m, 0.5) <= 14.0
     assert 12.8 <= np.quantile(results.miss_m, 0.9) <= 17.0
@@ -38,7 +38,7 @@ def test_game_noise(asteroid: Scenario) -> None:
         (NoiseKind.GAME, 11.0, 14.0, 308.0),
     ],
 )
-def test_with_the_range_sensor(
+def test_distribution_with_the_range_sensor_agrees_with_the_paper(
     ranging: Scenario, noise: NoiseKind, median: float, nine_in_ten: float, impulse: float
 ) -> None:
     """The published procedure: a set that a measurement empties stays lost."""

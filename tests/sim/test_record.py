@@ -25,7 +25,7 @@ class RangeAlone:
         return {"range": 10.0 * sight.range_m}
 
 
-def test_the_measurement_that_empties_the_set_for_good_is_kept(brief: Scenario) -> None:
+def test_record_has_the_measurement_that_empties_the_set(brief: Scenario) -> None:
     model = replace(brief.set_model, recovery=Recovery.NONE)
     ranging = replace(brief, **of_model(model), range_sensor=RangeSensor(model.step_s, 1e-3))
     record = fly_one(ranging, noise=RangeAlone())

@@ -40,9 +40,10 @@ def test_the_last_impulse_and_image_are_nearest_to_their_times() -> None:
     assert found.differences == ()
 
 
-def test_a_cut_off_is_that_of_its_nearest_step() -> None:
-    """A cut-off at 120 s is one at 119.98 s, the time of the step; that of the step before leaves a
-    larger miss.
+def test_cut_off_is_at_the_step_nearest_to_its_time() -> None:
+    """A cut-off at 120 s equals one at 119.98 s, the time of the step.
+
+    A cut-off at the step before leaves a larger miss.
     """
     misses_m = []
     for cut_off_s in (120, 119.97856, 179.97856):
@@ -114,7 +115,7 @@ def test_times_that_differ_by_more_than_a_tenth_of_a_step_are_differences(brief:
     )
 
 
-def test_times_of_a_period_are_differences_if_it_is_no_whole_number_of_steps(
+def test_times_of_a_period_are_differences_if_it_is_not_a_whole_number_of_steps(
     brief: Scenario,
 ) -> None:
     arrival_s = brief.nominal_arrival_s
@@ -132,7 +133,7 @@ def test_times_of_a_period_are_differences_if_it_is_no_whole_number_of_steps(
     ]
 
 
-def test_a_step_at_the_arrival_is_not_before_it(brief: Scenario) -> None:
+def test_step_at_the_arrival_is_not_in_the_schedule(brief: Scenario) -> None:
     whole = replace(brief, nominal_range_m=10.0 * brief.closing_speed_m_s)
     found = schedule(whole)
     assert found is not None
@@ -140,5 +141,7 @@ def test_a_step_at_the_arrival_is_not_before_it(brief: Scenario) -> None:
     assert found.images_before_last_decision == len(image_times_s(whole))
 
 
-def test_there_is_no_schedule_if_the_arrival_is_far_too_late(brief: Scenario) -> None:
+def test_schedule_is_none_if_the_arrival_is_after_the_maximum_number_of_steps(
+    brief: Scenario,
+) -> None:
     assert schedule(replace(brief, nominal_range_m=1e12)) is None

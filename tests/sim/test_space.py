@@ -1,4 +1,4 @@
-"""Engagements in space: identities that hold run by run, and what the guaranteed model promises."""
+"""Engagements in space: identities of single runs, and the guarantees of the guaranteed model."""
 
 from __future__ import annotations
 
@@ -246,7 +246,7 @@ def test_the_diagonal_is_a_planar_engagement_times_root_two(
     ("model", "with_rates"),
     [(Model.PAPER, False), (Model.GUARANTEED, False), (Model.GUARANTEED, True)],
 )
-def test_sections_are_those_of_the_two_planar_sets(
+def test_sections_in_space_equal_the_sections_of_two_planar_sets(
     model: Model, with_rates: bool, asteroid: Scenario
 ) -> None:
     # Theory, section 9, item 6: a replay at any label is the product of the planar replays of

@@ -149,7 +149,7 @@ def test_gravity_is_never_greater_than_its_bound(spatial: Scenario) -> None:
     assert (100.0 * pull[:, 2] <= model.gravity_speed_change * model.closing_speed_m_s).all()
 
 
-def test_without_motion_along_y_the_bound_of_gravity_is_the_planar_one(
+def test_bound_of_gravity_without_motion_along_y_equals_the_planar_bound(
     asteroid: Scenario, spatial: Scenario
 ) -> None:
     def idle(model: SetModel) -> SetModel:

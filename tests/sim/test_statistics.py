@@ -3,6 +3,7 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 from math import comb
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,13 +20,13 @@ from infoset.sim.statistics import (
 )
 
 
-def test_the_distribution_of_a_small_sample_by_hand() -> None:
+def test_distribution_of_a_small_sample_has_steps_of_one_over_its_size() -> None:
     distribution = empirical_distribution([3.0, 1.0, 2.0, 2.0])
     np.testing.assert_array_equal(distribution.values, (1.0, 2.0, 2.0, 3.0))
     np.testing.assert_array_equal(distribution.probability, (0.25, 0.5, 0.75, 1.0))
 
 
-def test_the_band_is_massarts() -> None:
+def test_width_of_the_band_is_massarts_bound() -> None:
     distribution = empirical_distribution(np.arange(50.0))
     half = distribution.probability - distribution.lower
     assert half[-1] == pytest.approx(math.sqrt(math.log(40.0) / 100.0), rel=1e-12)
@@ -33,7 +34,7 @@ def test_the_band_is_massarts() -> None:
     assert distribution.upper.max() <= 1.0
 
 
-def test_order_statistics_are_the_textbooks() -> None:
+def test_order_statistics_equal_textbook_values() -> None:
     # The median of 10 values: the second and the ninth hold it with probability 1 - 22/1024 =
     # 0.9785.
     assert order_statistics(10, 0.5, 0.95) == (2, 9)
@@ -45,7 +46,7 @@ def test_order_statistics_are_the_textbooks() -> None:
 
 @given(size=st.integers(1, 400), level=st.floats(0.01, 0.99), confidence=st.floats(0.5, 0.999))
 @settings(deadline=None)
-def test_order_statistics_enclose_with_the_confidence_and_no_wider(
+def test_order_statistics_are_the_narrowest_with_the_confidence(
     size: int, level: float, confidence: float
 ) -> None:
     lower, upper = order_statistics(size, level, confidence)
@@ -149,10 +150,15 @@ def test_299_runs_without_a_miss_show_99_percent() -> None:
     assert Fraction(99, 100) ** 299 <= Fraction(5, 100) < Fraction(99, 100) ** 298
 
 
-def test_runs_for_hits_of_values_without_a_meaning_are_refused() -> None:
-    for arguments in ((1.0,), (0.0,), (0.9, -1), (0.9, 0, 1.0)):
-        with pytest.raises(ValueError, match=r"share|misses|confidence"):
-            runs_for_hits(*arguments)
+@pytest.mark.parametrize(
+    ("arguments", "name"),
+    [((1.0,), "share"), ((0.0,), "share"), ((0.9, -1), "misses"), ((0.9, 0, 1.0), "confidence")],
+)
+def test_runs_for_hits_are_refused_if_an_argument_is_out_of_range(
+    arguments: tuple[Any, ...], name: str
+) -> None:
+    with pytest.raises(ValueError, match=name):
+        runs_for_hits(*arguments)
 
 
 @given(
@@ -160,7 +166,7 @@ def test_runs_for_hits_of_values_without_a_meaning_are_refused() -> None:
         st.sampled_from([-2.5, -0.0, 0.0, 1.0, math.nextafter(1.0, 2.0), 7.0, 1e300]), max_size=40
     )
 )
-def test_average_ranks_are_those_of_the_definition(values: list[float]) -> None:
+def test_average_ranks_equal_their_definition(values: list[float]) -> None:
     expected = [
         sum(other < value for other in values) + 0.5 * (sum(other == value for other in values) + 1)
         for value in values

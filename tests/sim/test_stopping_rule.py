@@ -68,7 +68,7 @@ def test_the_texts_of_rules_and_requirements_are_exact(level: float, number: flo
         "miss p99 ci<1",
     ],
 )
-def test_what_is_no_rule(text: str) -> None:
+def test_malformed_rule_is_refused(text: str) -> None:
     with pytest.raises(
         ValueError, match=r"must be|there is no quantity|greater than 0|between p0 and p100"
     ):
@@ -89,7 +89,7 @@ def decided_after(rule: StoppingRule, chunks: Sequence[Floats]) -> int | None:
     return None
 
 
-def test_it_stops_soon_after_the_rule_is_met() -> None:
+def test_sample_is_decided_within_5_percent_after_the_rule_is_met() -> None:
     chunks = samples(400, 5)
     met = decided_after(RULE, chunks)
     assert met is not None
@@ -103,7 +103,7 @@ def test_it_stops_soon_after_the_rule_is_met() -> None:
     assert first <= met <= 1.05 * first + 2
 
 
-def test_unknown_values_do_not_count() -> None:
+def test_nan_is_left_out_of_a_sample() -> None:
     assert decided_after(RULE, [np.full(20, 1.0)] * 50) == 1
     assert decided_after(RULE, [np.full(20, np.nan)] * 50) is None
 
@@ -117,6 +117,6 @@ class _MetBy(StoppingRule):
 
 
 @pytest.mark.parametrize("chunks", [1, 2, 20, 21, 22, 59, 400])
-def test_the_last_chunk_is_checked(chunks: int) -> None:
+def test_last_chunk_is_always_checked(chunks: int) -> None:
     rule = _MetBy(RULE.quantile, RULE.width, size=chunks)
     assert decided_after(rule, [np.zeros(1)] * chunks) == chunks

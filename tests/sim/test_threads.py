@@ -42,9 +42,7 @@ def test_simulations_at_the_same_time_share_a_scenario(brief: Scenario) -> None:
     ],
 )
 def test_threads_share_a_set(make: Callable[[], Any]) -> None:
-    """Each thread asks for what a set computes when it is first used, and adds the set to
-    itself.
-    """
+    """Each thread uses values that a set computes at the first use, and adds the set to itself."""
     shared = make()
     dimension = CUBE.shape[1] if isinstance(shared, Polytope) else 2
 

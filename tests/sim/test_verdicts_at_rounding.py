@@ -110,8 +110,9 @@ class Stored:
 
 
 def narrow_labels(share: float) -> Engagements:
-    """Errors of 1e-12 rad, almost at their bounds: labels are feasible within 150 ulp around that
-    of the truth at the end.
+    """Errors of 1e-12 rad, almost at their bounds.
+
+    At the end, labels are feasible within 150 ulp around the label of the truth.
     """
     scenario = load_scenario(CASES / "narrow-labels.toml")
     scenario = replace(scenario, **of_model(replace(scenario.set_model, recovery=Recovery.NONE)))
