@@ -1,5 +1,6 @@
-"""Compiled steps of Dormand and Prince's method of order 8, for any right-hand side, with SciPy's
-coefficients.
+"""Compiled steps of Dormand and Prince's method of order 8, for any right-hand side.
+
+The coefficients are from SciPy's DOP853.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ _THIRD = np.ascontiguousarray(DOP853.E3[:STAGES])
 _FIFTH = np.ascontiguousarray(DOP853.E5[:STAGES])
 """Coefficients of the embedded error estimates of orders 3 and 5."""
 _THIRD_ORDER_SHARE = 0.01
-"""Weight of the estimate of order 3 beside that of order 5, as in DOP853."""
+"""Weight of the estimate of order 3 relative to the estimate of order 5, as in DOP853."""
 
 
 def step_of(

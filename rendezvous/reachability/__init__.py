@@ -1,5 +1,4 @@
-"""Rendezvous through reachable sets: every optimal control of a linear system under constraints on
-its states.
+"""Rendezvous by reachable sets: all optimal controls of a linear system with bounded states.
 
 A problem is built from a motion. Its solution contains the sets of states and the set of optimal
 controls. Controls are selected from this set and simulated.

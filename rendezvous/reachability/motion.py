@@ -44,12 +44,11 @@ def motion_of(orbit: EllipticOrbit, model: MotionModel) -> HeldMotion:
 def discretised(
     motion: HeldMotion, periods: int, period_s: float, acceleration_m_s2: float
 ) -> tuple[Floats, Floats]:
-    """Return A(t) and B(t) of x(t + 1) = A(t) x(t) + B(t) u(t), exact for controls held over a
-    period.
+    """Return A(t) and B(t) of x(t + 1) = A(t) x(t) + B(t) u(t).
 
-    Equation (3) of Shorikov and Goranov (2021). States are in m and m/s. A(t), shape (periods, 6,
-    6), and B(t), shape (periods, 6, 3), are matrices of the `motion`; a unit control is an
-    acceleration of `acceleration_m_s2`.
+    The matrices are exact for controls that are held over each period; equation (3) of Shorikov and
+    Goranov (2021). States are in m and m/s. A(t), shape (periods, 6, 6), and B(t), shape (periods,
+    6, 3), are matrices of the `motion`; a unit control is an acceleration of `acceleration_m_s2`.
     """
     starts = period_s * np.arange(periods)
     segment = motion.segment(starts, starts + period_s)

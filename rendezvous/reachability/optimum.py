@@ -213,8 +213,9 @@ class MinimumNorm:
 
 
 def min_norm(lifted: Lifted, weights: Floats) -> MinimumNorm:
-    """Minimise |weights x(T)| over all controls of a block, a set without equations; weights, shape
-    (n,), are positive.
+    """Minimise |weights x(T)| over all controls of a block, a set without equations.
+
+    The `weights`, shape (n,), are positive.
 
     Raise `NoSolutionError` if the norm found exceeds its lower bound by more than 1e-8, relative,
     and by more than 1e-12 of the effect of the controls, or if the controls violate a constraint by

@@ -14,8 +14,8 @@ from scipy.sparse.csgraph import connected_components
 from infoset.rendezvous._arrays import Floats, Places
 
 MAX_PERIODS = 256
-"""Maximum number of periods in a file. Chosen: for three controls the dense constraints of a problem
-then take about 30 MB."""
+"""Maximum number of periods in a file. Chosen: with three controls the dense constraints of a
+problem then take about 30 MB."""
 _MAX_GROWTH = 1e10
 """Maximum growth of a deviation, relative to the bounds: its rounding, 1e-16 of it, is then 1e-6 of
 the bounds."""

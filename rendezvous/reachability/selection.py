@@ -36,8 +36,8 @@ _ROUNDED_DECREASE = 1e-15
 _STILL = 1e-9
 """Change of a control with v below which the control counts as constant, see `admissible`."""
 _STEPS_A_DIMENSION = 20
-"""Steps of hit-and-run per dimension: the mean of 1500 samples is then within 3 % of the centroid of
-a set whose centroid is known (test_routes)."""
+"""Steps of hit-and-run per dimension: with them the mean of 1500 samples is within 3 % of the
+centroid of a triangle (test_routes)."""
 _INSIDE = 1.0 - 1e-12
 """Part of a chord that is used, so that rounding does not move a point outside."""
 

@@ -18,8 +18,8 @@ from infoset.rendezvous.reachability.problem import ReachabilityProblem, StateBl
 MAX_VERTICES = 1000
 """Maximum number of vertices of an exact set: a step with so many takes seconds."""
 _MAX_DIMENSIONS = 8
-"""Maximum dimension of a set of optimal controls whose vertices are computed: six periods of the (x,
-y) block have 12 controls, and four terminal equations. Sets of more dimensions have too many."""
+"""Maximum dimension of a set of optimal controls whose vertices are computed. Six periods of the
+(x, y) block have 12 controls and four terminal equations; larger sets have too many vertices."""
 _FEW_CONTROLS = 24
 """Number of controls up to which dense programs over controls alone are faster than sparse ones
 over controls and states. Chosen: both have the same solutions."""

@@ -54,10 +54,10 @@ class EllipticOrbit:
 
     @property
     def semi_latus_rate_rad_s(self) -> float:
-        """Mean motion of a circular orbit at the semi-latus rectum p: sqrt(mu / p^3) = h / p^2,
-        rad/s.
+        """Mean motion of a circular orbit at the semi-latus rectum p, rad/s.
 
-        Yamanaka and Ankersen (2002) call it k^2.
+        It is sqrt(mu / p^3) = h / p^2 with the angular momentum h per mass. Yamanaka and Ankersen
+        (2002) call it k^2.
         """
         return float(self.mean_motion_rad_s / (1.0 - self.eccentricity**2) ** 1.5)
 

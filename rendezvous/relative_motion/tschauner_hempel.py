@@ -50,7 +50,7 @@ class _Intervals(NamedTuple):
 class TschaunerHempel(HeldMotion):
     """Relative motion about an elliptic `orbit`, from e = 0 on.
 
-    Transitions are those of Yamanaka and Ankersen (2002), in closed form: about 1 microsecond each.
+    Transitions have the closed form of Yamanaka and Ankersen (2002): about 1 microsecond each.
     The Gramian and the effect of a held control are integrals of Phi(end, t) B by Gauss and
     Legendre's rule of 16 nodes, on panels of eccentric anomaly that are at most a radian long, and
     not longer than the distance from the poles of the motion at cos E = 1 / e: about 4 microseconds

@@ -1,6 +1,4 @@
-"""Minimum energy with a bound on the control, against closed forms, cone programs and an
-integrator.
-"""
+"""Minimum energy with a bound, against closed forms, cone programs and an integrator."""
 
 from __future__ import annotations
 
@@ -80,9 +78,7 @@ def test_smallest_bound_is_zero_if_the_effect_is_zero() -> None:
 
 
 def some_arcs(seed: int) -> list[Arc]:
-    """One to three arcs that share up to three free values, with weights, on a circle or an
-    ellipse.
-    """
+    """One to three random arcs that share up to three free values."""
     random = np.random.default_rng(seed)
     rate = 1.1e-3
     elliptic = EllipticOrbit(
@@ -124,9 +120,7 @@ def peak_of(arc: Arc, costate: Floats, bound: float, edges_s: Floats) -> float:
 
 
 def held_program(arcs: list[Arc], bound: float, intervals: int) -> float:
-    """Minimum weighted energy of controls that are constant in each of so many intervals of an arc,
-    by Clarabel.
-    """
+    """Minimum weighted energy of controls that are held in equal intervals, by Clarabel."""
     quadratic = []
     responses = []
     slopes = []
@@ -176,9 +170,7 @@ def held_program(arcs: list[Arc], bound: float, intervals: int) -> float:
 
 
 def check_one(seed: int) -> None:
-    """A bound between the smallest one and the peak: integration, bound, and a cone program over
-    held controls.
-    """
+    """Compare the solution for a random bound with an integration and a cone program."""
     random = np.random.default_rng(seed)
     arcs = some_arcs(seed)
     peak = peak_without(arcs)
@@ -207,9 +199,7 @@ def check_one(seed: int) -> None:
 def flown(
     arc: Arc, costate: Floats, bound: float, edges_s: Floats, free: Floats
 ) -> tuple[float, float]:
-    """The energy and the miss, in units of the goal, of an integration (DOP853) under the
-    control.
-    """
+    """The energy and the miss, in units of the goal, by an integration (DOP853)."""
 
     def rates(time_s: float, state: Floats) -> Floats:
         to_end = arc.motion.transition(np.array([time_s]), np.array([arc.end_s]))[0]
@@ -264,8 +254,8 @@ def test_smallest_bound_over_140_revolutions_is_near_the_peak_of_a_control() -> 
     state = np.array([1042.875, -544.668, -206.956, 0.348, 0.814, 0.248])
     missing = -motion.transition(0.0, duration_s) @ state
     arc = Arc(motion, 0.0, duration_s, missing, np.zeros((6, 0)))
-    # A control is found by hand: held over 5000 intervals, in the direction of the multipliers,
-    # corrected by least squares.
+    # A control that is held over 5000 intervals: in the direction of the multipliers of least
+    # squares, then corrected.
     count = 5000
     grid = np.linspace(0.0, duration_s, count + 1)
     scale = np.array([duration_s] * 3 + [1.0] * 3)

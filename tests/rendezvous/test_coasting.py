@@ -20,9 +20,7 @@ EPSILON = 2.0**-53
 
 
 def exactly_coasted(state: Floats, duration: float) -> Floats:
-    """Universal variables, mu = 1, by bisection in 40 digits; the functions are differences of the
-    closed forms.
-    """
+    """Coast by universal variables, mu = 1, with bisection in 40 digits."""
     r, v = ([mp.mpf(float(each)) for each in part] for part in np.split(state, 2))
     time = abs(mp.mpf(duration))
     sign = 1 if duration >= 0.0 else -1
@@ -80,9 +78,7 @@ def random_state(seed: int, share: float) -> Floats:
 
 
 def allowed_error(state: Floats, duration: float) -> float:
-    """Rounding of the state changes the period and the perigee, the rounding of the time shifts the
-    state.
-    """
+    """Error by rounding of the state, which changes period and perigee, and of the time."""
     return float(
         200.0 * EPSILON * (1.0 + abs(duration)) / perigee_m(state[:3], state[3:], 1.0) ** 1.5
     )
@@ -129,7 +125,7 @@ def test_array_of_states_on_all_conics_is_coasted_as_single_states() -> None:
     for row in range(3):
         for column, duration in enumerate((-3.0, 0.0, 5.0, 7.0)):
             alone = coast(states[row], duration, 1.0)
-            # Libraries round functions of several numbers at once otherwise than those of one.
+            # Functions of arrays and of single numbers may be rounded differently.
             size = np.repeat([np.linalg.norm(alone[:3]), np.linalg.norm(alone[3:])], 3)
             difference = (found[row, column] - alone) / size
             assert np.abs(difference).max() <= allowed_error(states[row], duration)

@@ -26,9 +26,7 @@ ORBIT = EllipticOrbit.of_size(1e7, 0.1, 3.986004418e14)
 
 
 def printed(number: str) -> object:
-    """A solution that was printed: it is compared within half a unit of its last digit and the
-    solver's tolerance.
-    """
+    """A printed solution, to half a unit of its last digit and the solver's tolerance."""
     value = float(number)
     last_digit = 10.0 ** -len(number.partition(".")[2])
     return pytest.approx(value, abs=0.5 * last_digit + SOLVED * abs(value))
@@ -41,9 +39,7 @@ def orbit() -> EllipticOrbit:
 
 @pytest.fixture(scope="session")
 def paper() -> Paper:
-    """The paper's problem, with another model, number of periods, bound on the thrust or shape of
-    it.
-    """
+    """The paper's problem, with other models, periods, bounds on the thrust and thrust shapes."""
 
     def make(
         model: MotionModel = MotionModel.FROZEN,
@@ -67,9 +63,7 @@ def paper() -> Paper:
 
 @pytest.fixture(scope="session")
 def random_problem() -> Callable[[int, int], ReachabilityProblem]:
-    """A random system of a dimension: sometimes singular, sometimes with fewer controls than reach
-    every direction.
-    """
+    """A random system of a dimension, sometimes singular or not controllable."""
 
     def make(seed: int, size: int) -> ReachabilityProblem:
         generator = np.random.default_rng(seed)

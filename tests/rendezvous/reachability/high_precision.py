@@ -1,5 +1,6 @@
-"""The minimum terminal norm in forty decimal digits, by a barrier method that shares nothing with
-the package.
+"""The minimum terminal norm in forty decimal digits, by a barrier method.
+
+It shares no code with the package.
 """
 
 from __future__ import annotations
@@ -24,10 +25,9 @@ _decimals = np.vectorize(lambda value: Decimal(float(value)), otypes=[object])
 
 
 class Dense:
-    """A problem as matrices of the controls divided by their bounds: minimise |free + response v|,
-    rows v <= limits.
+    """Minimise |free + response v| over rows v <= limits, with controls v divided by their bounds.
 
-    Written straight from x(t + 1) = A x + B u, in whatever numbers `convert` makes.
+    The matrices come directly from x(t + 1) = A x + B u, in the number type of `convert`.
     """
 
     def __init__(self, problem: ReachabilityProblem, convert: Any = np.asarray) -> None:
@@ -75,8 +75,10 @@ class Dense:
 
 
 def cone_program(given: Dense, kind: str) -> tuple[float, Floats]:
-    """Minimise the norm, or maximise a margin (deep), or minimise the bound on controls that
-    reaches zero (bound).
+    """Solve one of three problems (`kind`) and return its value and the controls.
+
+    norm: the minimum norm; deep: the maximum margin; bound: the minimum bound on the controls with
+    which zero is reached.
     """
     size = given.response.shape[1]
     rows = []
@@ -138,13 +140,10 @@ def cone_program(given: Dense, kind: str) -> tuple[float, Floats]:
 
 
 def precise_min_norm(problem: ReachabilityProblem) -> tuple[float, float] | None:
-    """Return the minimum terminal norm and its rounding in doubles; None where no control is well
-    inside.
+    """Return the minimum terminal norm and its rounding in doubles.
 
-    Notes
-    -----
-    A logarithmic barrier followed to a duality gap of `GAP`, in float while that does, then in
-    Decimal.
+    The result is None if no control is well inside the constraints. A logarithmic barrier is
+    followed to a duality gap of `GAP`: in floats while they are exact enough, then in Decimal.
     """
     radius, start = cone_program(Dense(problem), "deep")
     if not radius > 1e-6:
@@ -233,9 +232,7 @@ def _slopes(given: Dense, point: Numbers, weight: Any) -> tuple[Numbers, Numbers
 
 
 def _solved(matrix: Numbers, right: Numbers) -> Numbers:
-    """Solve a positive definite system by elimination, in whatever numbers it has, after a scaling
-    of its diagonal.
-    """
+    """Solve a positive definite system by elimination, in floats or Decimal."""
     if matrix.dtype == float:
         scale = 1.0 / np.sqrt(np.diag(matrix))
         return np.asarray(scale * np.linalg.solve(matrix * np.outer(scale, scale), scale * right))

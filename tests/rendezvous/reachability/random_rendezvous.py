@@ -25,9 +25,7 @@ GAPS = (0.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, -1e-9)
 
 
 def random_rendezvous(seed: int) -> ReachabilityProblem:
-    """A problem that may or may not reach zero, or have controls that keep its constraints at
-    all.
-    """
+    """A problem that may be infeasible, and whose optimum may not be zero."""
     generator = np.random.default_rng([2021, seed])
     while True:
         problem = _drawn(generator)

@@ -41,9 +41,7 @@ class RationalSet:
 
 
 def rational_hull(points: Floats) -> RationalSet:
-    """Return the exact convex hull of points, shape (k, n), by the double description of the
-    library PPL.
-    """
+    """Return the exact convex hull of points, shape (k, n), by the double description of PPL."""
     return rounded(polyhedron_of([[Fraction(float(value)) for value in point] for point in points]))
 
 
@@ -126,8 +124,9 @@ def rational_sets(block: StateBlock) -> tuple[list[RationalSet], list[RationalSe
 
 
 def _step(block: StateBlock, period: int, before: int, after: int) -> ppl.C_Polyhedron:
-    """States (first index: before), controls and next states (after) of a period, states
-    unconstrained.
+    """The step of a period as a polyhedron, with states unconstrained.
+
+    The coordinates are states (first index `before`), controls and next states (`after`).
     """
     size = block.size
     group = len(block.controls)

@@ -9,8 +9,9 @@ from infoset.rendezvous.reachability.conic import ConeProgram, NoSolutionError
 
 
 def program_with_solution() -> tuple[ConeProgram, np.ndarray, np.ndarray]:
-    """Minimise the first of 40 states that are linear in a control u with |u| <= 1, with its exact
-    solution.
+    """A program over a control with |u| <= 1, and its exact solution and multipliers.
+
+    It minimises the first of 40 states, which are linear in the control.
     """
     generator = np.random.default_rng(5)
     response = 100.0 * generator.standard_normal((40, 3))

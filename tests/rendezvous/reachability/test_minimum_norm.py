@@ -1,6 +1,4 @@
-"""The minimum terminal norm against programs of its own kind and forty digits, from well inside to
-the edges.
-"""
+"""The minimum terminal norm against dense cone programs and forty digits, up to the edges."""
 
 from __future__ import annotations
 
@@ -44,22 +42,25 @@ SELECTIONS = (
     analytic_centre,
 )
 RELATIVE = 1e-6
-ZERO, ABSOLUTE = 1e-11, 1e-12
-"""Of what controls can do: misses below the first are zero, and the second is the error of small
-ones.
+ZERO = 1e-11
+ABSOLUTE = 1e-12
+"""Maximum miss that counts as zero, and error of small misses.
+
+Both are relative to the effect of the controls.
 """
 
 
 def size_of(problem: ReachabilityProblem) -> float:
-    """How far controls and free motion may bring a terminal state: doubles know it to so many parts
-    in 1e16.
+    """The maximum effect of controls and free motion on the terminal state.
+
+    Doubles have a rounding error of about 1e-16 of it.
     """
     given = Dense(problem)
     return float(np.abs(given.free).max() + np.abs(given.response).sum(axis=1).max())
 
 
 def assert_precise(problem: ReachabilityProblem, miss: float) -> bool:
-    """Whether forty digits could tell, and then that they agree."""
+    """Compare a miss with forty digits; return False if these are not available."""
     found = precise_min_norm(problem)
     if found is None:
         return False
@@ -118,9 +119,7 @@ def test_selections_from_a_flat_set_are_optimal(paper: Paper, bound: float) -> N
 
 
 def test_set_loses_dimensions_at_the_minimum_bound(paper: Paper) -> None:
-    """At the minimum bound that reaches zero the set loses dimensions; with fewer periods it is a
-    point.
-    """
+    """With fewer periods than needed it is a point."""
     problem = paper()
     dimensions = []
     for shape in ThrustShape:
@@ -155,7 +154,7 @@ def test_problem_with_axes_without_thrust_is_solved(
             1e-9 if thrust is ThrustShape.BOX else CONE_TOLERANCE
         )
     if thrust is ThrustShape.BOX:
-        assert solve(still).route is Route.EXACT  # its bounds agree with those of programs
+        assert solve(still).route is Route.EXACT  # both routes agree
 
 
 @pytest.fixture(scope="module")
@@ -178,7 +177,7 @@ def test_miss_scales_with_the_unit_of_length(
 
 
 def check(seed: int, *, precise_to: int = 0, members: bool = True) -> str:
-    """Solve a random problem and compare; return what became of it."""
+    """Solve a random problem, compare, and return the kind of result."""
     problem = random_rendezvous(seed)
     rough = Dense(problem)
     try:

@@ -72,7 +72,7 @@ def test_feedback_plan_satisfies_constraints_that_fixed_controls_violate(paper: 
         assert (states >= plan.lower - 1e-6).all()
         assert (states <= plan.upper + 1e-6).all()
         assert float(np.linalg.norm(states[-1])) <= plan.worst_miss + 1e-6
-    # Controls know nothing of what is to come.
+    # Controls do not depend on later disturbances.
     moves = extreme_moves(1, 4, 3)[0]
     later = moves.copy()
     later[2:] *= -1.0

@@ -1,11 +1,10 @@
-"""Both routes, and exact rationals, on random systems; the set of optimal controls and its
-members.
-"""
+"""Both routes and exact rationals on random systems; members of the set of optimal controls."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from importlib.util import find_spec
+from typing import Any
 
 import numpy as np
 import pytest
@@ -101,8 +100,7 @@ def test_samples_are_optimal_and_controls_outside_the_set_are_not(
     assert np.abs(norms - optimal.miss).max() < 1e-7
     assert float(problem.excess(members).max()) < 1e-9
     assert float(optimal.excess(members).max()) < 1e-9
-    # Controls outside: members moved across the set's own affine hull, and members pushed out of
-    # it.
+    # Controls outside the set: members moved out of its affine hull, and pushed outward in it.
     moved = members + 1e-3 * generator.standard_normal(members.shape)
     centre = chebyshev_centre(optimal)
     pushed = centre + 40.0 * (members - centre)
@@ -122,7 +120,7 @@ def test_samples_are_reproducible_and_centred_on_the_centroid(paper: Paper) -> N
     ranges = optimal.ranges()
     np.testing.assert_allclose(corners.min(axis=0), ranges[..., 0], atol=1e-9)
     np.testing.assert_allclose(corners.max(axis=0), ranges[..., 1], atol=1e-9)
-    # z: a triangle, uniform over which the mean is the centroid; a direct check of uniformity.
+    # The set of controls along z is a triangle; the mean of uniform samples is its centroid.
     triangle = np.unique(corners[:, :, 2].round(9), axis=0)
     assert len(triangle) == 3
     spread = np.ptp(triangle, axis=0)
@@ -150,13 +148,12 @@ def test_selection_has_the_smallest_cost_of_a_thousand_members(
             others = samples(optimal, 1000, np.random.default_rng(2))
             assert own <= float(np.linalg.norm(others, axis=2).max(axis=1).min())
         else:
-            assert (
-                getattr(effort(control), name) <= min(getattr(each, name) for each in drawn) + 1e-9
-            )
+            smallest = min(getattr(each, name) for each in drawn)
+            assert getattr(effort(control), name) <= smallest + 1e-9
+
+    accuracy = 1e-12 if thrust is ThrustShape.BOX else CONE_TOLERANCE
     for centre in (chebyshev_centre(optimal), analytic_centre(optimal)):
-        assert float(optimal.excess(centre)) < (
-            1e-12 if thrust is ThrustShape.BOX else CONE_TOLERANCE
-        )
+        assert float(optimal.excess(centre)) < accuracy
 
 
 def test_analytic_centre_has_the_max_product_of_slacks(paper: Paper) -> None:
@@ -176,28 +173,49 @@ def test_analytic_centre_has_the_max_product_of_slacks(paper: Paper) -> None:
     )
 
 
-def test_lifted_route_states_its_reason(paper: Paper, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({}, ""),
+        ({"thrust": ThrustShape.BALL}, "thrust in a ball"),
+        ({"periods": 16, "period_s": 45.0}, "more than 100 vertices"),
+        ({"periods": 17, "period_s": 45.0}, "at most 16 periods"),
+    ],
+)
+def test_lifted_route_states_its_reason(
+    paper: Paper, monkeypatch: pytest.MonkeyPatch, changes: dict[str, Any], reason: str
+) -> None:
     monkeypatch.setattr("infoset.rendezvous.reachability.sets.MAX_VERTICES", 100)
-    for problem, reason in (
-        (paper(), ""),
-        (paper(thrust=ThrustShape.BALL), "thrust in a ball"),
-        (paper(periods=16, period_s=45.0), "more than 100 vertices"),
-        (paper(periods=17, period_s=45.0), "at most 16 periods"),
-    ):
-        solution = solve(problem)
-        assert solution.route is (Route.LIFTED if reason else Route.EXACT)
-        assert reason in solution.reason
+
+    solution = solve(paper(**changes))
+
+    assert solution.route is (Route.LIFTED if reason else Route.EXACT)
+    assert reason in solution.reason
 
 
-def test_projections_of_both_routes_agree(paper: Paper) -> None:
+@pytest.fixture(scope="module")
+def both_routes(paper: Paper) -> tuple[ReachableSets, ReachableSets]:
     exact = solve(paper())
-    both = [exact.sets, ReachableSets(exact.problem, tuple(map(LiftedSets, exact.optimal.blocks)))]
-    for kind, t, axes in (
+    parts = tuple(LiftedSets(optimum) for optimum in exact.optimal.blocks)
+    return exact.sets, ReachableSets(exact.problem, parts)
+
+
+@pytest.mark.parametrize(
+    ("kind", "time", "axes"),
+    [
         (SetKind.TUBE, 2, (0, 1)),
         (SetKind.FORWARD, 3, (0, 1, 2)),
         (SetKind.TUBE, 1, (3, 4, 5)),
-    ):
-        one, other = (sets.projection(kind, t, axes) for sets in both)
-        seen = np.random.default_rng(0).standard_normal((40, len(axes)))
-        gap = np.abs((seen @ one.T).max(axis=1) - (seen @ other.T).max(axis=1))
-        assert gap.max() < 1e-8 * np.abs(one).max()
+    ],
+)
+def test_projections_of_both_routes_agree(
+    both_routes: tuple[ReachableSets, ReachableSets],
+    kind: SetKind,
+    time: int,
+    axes: tuple[int, ...],
+) -> None:
+    exact, lifted = (sets.projection(kind, time, axes) for sets in both_routes)
+
+    directions = np.random.default_rng(0).standard_normal((40, len(axes)))
+    gap = np.abs((directions @ exact.T).max(axis=1) - (directions @ lifted.T).max(axis=1))
+    assert gap.max() < 1e-8 * np.abs(exact).max()

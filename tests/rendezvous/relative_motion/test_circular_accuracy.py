@@ -7,10 +7,10 @@ import pytest
 
 from infoset.rendezvous.relative_motion import ClohessyWiltshire
 
-# fmt: off
-ANGLES = (1e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.1, 0.5, 0.999, 1.0, 1.7, 1.999999, 2.0, 2.5, 4.493409457909, 11.06652863,
- 20, 50)
-# fmt: on
+ANGLES = (
+    1e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.1, 0.5, 0.999, 1.0, 1.7, 1.999999, 2.0, 2.5, 4.493409457909,
+    11.06652863, 20, 50,
+)  # fmt: skip
 
 
 def exact(theta: float) -> tuple[mp.matrix, mp.matrix]:

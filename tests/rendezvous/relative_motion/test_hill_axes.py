@@ -40,9 +40,7 @@ def flown(state: Floats, end_s: float) -> Floats:
 
 
 def axes_and_rate(chief: Floats) -> tuple[Floats, Floats]:
-    """x outward, y along the motion, z = x cross y, as rows in inertial axes, and their angular
-    velocity, inertial.
-    """
+    """Hill's axes, as rows in inertial axes, and their angular velocity, inertial."""
     position = chief[:3]
     velocity = chief[3:]
     momentum = np.cross(position, velocity)

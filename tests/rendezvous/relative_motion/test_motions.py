@@ -60,7 +60,7 @@ INTERLEAVED = [0, 3, 1, 4, 2, 5]
 
 
 def in_paper_axes(matrix: Floats) -> Floats:
-    """Convert the rows and columns of a matrix from Hill's axes to those of the papers."""
+    """Convert the rows and columns of a matrix from Hill's axes to the papers' axes."""
     return to_paper(to_paper(matrix).T).T
 
 
