@@ -1,3 +1,1 @@
-"""Visits to a sequence of moving targets: file, command, tables, figures, page and printed
-numbers.
-"""
+"""Visits to moving targets: file, command, tables, figures, page and printed numbers."""

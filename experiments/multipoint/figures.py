@@ -125,9 +125,7 @@ def _mark_visits(panel: Axes, report: MultipointReport, visits: Floats) -> None:
 
 @style()
 def draw_control(report: MultipointReport) -> Figure:
-    """Draw the components and the magnitude of the control against time, with the bound if there is
-    one.
-    """
+    """Draw the components and the magnitude of the control against time, with a bound."""
     control = report.path.control(report.times) * 1e3
     figure, (above, below) = _over_time(report)
     for title, look, component in zip(report.axis_titles, LINE_LOOKS, control.T, strict=False):
@@ -143,8 +141,9 @@ def draw_control(report: MultipointReport) -> Figure:
 
 
 def _over_time(report: MultipointReport) -> tuple[Figure, list[Axes]]:
-    """Return a figure of two panels over time, with the visits and the stays marked, and named
-    above the first one.
+    """Return a figure of two panels over time, with visits and stays marked.
+
+    The visits are named above the first panel.
     """
     unit, per_s = report.time_unit
     figure, grid = subplots(115.0, 2, 1, sharex=True)

@@ -26,8 +26,9 @@ Vector = Annotated[tuple[float, float, float], NUMBER]
 
 @dataclass(frozen=True, kw_only=True)
 class BodyTable:
-    """[chaser]: a state at t = 0 in Hill's axes, or at an epoch in inertial ones; there elements
-    may stand for it.
+    """[chaser]: a state at t = 0 in Hill's axes, or at an epoch in inertial axes.
+
+    In inertial axes, orbital elements may replace the state.
     """
 
     position_m: Vector | None = None
@@ -153,8 +154,9 @@ class MultipointProblem:
         return max(times, default=np.inf)
 
     def limits(self) -> TimeLimits:
-        """Return the limits of the times; ValueError if the last time has neither a limit nor a
-        price.
+        """Return the limits of the times.
+
+        Raise ValueError if the last time has neither a limit nor a price.
         """
         return self.times or TimeLimits()
 

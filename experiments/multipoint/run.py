@@ -81,8 +81,9 @@ def solve(
 def _within_bound(
     problem: MultipointProblem, best: BestOrder, peak: float, bound: float, times_are_free: bool
 ) -> tuple[BestOrder, float]:
-    """Return the visits with the bound imposed, and the smallest possible bound at the times of
-    `best`.
+    """Return the visits with the bound imposed, and the smallest possible bound.
+
+    The latter is the smallest bound at the times of `best`.
     """
     tour = problem.tour
     path = best.path

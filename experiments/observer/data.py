@@ -73,7 +73,7 @@ def simulate(problem: ObserverProblem, errors: Errors, seed: int) -> Data:
 
 
 def need_size(where: str, *values: Floats) -> None:
-    """Raise an error if a state is too large; NaN is not."""
+    """Raise an error if a state is too large; NaN is not too large."""
     if any((np.abs(numbers) > MAX_STATE).any() for numbers in values):
         raise InputError(
             f"{where}: a state is larger than {MAX_STATE:g}; the system is unstable: correct A, or "
@@ -89,7 +89,7 @@ def _signs(errors: Errors, shape: tuple[int, ...], generator: np.random.Generato
 
 
 def _point(shape: Set, errors: Errors, generator: np.random.Generator) -> Floats:
-    """Return a random point of a set: an extreme one for extremal errors."""
+    """Return a random point of a set; an extreme point for extremal errors."""
     if isinstance(shape, Zonotope):
         return np.asarray(
             shape.centre + _signs(errors, (len(shape.generators),), generator) @ shape.generators
@@ -109,10 +109,10 @@ def _padded(inputs: Floats | None, steps: int, size: int) -> Floats:
 
 
 def read_csv(file: Path, problem: ObserverProblem, columns: str) -> Data:
-    """Read measurements and inputs from a CSV file with a row for each step; `columns` renames some
-    of its columns.
+    """Read measurements and inputs from a CSV file with a row for each step.
 
-    Raise `InputError` if the file cannot be read, a column is missing, or a cell is not a number.
+    `columns` gives other names of its columns. Raise `InputError` if the file cannot be read, a
+    column is missing, or a cell is not a number.
     """
     outputs = len(problem.system.C)
     inputs = problem.system.inputs
@@ -158,11 +158,11 @@ def read_csv(file: Path, problem: ObserverProblem, columns: str) -> Data:
 
 
 def _rows(content: bytes, wanted: list[str]) -> list[list[str]]:
-    """Return the cells of a CSV file by row, the header first; commas, semicolons or tabs separate
-    them.
+    """Return the cells of a CSV file by row, the header first.
 
-    The separator is the first one that gives a header with the wanted columns, or a comma. A byte
-    order mark selects UTF-16, as of spreadsheets; without one the file is UTF-8.
+    Commas, semicolons or tabs separate them. The separator is the first one that gives a header
+    with the wanted columns, or a comma. A byte order mark selects UTF-16, as of spreadsheets;
+    without one the file is UTF-8.
     """
     is_utf_16 = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     lines = content.decode("utf-16" if is_utf_16 else "utf-8-sig").rstrip(" \r\n").splitlines()
@@ -177,7 +177,7 @@ def _rows(content: bytes, wanted: list[str]) -> list[list[str]]:
 
 
 def _renamed(names: list[str], columns: str) -> list[str]:
-    """Return the columns of a file that have some names; `columns` is NAME=COLUMN,NAME=COLUMN."""
+    """Return the columns of a file for some names; `columns` is NAME=COLUMN,NAME=COLUMN."""
     wanted = {name: name for name in names}
     for part in columns.split(",") if columns else ():
         name, _, column = (text.strip() for text in part.partition("="))

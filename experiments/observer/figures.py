@@ -29,8 +29,9 @@ _MAX_OUTLINES = 60
 
 
 def draw_all(report: ObserverReport) -> Iterator[Figure | None]:
-    """Draw the figures of a report, one after the other; None for the sets of more than two
-    states.
+    """Draw the figures of a report, one after the other.
+
+    The figure of the sets is None for more than two states.
     """
     yield draw_bounds(report)
     yield draw_sets(report) if len(report.problem.names) == 2 else None
@@ -38,8 +39,9 @@ def draw_all(report: ObserverReport) -> Iterator[Figure | None]:
 
 @style()
 def draw_bounds(report: ObserverReport) -> Figure:
-    """Draw the bounds of each state and their distance against time, with the true state of a
-    simulation.
+    """Draw the bounds and the widths of each state against time.
+
+    The true state of a simulation is added.
     """
     names = report.problem.names
     figure, grid = subplots(30.0 + 38.0 * len(names), len(names), 2, sharex=True)
@@ -97,9 +99,7 @@ def draw_bounds(report: ObserverReport) -> Figure:
 
 @style()
 def draw_sets(report: ObserverReport) -> Figure:
-    """Draw the sets of two states, the first ones light and the last ones dark, at most 60 of
-    them.
-    """
+    """Draw the sets of two states, the first ones light and the last ones dark, at most 60."""
     figure, ((panel,),) = subplots(115.0)
     shown = [estimate for estimate in report.estimates if not estimate.is_empty]
     shown = shown[:: -(-len(shown) // _MAX_OUTLINES)] if shown else []

@@ -1,6 +1,4 @@
-"""Problem files of kind `observer`: their tables and keys, and the observer of the system they
-describe.
-"""
+"""Problem files of kind `observer`: tables and keys, and the observer of their system."""
 
 from __future__ import annotations
 
@@ -37,8 +35,9 @@ Rows = tuple[Row, ...]
 
 @dataclass(frozen=True, kw_only=True)
 class ObserverTable:
-    """[system]: x+ = A x + B u + c + w, y = C x + v, every `step_s`; `states` are names for
-    figures.
+    """[system]: x+ = A x + B u + c + w, y = C x + v, every `step_s`.
+
+    `states` are names for figures.
     """
 
     A: Rows
@@ -56,8 +55,9 @@ class ObserverTable:
 
 @dataclass(frozen=True)
 class SetTable:
-    """[initial], [disturbance]: a box, a zonotope with a generator a row (times -1 to 1), or a
-    vertex a row.
+    """[initial], [disturbance]: a box, a zonotope or a polytope.
+
+    A zonotope has a generator in each row (times -1 to 1), a polytope a vertex in each row.
     """
 
     lower: Row = ()
@@ -99,8 +99,9 @@ class NoiseTable:
 
 @dataclass(frozen=True)
 class MeasurementTable:
-    """[measurements]: a row of outputs a step, empty if missing, and a row of inputs, which act
-    after them.
+    """[measurements]: rows of outputs and of inputs, one for each step.
+
+    A missing output is empty, and the inputs act after the outputs of their row are measured.
     """
 
     y: Rows = ()
@@ -109,8 +110,9 @@ class MeasurementTable:
 
 @dataclass(frozen=True)
 class SimulationTable:
-    """[simulation]: number of measurements that are simulated if there are none, and steps without
-    one.
+    """[simulation]: number of measurements that are simulated if the file has none.
+
+    `missing` are the steps without a measurement.
     """
 
     steps: Annotated[int, Limits(minimum=1, maximum=MAX_STEPS, whole=True)] = 30

@@ -1,6 +1,4 @@
-"""Figures of an encounter: trajectories (the figure of the paper), controls, the Pareto set and
-front.
-"""
+"""Figures of an encounter: trajectories (as in the paper), controls, Pareto set and front."""
 
 from __future__ import annotations
 
@@ -119,9 +117,7 @@ def draw_trajectories(
 
 @style()
 def draw_controls(report: ParetoReport) -> Figure:
-    """Draw the components and the magnitude of the controls against time, with the bound if there
-    is one.
-    """
+    """Draw the components and the magnitude of the controls against time, with a bound."""
     figure, grid = subplots(120.0, 2, 2, sharex=True)
     panels = [*grid.flat]
     for index, (name, flight) in enumerate(
@@ -147,9 +143,7 @@ def draw_controls(report: ParetoReport) -> Figure:
 
 @style()
 def draw_front(report: ParetoReport) -> Figure:
-    """Draw the Pareto set with the chosen meetings, the Pareto front, and costs against the
-    duration.
-    """
+    """Draw the Pareto set with the chosen meetings, the front, and costs against the duration."""
     figure, (panels,) = subplots(105.0, 1, 3)
     solution = report.solution
     selections = report.selections
@@ -197,8 +191,9 @@ def _draw_set(
 
 
 def _hull(solution: EncounterSolution) -> Floats | None:
-    """Return the convex hull of the ideal meetings in the first two free components; None if it has
-    no area.
+    """Return the convex hull of the ideal meetings in the first two free components.
+
+    It is None if it has no area.
     """
     if not solution.same_matrix:
         return None
@@ -212,8 +207,9 @@ def _hull(solution: EncounterSolution) -> Floats | None:
 def _draw_excesses(
     axes: Axes, solution: EncounterSolution, excess: Floats, selections: Mapping[str, Floats]
 ) -> None:
-    """Draw the front of two or three craft, the third as a colour, or the ranges of the excesses of
-    other numbers.
+    """Draw the front of two or three craft, the third as a colour.
+
+    For other numbers of craft, draw the ranges of the excesses.
     """
     names = _names(solution)
     chosen = {choice: solution.excess(point) for choice, point in selections.items()}

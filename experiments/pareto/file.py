@@ -1,6 +1,4 @@
-"""Problem files of kind `pareto-encounter`: their tables and keys, and the encounter they
-describe.
-"""
+"""Problem files of kind `pareto-encounter`: tables and keys, and the encounter."""
 
 from __future__ import annotations
 
@@ -21,9 +19,7 @@ Vector = Annotated[tuple[float, float, float], NUMBER]
 
 @dataclass(frozen=True)
 class TerminalTable:
-    """[terminal]: the components of the meeting that are not free, in the axes of
-    `ParetoProblem`.
-    """
+    """[terminal]: components of the meeting that are not free, in the axes of `ParetoProblem`."""
 
     x_m: Number = 0.0
     y_m: Number = 0.0
@@ -50,8 +46,9 @@ class CraftTable:
 
 @dataclass(frozen=True, kw_only=True)
 class ParetoProblem:
-    """A problem file of kind `pareto-encounter`. Axes: x radially outward, y along the motion, z
-    along the normal.
+    """A problem file of kind `pareto-encounter`.
+
+    Axes: x radially outward, y along the motion, z along the normal.
 
     Parameters
     ----------

@@ -66,10 +66,10 @@ def results(solution: EncounterSolution, paper: Paper) -> dict[str, Sequence[flo
 
 
 def _fitted(solution: EncounterSolution, numbers: Sequence[PrintedNumber]) -> list[float]:
-    """Return coefficients fitted over two orbits: in the 30 s of the flight the terms are nearly
-    dependent.
+    """Return coefficients fitted over two orbits.
 
-    The name of a number is ``CRAFT, QUANTITY, TERM``.
+    In the 30 s of the flight the terms are nearly dependent. The name of a number is ``CRAFT,
+    QUANTITY, TERM``.
     """
     motion = solution.encounter.craft[0].motion
     assert isinstance(motion, ClohessyWiltshire)

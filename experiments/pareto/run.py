@@ -91,8 +91,9 @@ def _preferred(text: str, problem: ParetoProblem) -> Floats:
 
 
 def _imposed(problem: ParetoProblem, solution: EncounterSolution) -> ImposedBound | None:
-    """Return the meeting with the bound; None if there is none, or the minimum-energy controls keep
-    it.
+    """Return the meeting with the bound imposed.
+
+    It is None if there is no bound, or the minimum-energy controls keep it.
     """
     bound = problem.max_control_m_s2
     encounter = problem.encounter

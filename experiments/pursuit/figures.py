@@ -1,6 +1,4 @@
-"""Figures of the pursuit-evasion game: orbits, relative motion, thrust, distance against duration,
-feedback.
-"""
+"""Figures of the pursuit game: orbits, relative motion, thrust, distances and feedback."""
 
 from __future__ import annotations
 
@@ -123,9 +121,7 @@ def draw_relative(sampled: CaptureHistory) -> Figure:
 
 @style()
 def draw_control(sampled: CaptureHistory) -> Figure:
-    """Draw the thrust directions in the orbital frame of each craft, and the switching
-    functions.
-    """
+    """Draw the thrust directions in the orbital frames, and the switching functions."""
     time, unit = _times(sampled.time_s)
     figure, (panels,) = subplots(75.0, 1, 3)
     for player, look in ((sampled.pursuer, PURSUER), (sampled.evader, EVADER)):
@@ -151,8 +147,9 @@ def draw_control(sampled: CaptureHistory) -> Figure:
 
 @style()
 def draw_distance(solution: CaptureSolution) -> Figure:
-    """Draw the distance that the evader can keep against the duration, and the curvature that
-    certifies it.
+    """Draw the distance that the evader can keep against the duration, and the curvature.
+
+    A positive curvature certifies the distance.
 
     Parameters
     ----------
@@ -182,8 +179,9 @@ def draw_distance(solution: CaptureSolution) -> Figure:
 
 @style()
 def draw_feedback(solution: CaptureSolution, flights: Sequence[PursuitFlight]) -> Figure:
-    """Draw the capture times that the plans predict, and the distance, or the capture times of
-    several simulations.
+    """Draw the predicted capture times and the distance of a simulation.
+
+    For several simulations, draw their capture times.
     """
     figure, (panels,) = subplots(75.0, 1, 2)
     left, right = panels

@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,7 @@ from infoset.sim.columns import csv_text
 Masked = np.ma.MaskedArray[tuple[int, ...], np.dtype[np.float64]]
 
 MAX_POINTS = 100_000
+"""Largest number of points of a map: an hour at 20 to 40 ms each."""
 RATIOS = ("phase_deg", "thrust_ratio")
 """Parameters besides the keys of a file: lead of the evader in true longitude, its thrust by the
 pursuer's.
@@ -43,8 +45,9 @@ class MapAxis:
 
 @dataclass(frozen=True)
 class MapReport:
-    """Results of one command, shape (rows, columns); times and closing speeds are masked without a
-    capture.
+    """Results of one command, shape (rows, columns).
+
+    Times and closing speeds are masked without a capture.
     """
 
     problem: PursuitProblem
@@ -85,30 +88,42 @@ def solve_map(problem: PursuitProblem, options: PursuitMap, begin: BeginProgress
         values = [{x.parameter: column, y.parameter: row} for column in x.values.tolist()]
         rows.append([_solved(problem, each, options.certify) for each in values])
         progress(len(rows) / len(y.values))
-    verdicts, times, speeds = (
-        np.array([[point[i] for point in points] for points in rows]) for i in range(3)
-    )
+    times = np.array([[point.capture_s for point in points] for points in rows])
+    speeds = np.array([[point.closing_speed_m_s for point in points] for points in rows])
     return MapReport(
-        problem, x, y, verdicts, np.ma.masked_invalid(times), np.ma.masked_invalid(speeds)
+        problem,
+        x,
+        y,
+        np.array([[point.verdict for point in points] for points in rows]),
+        np.ma.masked_invalid(times),
+        np.ma.masked_invalid(speeds),
     )
 
 
-def _solved(
-    problem: PursuitProblem, values: Mapping[str, float], change_branch: bool
-) -> tuple[str, float, float]:
-    """Return the verdict of a point, the time of capture and the closing speed."""
+class _Point(NamedTuple):
+    """Result of a point of the map; NaN without a capture."""
+
+    verdict: str
+    capture_s: float = math.nan
+    closing_speed_m_s: float = math.nan
+
+
+def _solved(problem: PursuitProblem, values: Mapping[str, float], change_branch: bool) -> _Point:
+    """Solve the game of a point."""
     try:
         game = game_at(problem, values)
     except (InputError, ValueError):
-        return NO_GAME, math.nan, math.nan
+        return _Point(NO_GAME)
+
     solution = solve(game, change_branch=change_branch)
     if solution.capture is None or solution.verdict is not CertificateVerdict.CAPTURED:
-        return solution.verdict.value, math.nan, math.nan
-    return solution.verdict.value, solution.capture.time_s, solution.capture.closing_speed_m_s
+        return _Point(solution.verdict.value)
+    capture = solution.capture
+    return _Point(solution.verdict.value, capture.time_s, capture.closing_speed_m_s)
 
 
 def game_at(problem: PursuitProblem, values: Mapping[str, float]) -> Game:
-    """Return the game with other values of parameters, those of `RATIOS` last.
+    """Return the game with other values of parameters; `RATIOS` are applied last.
 
     Raise `ValueError` or `InputError` if they define no game.
     """
@@ -132,17 +147,16 @@ def _true_longitude_rad(orbit: OrbitalElements) -> float:
 
 
 def read_axis(option: str, text: str) -> MapAxis:
-    """Read KEY=FROM:TO:N; raise `InputError` if it has another form, an unknown parameter, or a
-    value out of range.
+    """Return the axis KEY=FROM:TO:N.
+
+    Raise `InputError` if it has another form, an unknown parameter, or a value out of range.
     """
     key, _, span = text.partition("=")
     if key not in RATIOS and numeric_key(PursuitProblem, key) is None:
         guess = similar_key(key, [*RATIOS, *keys_of(PursuitProblem)])
-        hint = (
-            f"did you mean {guess}?"
-            if guess
-            else f"choose {', '.join(RATIOS)} or a key of the file"
-        )
+        hint = f"choose {', '.join(RATIOS)} or a key of the file"
+        if guess:
+            hint = f"did you mean {guess}?"
         raise InputError(f"{option}: there is no parameter {shown(key)}; {hint}")
     try:
         low_text, high_text, count_text = span.split(":")

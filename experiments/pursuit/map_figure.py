@@ -76,8 +76,9 @@ def draw_map(report: MapReport) -> Figure:
 
 
 def axis_name(parameter: str) -> str:
-    """Return the axis label of a parameter: `evader orbit: inclination, deg` for
-    `evader.orbit.inclination_deg`.
+    """Return the axis label of a parameter.
+
+    For example, `evader orbit: inclination, deg` for `evader.orbit.inclination_deg`.
     """
     owner, _, key = parameter.rpartition(".")
     words = _RATIOS.get(key) or ", ".join(filter(None, split_unit(key)))

@@ -30,7 +30,7 @@ INERTIAL_AXES = "inertial, z along the planet's axis"
 
 @dataclass(frozen=True)
 class Feedback:
-    """Simulations with feedback, and their settings; `policy` is that of the evader."""
+    """Simulations with feedback, and their settings; the evader follows `policy`."""
 
     policy: str
     replan_s: float
@@ -52,28 +52,33 @@ class PursuitReport:
 def report_json(report: PursuitReport) -> dict[str, object]:
     """Return the results for `to_json`; keys are the names of the solution's fields."""
     solution = report.solution
-    capture = report.solution.capture
-    certificate = report.certificate
-    return {
+    values: dict[str, object] = {
         "axes": INERTIAL_AXES,
         "units": solution.units,
         "verdict": solution.verdict,
         "branch_changes": solution.branch_changes,
         "looked_at_s": solution.looked_at_s,
         "exhausted": solution.exhausted,
-        "capture": capture
-        and {key: value for key, value in vars(capture).items() if key != "extremal"},
-        "certificate": certificate
-        and {
-            "saddle_point": certificate.claims_saddle_point,
-            "failures": certificate.failures,
-            "undecided": certificate.undecided,
-            **vars(certificate),
-        },
+        "capture": None,
+        "certificate": None,
         "distance_curve": solution.curve,
-        "feedback": report.feedback
-        and {**vars(report.feedback), "flights": _flights_json(report.feedback.flights)},
+        "feedback": None,
     }
+    if solution.capture is not None:
+        capture = dict(vars(solution.capture))
+        del capture["extremal"]
+        values["capture"] = capture
+    if report.certificate is not None:
+        values["certificate"] = {
+            "saddle_point": report.certificate.claims_saddle_point,
+            "failures": report.certificate.failures,
+            "undecided": report.certificate.undecided,
+            **vars(report.certificate),
+        }
+    if report.feedback is not None:
+        flights = _flights_json(report.feedback.flights)
+        values["feedback"] = {**vars(report.feedback), "flights": flights}
+    return values
 
 
 def _flights_json(flights: Sequence[PursuitFlight]) -> list[dict[str, object]]:
@@ -89,8 +94,9 @@ def _flights_json(flights: Sequence[PursuitFlight]) -> list[dict[str, object]]:
 
 
 def trajectories(report: PursuitReport) -> str:
-    """Return both trajectories as CSV, no line without a capture; without thrust the direction of
-    thrust is zero.
+    """Return both trajectories as CSV, without rows if there is no capture.
+
+    The direction of thrust is zero without thrust.
     """
     columns = ["mass_kg", *(f"thrust_direction_{axis}" for axis in "xyz")]
     if report.solution.capture is None:
@@ -104,15 +110,14 @@ def trajectories(report: PursuitReport) -> str:
 
 
 def thrust_angles(player: PlayerHistory) -> Floats:
-    """Return the angles of the thrust in the craft's orbital frame, in and out of plane, rad, shape
-    (n, 2).
+    """Return the angles of the thrust in the craft's orbital frame, rad, shape (n, 2).
+
+    They are the angles in the plane and out of it.
     """
-    u = np.einsum(
-        "nij,nj->ni", orbital_axes(player.position_m, player.velocity_m_s), player.thrust_direction
-    )
-    return np.stack(
-        [np.unwrap(np.arctan2(u[:, 0], u[:, 1])), np.arcsin(np.clip(u[:, 2], -1.0, 1.0))], axis=1
-    )
+    axes = orbital_axes(player.position_m, player.velocity_m_s)
+    radial, along, normal = np.einsum("nij,nj->ni", axes, player.thrust_direction).T
+    in_plane = np.unwrap(np.arctan2(radial, along))
+    return np.stack([in_plane, np.arcsin(np.clip(normal, -1.0, 1.0))], axis=1)
 
 
 def report_lines(report: PursuitReport) -> Iterator[Part]:
@@ -129,8 +134,9 @@ def report_lines(report: PursuitReport) -> Iterator[Part]:
 
 
 def _capture_lines(capture: Capture, solution: CaptureSolution) -> Iterator[Part]:
-    """Yield vectors as columns of their components, which a narrow screen does not break, and the
-    scalars as lines.
+    """Yield the vectors as columns of a table and the scalars as lines.
+
+    A narrow screen does not break the columns.
     """
     pursuer = capture.pursuer
     evader = capture.evader
@@ -150,6 +156,7 @@ def _capture_lines(capture: Capture, solution: CaptureSolution) -> Iterator[Part
             *velocities,
         )
     yield table
+
     yield (
         f"propellant spent, kg: pursuer {pursuer.propellant_kg:.8f}, evader "
         f"{evader.propellant_kg:.8f}"
@@ -164,29 +171,25 @@ def _capture_lines(capture: Capture, solution: CaptureSolution) -> Iterator[Part
 
 
 def _verdict(solution: CaptureSolution) -> str:
-    until = (
-        f"{solution.looked_at_s:.1f} s"
-        if solution.looked_at_s >= 1.0
-        else f"{solution.looked_at_s:.3g} s"
-    )
     if solution.capture is not None and solution.verdict is CertificateVerdict.CAPTURED:
         return (
             f"captured at {solution.capture.time_s:.6f} s "
             f"({solution.capture.time_s / S_PER_HOUR:.4f} h)"
         )
+
+    looked_at_s = solution.looked_at_s
+    until = f"{looked_at_s:.1f} s" if looked_at_s >= 1.0 else f"{looked_at_s:.3g} s"
     if solution.verdict is CertificateVerdict.PROPELLANT_EXHAUSTED:
         return (
             f"propellant-exhausted: the {solution.exhausted} has no propellant after {until}; no "
             "capture before"
         )
     if solution.verdict is CertificateVerdict.ESCAPES:
-        why = (
-            f"the {solution.exhausted} has no propellant"
-            if solution.exhausted
-            else "the end of the time searched"
-        )
+        why = "the end of the time searched"
+        if solution.exhausted:
+            why = f"the {solution.exhausted} has no propellant"
         return f"escapes: no capture until {why}, {until}"
-    if solution.looked_at_s == 0.0:
+    if looked_at_s == 0.0:
         return (
             "branch-not-certified: no game could be followed, not even a short one; check the "
             "units of the values"
@@ -203,27 +206,25 @@ def _certificate_lines(certificate: Certificate) -> Iterator[str]:
         f"{certificate.hamiltonian_drift:.1e}, difference of a second integrator "
         f"{certificate.integrator_gap_m:.2g} m"
     )
+    confirmed = "confirmed" if certificate.no_earlier_capture else "not confirmed"
     yield (
-        "no earlier capture: "
-        f"{'confirmed' if certificate.no_earlier_capture else 'not confirmed'}; smallest distance "
-        f"from the planet's centre {certificate.min_distance_m / M_PER_KM:.1f} km"
+        f"no earlier capture: {confirmed}; smallest distance from the planet's centre "
+        f"{certificate.min_distance_m / M_PER_KM:.1f} km"
     )
     if certificate.pursuer_alone_s is not None:
         yield f"earliest capture if only the pursuer deviates: {certificate.pursuer_alone_s:.3f} s"
-    answers = [
-        (
-            f"{deviation.name} "
-            f"{'not known' if deviation.capture_s is None else f'{deviation.capture_s:.1f} s'}"
-        )
-        for deviation in certificate.evader_deviations
-    ]
+    answers = []
+    for deviation in certificate.evader_deviations:
+        time_s = deviation.capture_s
+        time = "not known" if time_s is None else f"{time_s:.1f} s"
+        answers.append(f"{deviation.name} {time}")
     if answers:
         yield f"captures if the evader deviates and the pursuer responds: {', '.join(answers)}"
     yield saddle_point(certificate)
 
 
 def saddle_point(certificate: Certificate | None) -> str:
-    """Return what a certificate says of the saddle point; nothing without a certificate."""
+    """Return the claim of a certificate about the saddle point; empty without a certificate."""
     if certificate is None:
         return ""
     if not certificate.claims_saddle_point:
@@ -232,18 +233,15 @@ def saddle_point(certificate: Certificate | None) -> str:
             reasons = (*reasons, *certificate.undecided)
         return f"saddle point: not claimed: {'; '.join(reasons)}"
     if certificate.undecided:
-        why = (
-            "no farthest extremal was found for one craft or both"
-            if certificate.directions_tried
-            else "add --certify"
-        )
+        why = "add --certify"
+        if certificate.directions_tried:
+            why = "no farthest extremal was found for one craft or both"
         return f"saddle point: no check failed; {'; '.join(certificate.undecided)} ({why})"
     return "saddle point: all checks hold"
 
 
 def _feedback_lines(feedback: Feedback) -> Iterator[str]:
     flights = feedback.flights
-    captured = [each for each in feedback.flights if each.ended is Ended.CAPTURED]
     heading = f"feedback, a plan every {feedback.replan_s:g} s, evader {feedback.policy}: "
     if len(flights) == 1:
         (flight,) = flights
@@ -252,6 +250,8 @@ def _feedback_lines(feedback: Feedback) -> Iterator[str]:
             f"{flight.distance_m:.4g} m; last predicted capture {flight.predicted_s[-1]:.1f} s"
         )
         return
+
+    captured = [each for each in flights if each.ended is Ended.CAPTURED]
     yield f"{heading}{len(captured)} of {len(flights)} captured"
     if captured:
         yield f"  capture time, s: {_distribution([flight.time_s for flight in captured])}"

@@ -32,8 +32,12 @@ from infoset.rendezvous.pursuit_evasion import (
 OPTIMAL, RANDOM = "optimal", "random"
 """Policies of the evader besides those of `Policy`."""
 
-REPLAN_S, MIN_PLANS, MAX_PLANS = 600.0, 50, 2000
-"""Default time between plans, and the smallest and largest number of plans in a game by default."""
+REPLAN_S = 600.0
+"""Default time between plans: some 150 in a revolution of a geostationary orbit."""
+MIN_PLANS = 50
+"""Smallest number of plans in a game by default; chosen for short games, as in low orbits."""
+MAX_PLANS = 2000
+"""Largest number of plans in a game by default: at 2 to 4 ms each, a run takes some seconds."""
 
 
 def solve_pursuit(problem: PursuitProblem, options: Pursuit, begin: BeginProgress) -> PursuitReport:
@@ -53,13 +57,14 @@ def solve_pursuit(problem: PursuitProblem, options: Pursuit, begin: BeginProgres
     progress = begin("solve")
     solution = solve(problem.game, all_directions=options.certify)
     progress(0.5)
-    certificate = (
-        None if solution.capture is None else certify(solution, all_directions=options.certify)
-    )
+    certificate = None
+    if solution.capture is not None:
+        certificate = certify(solution, all_directions=options.certify)
     progress(1.0)
-    feedback = (
-        None if options.feedback is None else _fly(solution, options, options.feedback, begin)
-    )
+
+    feedback = None
+    if options.feedback is not None:
+        feedback = _fly(solution, options, options.feedback, begin)
     return PursuitReport(problem, solution, certificate, feedback)
 
 

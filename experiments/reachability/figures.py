@@ -1,6 +1,4 @@
-"""Figures of a rendezvous: the tube in space (figures 1 and 2 of the paper) and in planes, and the
-controls.
-"""
+"""Figures of a rendezvous: the tube in space (as in the paper) and in planes, and controls."""
 
 from __future__ import annotations
 
@@ -87,8 +85,9 @@ def _legend(figure: Figure, report: ReachabilityReport) -> None:
 
 
 def shown_times(periods: int, most: int = _MAX_TIMES) -> list[int]:
-    """Return the times at which sets are drawn: all of a few, or evenly spaced ones, and never the
-    last.
+    """Return the times at which sets are drawn, without the last one.
+
+    If there are many, they are evenly spaced.
     """
     if periods <= most + 1:
         return list(range(1, periods))
@@ -134,9 +133,7 @@ def draw_planes(report: ReachabilityReport) -> Figure:
 def _draw_motion(
     axes: Axes, report: ReachabilityReport, states: list[int], max_times: int, tolerance: float
 ) -> None:
-    """Draw two or three states of the six: the tube, light at first and dark at last, and the
-    members.
-    """
+    """Draw two or three states of the six: the tube, from light to dark, and the members."""
     unit, per_m = report.length_unit
     factors = np.array([per_m if state < 3 else 1.0 for state in states])
     times = shown_times(report.solution.problem.periods, max_times)
@@ -162,8 +159,9 @@ def _draw_motion(
 
 
 def _draw_set(axes: Any, points: Floats, colour: Any, label: str) -> None:
-    """Draw the convex hull of points in a plane or in space; one without area or volume, as its
-    points on a line.
+    """Draw the convex hull of points in a plane or in space.
+
+    A hull without area or volume is drawn as its points on a line.
     """
     try:
         hull = ConvexHull(points / np.ptp(points, axis=0).max())
@@ -194,9 +192,7 @@ def _draw_set(axes: Any, points: Floats, colour: Any, label: str) -> None:
 
 @style()
 def draw_controls(report: ReachabilityReport) -> Figure:
-    """Draw the components of the controls over the periods, and the ranges of all optimal
-    controls.
-    """
+    """Draw the components of the controls, and the ranges of all optimal controls."""
     figure, (row,) = subplots(78.0, 1, 3)
     periods = report.solution.problem.periods
     bounds = report.solution.problem.control_bounds

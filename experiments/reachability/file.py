@@ -28,6 +28,7 @@ from infoset.rendezvous.two_body import OrbitalElements
 
 STATE_NAMES = ("x", "y", "z", "vx", "vy", "vz")
 _MAX_REACH = 1e4
+"""Largest change of a state by full thrust over a period, as a multiple of its bound."""
 _INSTANTS = 12
 """Instants within a period at which selected controls are checked."""
 
@@ -59,8 +60,9 @@ class Orbit:
 
 @dataclass(frozen=True, kw_only=True)
 class Start:
-    """The active craft at t = 0: x radially outward, y along the motion, z along the orbit's
-    normal.
+    """The active craft at t = 0 in Hill's axes.
+
+    x radially outward, y along the motion, z along the orbit's normal.
     """
 
     position_m: Vector
@@ -69,8 +71,9 @@ class Start:
 
 @dataclass(frozen=True, kw_only=True)
 class Bounds:
-    """Bounds of position and velocity at t = 0..T, and of the control, in units of
-    `acceleration_m_s2`.
+    """Bounds of position and velocity at t = 0..T, and of the control.
+
+    The unit of the control is `acceleration_m_s2`.
     """
 
     position_m: Bound
@@ -80,10 +83,10 @@ class Bounds:
 
 @dataclass(frozen=True, kw_only=True)
 class Cone:
-    """An approach cone, replaced by a pyramid inside it, which holds from the period `from_period`
-    on.
+    """An approach cone, replaced by a pyramid inside it.
 
-    The axis may have any length; the half-angle is that between axis and cone.
+    It holds from the period `from_period` on. The axis may have any length; the half-angle is that
+    between axis and cone.
     """
 
     apex_m: Vector
@@ -112,8 +115,9 @@ class Cone:
 
 @dataclass(frozen=True, kw_only=True)
 class KeepIn:
-    """Half-spaces for the position, normals . position <= offsets, from the period `from_period`
-    on.
+    """Half-spaces for the position, normals . position <= offsets.
+
+    They hold from the period `from_period` on.
     """
 
     normals: Annotated[tuple[Vector, ...], Field(min_length=1, max_length=50)]
@@ -193,7 +197,7 @@ class Rendezvous:
                 f"acceleration_m_s2: full thrust over a period changes a state by {reach:.3g} "
                 f"times its bound; rounding decides the result beyond {_MAX_REACH:g}"
             )
-        _ = self.problem  # raises ValueError if it is none
+        _ = self.problem  # raises ValueError if the values define no problem
 
     @cached_property
     def ellipse(self) -> EllipticOrbit:
@@ -243,19 +247,14 @@ class Rendezvous:
     @property
     def navigation_error(self) -> Floats | None:
         """Largest error of each component of an estimate, shape (6,)."""
-        navigation = self.navigation
-        return (
-            None
-            if navigation is None
-            else np.array(navigation.position_error_m + navigation.velocity_error_m_s)
-        )
+        if self.navigation is None:
+            return None
+        return np.array(self.navigation.position_error_m + self.navigation.velocity_error_m_s)
 
     def _problem(self, periods: int) -> ReachabilityProblem:
-        between = (
-            self._between(periods, self.checks_between_periods)
-            if self.checks_between_periods
-            else None
-        )
+        between = None
+        if self.checks_between_periods:
+            between = self._between(periods, self.checks_between_periods)
         with np.errstate(over="ignore", invalid="ignore"):
             transition, control = discretised(
                 self.motion, periods, self.period_s, self.acceleration_m_s2
@@ -280,13 +279,12 @@ class Rendezvous:
 
     def _half_spaces(self, periods: int) -> tuple[Floats, Floats, tuple[str, ...]]:
         """Return cone and half-spaces as constraints on states: normals, offsets and names."""
-        regions: list[tuple[str, Cone | KeepIn]] = (
-            [("face {} of the cone", self.cone)] if self.cone else []
-        )
-        regions += [
-            (f"half-space {{}} of keep_in #{number}", box)
-            for number, box in enumerate(self.keep_in, start=1)
-        ]
+        regions: list[tuple[str, Cone | KeepIn]] = []
+        if self.cone:
+            regions.append(("face {} of the cone", self.cone))
+        for number, box in enumerate(self.keep_in, start=1):
+            regions.append((f"half-space {{}} of keep_in #{number}", box))
+
         normals = np.zeros((0, 6))
         offsets = np.zeros((periods + 1, 0))
         names = list[str]()

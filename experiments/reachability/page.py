@@ -19,8 +19,10 @@ from infoset.experiments.common.page_motion import (
 from infoset.experiments.reachability.report import POINTS, ReachabilityReport
 from infoset.rendezvous.reachability import SetKind
 
-_TOLERANCE = 1e-2
+_PROJECTION_TOLERANCE = 1e-2
+"""Accuracy of the projections of the tube, see `Sets.projection`; about a pixel of the page."""
 _MAX_SETS = 24
+"""Number of periods at which the tube is shown; chosen: more make the page large and slow."""
 _ZERO = 1e-10
 """Controls smaller than the errors of the optimization are shown as zero."""
 _VIEWS = (
@@ -38,41 +40,53 @@ def reachability_page(report: ReachabilityReport) -> str:
     rendezvous = report.rendezvous
     periods = rendezvous.problem.periods
     period_s = rendezvous.period_s
-    members = [member for member, _ in report.shown]
-    time_s = np.linspace(
-        0.0, periods * period_s, len(report.shown[0][1]) if members else periods * POINTS + 1
+    instants = len(report.shown[0][1]) if report.shown else periods * POINTS + 1
+    time_s = np.linspace(0.0, periods * period_s, instants)
+
+    miss = report.solution.optimal.miss
+    about = [rendezvous.description] if rendezvous.description else []
+    about += [
+        f"axes: {AXES}",
+        f"minimum terminal norm {miss:.9g} in {periods} periods of {period_s:g} s; "
+        "trajectories of the nonlinear model",
+    ]
+    return motion_page(
+        f"Rendezvous {rendezvous.name}",
+        about,
+        time_s,
+        [_view(report, time_s, *view) for view in _VIEWS],
+        _graphs(report, time_s),
+        [member.name for member, _ in report.shown],
     )
-    views = [_view(report, time_s, *view) for view in _VIEWS]
-    period_of = np.minimum((time_s / period_s).astype(int), periods - 1)
+
+
+def _graphs(report: ReachabilityReport, time_s: Floats) -> list[Graph]:
+    """Return a graph of each component of the controls, constant over each period."""
+    rendezvous = report.rendezvous
+    last = rendezvous.problem.periods - 1
+    period_of = np.minimum((time_s / rendezvous.period_s).astype(int), last)
+    members = [member for member, _ in report.shown]
     controls = [
         np.where(np.abs(member.controls) < _ZERO, 0.0, member.controls)[period_of]
         for member in members
     ]
-    graphs = [
-        Graph(
-            f"Control along {AXIS_TITLES[j]}, and its range over all optimal controls",
-            f"u{axis}",
-            ("m/s²", rendezvous.acceleration_m_s2),
-            [
-                PageCurve(member.name, look, controls[look][:, j], look)
-                for look, member in enumerate(members)
-            ],
-            band=report.ranges[period_of, j],
-            stairs=True,
+    graphs = []
+    for j, axis in enumerate("xyz"):
+        curves = [
+            PageCurve(member.name, look, controls[look][:, j], look)
+            for look, member in enumerate(members)
+        ]
+        graphs.append(
+            Graph(
+                f"Control along {AXIS_TITLES[j]}, and its range over all optimal controls",
+                f"u{axis}",
+                ("m/s²", rendezvous.acceleration_m_s2),
+                curves,
+                band=report.ranges[period_of, j],
+                stairs=True,
+            )
         )
-        for j, axis in enumerate("xyz")
-    ]
-    miss = report.solution.optimal.miss
-    about = [
-        *filter(None, [rendezvous.description]),
-        f"axes: {AXES}",
-        (
-            f"minimum terminal norm {miss:.9g} in {periods} periods of {period_s:g} s; "
-            "trajectories of the nonlinear model"
-        ),
-    ]
-    names = [member.name for member in members]
-    return motion_page(f"Rendezvous {rendezvous.name}", about, time_s, views, graphs, names)
+    return graphs
 
 
 def _view(
@@ -85,19 +99,22 @@ def _view(
     """Return a view of the three states from ``first`` on: positions (0) or velocities (3)."""
     periods = report.rendezvous.problem.periods
     states = slice(first, first + 3)
+
+    # The tube at some whole periods; each time shows the nearest of them.
     times = sorted({round(t) for t in np.linspace(0, periods, min(periods, _MAX_SETS) + 1)})
     nearest = [
         int(np.abs(np.array(times) - time / report.rendezvous.period_s).argmin()) for time in time_s
     ]
     axes = tuple(first + axis for axis in (plane or (0, 1, 2)))
     projections = [
-        report.solution.sets.projection(SetKind.TUBE, t, axes, _TOLERANCE) for t in times
+        report.solution.sets.projection(SetKind.TUBE, t, axes, _PROJECTION_TOLERANCE) for t in times
     ]
     tube = Sets(
         "states of all optimal controls, at whole periods",
         [faces_of(points) for points in projections],
         nearest,
     )
+
     tracks = [
         Track(member.name, look, path[:, states], look)
         for look, (member, path) in enumerate(report.shown)

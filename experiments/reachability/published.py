@@ -42,11 +42,11 @@ _STATE_ROUNDING = np.array([0.05, 0.05, 0.05, 0.005, 0.005, 0.005])
 
 
 class PrintedTable(NamedTuple):
-    """A table of the paper; misprints are corrected in the controls, shape (4, 3), and the linear
-    states, shape (4, 6).
+    """A table of the paper, with misprints corrected.
 
-    `contradicted`, shape (4, 3), are the controls that the states contradict; they stay as printed,
-    because the correct ones are not known. The `nonlinear` states, shape (4, 6), are as printed.
+    The controls have shape (4, 3), and the linear states have shape (4, 6). `contradicted`, shape
+    (4, 3), are the controls that the states contradict; they stay as printed, because the correct
+    ones are not known. The `nonlinear` states, shape (4, 6), are as printed.
     """
 
     numbers: tuple[PrintedNumber, ...]
@@ -117,10 +117,10 @@ def _numbers(member: ChosenControl, controls: Floats) -> list[float]:
 
 
 def published_motion(orbit: EllipticOrbit, radius_m: float = PUBLISHED_RADIUS_M) -> NonlinearMotion:
-    """Return the motion of the nonlinear columns: about a circle of `radius_m`, with the rate of
-    `orbit` at t = 0.
+    """Return the motion of the nonlinear columns: about a circle of `radius_m`.
 
-    Equation (1) with e = 0 and w^2 radius^3 in place of the gravitational parameter.
+    Its rate is the rate of `orbit` at t = 0. Equation (1) with e = 0 and w^2 radius^3 in place of
+    the gravitational parameter.
     """
     rate_rad_s = (
         orbit.semi_latus_rate_rad_s
@@ -130,8 +130,7 @@ def published_motion(orbit: EllipticOrbit, radius_m: float = PUBLISHED_RADIUS_M)
 
 
 def flown_controls(rendezvous: Rendezvous, energy: Floats) -> Floats:
-    """Return the controls to which the states of tables 1 to 3 belong, in Hill's axes, shape (3, 4,
-    3).
+    """Return the controls of the states in tables 1 to 3, in Hill's axes, shape (3, 4, 3).
 
     Table 1: the control of minimum energy, `energy`, which is an independent computation. Tables 2
     and 3: the printed controls with corrections; controls of table 2 that its states contradict are
@@ -158,10 +157,10 @@ def _inverse(problem: ReachabilityProblem) -> Floats:
 
 
 def _implied_rounding(problem: ReachabilityProblem) -> Floats:
-    """Return the effect of the rounding of the states before and after a control on the control
-    that they imply.
+    """Return the effect of rounded states on the control that they imply.
 
-    The first state and the last one are known. In the paper's axes, shape (4, 3).
+    The states are the ones before and after the control. The first state and the last one are
+    known. In the paper's axes, shape (4, 3).
     """
     before = np.tile(np.abs(problem.transition[0]) @ _STATE_ROUNDING, (4, 1))
     after = np.tile(_STATE_ROUNDING, (4, 1))
@@ -170,9 +169,7 @@ def _implied_rounding(problem: ReachabilityProblem) -> Floats:
 
 
 def _state_rounding(problem: ReachabilityProblem) -> Floats:
-    """Return the effect of the rounding of the controls on the states, in the paper's axes, shape
-    (4, 6).
-    """
+    """Return the effect of rounded controls on the states, in the paper's axes, shape (4, 6)."""
     powers = [
         np.linalg.matrix_power(problem.transition[0], power) @ problem.control[0]
         for power in range(4)

@@ -28,13 +28,15 @@ POINTS = 24
 """Points of a displayed trajectory per period."""
 NORM = "(m, m/s)"
 """Unit of a norm of states."""
-_MAX_SHOWN, _ALIKE = 5, 1e-4
+_MAX_SHOWN = 5
+"""Number of controls in figures and pages; chosen: more curves cannot be told apart."""
+_ALIKE = 1e-4
+"""Difference of two controls, as parts of the largest one, below which only one is shown."""
 
 
 @dataclass(frozen=True, eq=False)
 class ChosenControl:
-    """An optimal control, and the states, shape (T + 1, 6), of the linear and of the nonlinear
-    model.
+    """An optimal control, with its states, shape (T + 1, 6), in both models.
 
     `between` is the largest violation of a constraint between the periods by the linear model, as a
     fraction of the bound; at most 0 if there is none.
@@ -96,9 +98,7 @@ class ReachabilityReport:
 
     @cached_property
     def shown(self) -> tuple[tuple[ChosenControl, Floats], ...]:
-        """Return the first few different members, each with its nonlinear trajectory, shape
-        (points, 6).
-        """
+        """Return the first few different members with nonlinear trajectories, (points, 6)."""
         chosen: list[ChosenControl] = []
         for member in self.members:
             if all(np.abs(member.controls - other.controls).max() > _ALIKE for other in chosen):
@@ -114,7 +114,7 @@ class ReachabilityReport:
 
 
 def delta_v(rendezvous: Rendezvous, controls: Floats) -> dict[str, float]:
-    """Return the Delta-v of controls, shape (T, 3), in m/s: the sum, and that along each axis.
+    """Return the Delta-v of controls, shape (T, 3), in m/s: the sum, and the part of each axis.
 
     The sum is over the axes, each of which has an engine; for thrust in a ball, with one engine, it
     is over the norms.
@@ -127,8 +127,9 @@ def delta_v(rendezvous: Rendezvous, controls: Floats) -> dict[str, float]:
 
 
 def trajectories(report: ReachabilityReport) -> str:
-    """Return the trajectories of the selected controls on both models, as CSV; a control is held
-    over its period.
+    """Return the trajectories of the selected controls in both models, as CSV.
+
+    A control is constant over its period.
     """
     rendezvous = report.rendezvous
     times_s = rendezvous.period_s * np.arange(rendezvous.problem.periods + 1)
@@ -143,8 +144,9 @@ def trajectories(report: ReachabilityReport) -> str:
 
 
 def report_json(report: ReachabilityReport) -> dict[str, object]:
-    """Return the results for `infoset.experiments.common.output.to_json`; key ``units`` has the
-    units of the states.
+    """Return the results for `infoset.experiments.common.output.to_json`.
+
+    Key ``units`` has the units of the states.
     """
     solution = report.solution
     rendezvous = report.rendezvous
@@ -173,27 +175,24 @@ def solution_json(
 
     def set_json(kind: SetKind, time: int, bounds: Floats) -> dict[str, object]:
         counts = solution.sets.counts(kind, time)
-        keys = ("vertices", "facets", "dimension")
-        return {"min": bounds[:, 0], "max": bounds[:, 1]} | {
-            key: counts and getattr(counts, key) for key in keys
-        }
+        values: dict[str, object] = {"min": bounds[:, 0], "max": bounds[:, 1]}
+        for key in ("vertices", "facets", "dimension"):
+            values[key] = counts and getattr(counts, key)
+        return values
 
+    periods: list[dict[str, object]] = []
+    for t in range(1, solution.problem.periods + 1):
+        at_period: dict[str, object] = {"period": t}
+        for kind, bounds in zip(SetKind, sets, strict=True):
+            at_period[kind.value] = set_json(kind, t, bounds[t])
+        periods.append(at_period)
     return {
         "route": solution.route,
         "route_reason": solution.reason,
         "optimal_miss": solution.optimal.miss,
         "optimal_dimension": solution.optimal.dimension,
         "min_periods": min_periods,
-        "sets": [
-            {
-                "period": t,
-                **{
-                    kind.value: set_json(kind, t, of[t])
-                    for kind, of in zip(SetKind, sets, strict=True)
-                },
-            }
-            for t in range(1, solution.problem.periods + 1)
-        ],
+        "sets": periods,
         "control_ranges": ranges,
     }
 
@@ -224,9 +223,7 @@ def _robust_json(robustness: Robustness) -> dict[str, object]:
 
 
 def report_lines(report: ReachabilityReport) -> Iterator[Part]:
-    """Yield the minimum norm, the tube, the selected controls and the simulations in closed loop,
-    for the screen.
-    """
+    """Yield the minimum norm, the tube, the controls and the simulations, for the screen."""
     rendezvous = report.rendezvous
     solution = report.solution
     minimum = report.min_periods
@@ -248,8 +245,13 @@ def report_lines(report: ReachabilityReport) -> Iterator[Part]:
     yield from ("", table)
     if report.members:
         yield from ("", _members_table(report))
+    yield from _flight_lines(report)
+
+
+def _flight_lines(report: ReachabilityReport) -> Iterator[str]:
+    """Yield the misses in closed loop, and the bounds with disturbances."""
     if report.flight is not None:
-        used = delta_v(rendezvous, report.flight.controls)["sum"]
+        used = delta_v(report.rendezvous, report.flight.controls)["sum"]
         yield (
             "\n"
             f"replanned every period: nonlinear miss {number(report.flight.miss)} {NORM}, Delta-v "
@@ -263,19 +265,14 @@ def report_lines(report: ReachabilityReport) -> Iterator[Part]:
             f"{number(float(np.median(misses)))}, largest {number(max(misses))} {NORM}; "
             f"constraints relaxed by at most {relaxed:.2%}"
         )
-    if report.robustness is not None:
-        conflict = report.robustness.conflict
-        plan = report.robustness.plan
-        yield (
-            "\n"
-            "with disturbances, without feedback: "
-            f"{conflict or 'controls that keep the constraints exist'}"
-        )
-        bound = (
-            report.robustness.refusal
-            if plan is None
-            else f"terminal norm at most {number(plan.worst_miss)} {NORM}"
-        )
+
+    robustness = report.robustness
+    if robustness is not None:
+        fixed = robustness.conflict or "controls that keep the constraints exist"
+        yield f"\nwith disturbances, without feedback: {fixed}"
+        bound = robustness.refusal
+        if robustness.plan is not None:
+            bound = f"terminal norm at most {number(robustness.plan.worst_miss)} {NORM}"
         yield f"with disturbances, with feedback: {bound}"
 
 

@@ -49,9 +49,7 @@ NOISY_FLIGHTS = 10
 def solve_rendezvous(
     rendezvous: Rendezvous, options: Reach, begin: BeginProgress
 ) -> ReachabilityReport:
-    """Return the sets, the selected optimal controls with their trajectories, and the simulations
-    in closed loop.
-    """
+    """Return the sets, the selected controls with trajectories, and the simulations."""
     selection(options.select)  # a mistake is found before anything is computed
     progress = begin(rendezvous.name)
     solution = solve(rendezvous.problem)
@@ -97,8 +95,9 @@ def fly_members(
     controls: Floats,
     truth: NonlinearMotion | None = None,
 ) -> tuple[ChosenControl, ...]:
-    """Simulate controls, shape (k, T, 3), on the linear and on the nonlinear model; `truth`
-    replaces the latter.
+    """Simulate controls, shape (k, T, 3), on the linear and on the nonlinear model.
+
+    `truth` replaces the nonlinear model.
     """
     problem = rendezvous.problem
     linear = problem.run(controls)

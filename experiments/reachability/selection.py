@@ -69,12 +69,10 @@ def select_controls(solution: Solution, options: Reach) -> dict[str, Floats]:
                 raise InputError(
                     f"--select vertices: {error}; choose for example --select samples:20"
                 ) from None
-            controls |= {
-                f"vertex {number}": control for number, control in enumerate(several, start=1)
-            }
+            for number, control in enumerate(several, start=1):
+                controls[f"vertex {number}"] = control
         else:
             several = samples(solution.optimal, count, np.random.default_rng(options.seed))
-            controls |= {
-                f"sample {number}": control for number, control in enumerate(several, start=1)
-            }
+            for number, control in enumerate(several, start=1):
+                controls[f"sample {number}"] = control
     return controls

@@ -24,8 +24,10 @@ _ZERO = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class SystemReport:
-    """Results of one command: sets, shape (T + 1, n, 2), controls, (T, m), and their states, (T +
-    1, n), by name.
+    """Results of one command.
+
+    Sets have shape (T + 1, n, 2). Controls, (T, m), and their states, (T + 1, n), are given by
+    name.
     """
 
     system: ReachableSystem
@@ -55,8 +57,10 @@ def solve_system(system: ReachableSystem, options: Reach, begin: BeginProgress) 
         solution.sets.bounds(kind) + path[..., None] for kind in (SetKind.FORWARD, SetKind.TUBE)
     )
     states = {name: problem.run(control) + path for name, control in controls.items()}
-    still = not np.ptp(path, axis=0).any()  # otherwise another number of periods has another target
-    least = min_periods(problem) if still else None
+
+    # If the target moves, another number of periods has another target.
+    is_fixed = not np.ptp(path, axis=0).any()
+    least = min_periods(problem) if is_fixed else None
     progress(1.0)
     return SystemReport(
         system, solution, least, forward, tube, solution.optimal.ranges(), controls, states
@@ -87,12 +91,12 @@ def motions_csv(report: SystemReport) -> str:
         *(f"x{i + 1}" for i in range(n)),
         *(f"u{j + 1}" for j in range(m)),
     ]
-    rows: list[list[Cell]] = [
-        [name, t, *states[t].tolist(), *(control[t].tolist() if t < len(control) else [None] * m)]
-        for name, control in report.controls.items()
-        for states in [report.states[name]]
-        for t in range(len(states))
-    ]
+    rows: list[list[Cell]] = []
+    for name, control in report.controls.items():
+        # No control acts after the last state.
+        controls: list[list[Cell]] = [*control.tolist(), [None] * m]
+        for t, state in enumerate(report.states[name].tolist()):
+            rows.append([name, t, *state, *controls[t]])
     return csv_text(columns, rows)
 
 
@@ -100,20 +104,19 @@ def report_lines(report: SystemReport) -> Iterator[Part]:
     """Yield the minimum norm, the tube and the selected controls, for the screen."""
     solution = report.solution
     minimum = report.min_periods
-    least = (
-        ""
-        if minimum is None
-        else f"; to reach it takes at least {minimum} period{'s' if minimum > 1 else ''}"
-    )
-    yield f"{report.system.name}: minimum distance from the target {solution.optimal.miss:.9g}{least}"
+    reached = f"minimum distance from the target {solution.optimal.miss:.9g}"
+    if minimum is not None:
+        reached += f"; to reach it takes at least {minimum} period{'s' if minimum > 1 else ''}"
+    yield f"{report.system.name}: {reached}"
     yield from solution_lines(solution)
+
     table = number_table("period", *(f"{name}\nof the tube" for name in report.system.names))
+    zero = _ZERO * np.array(report.system.bounds.states)[:, None]
     for t, row in enumerate(report.tube):
-        shown = np.where(
-            np.abs(row) < _ZERO * np.array(report.system.bounds.states)[:, None], 0.0, row
-        )
+        shown = np.where(np.abs(row) < zero, 0.0, row)
         table.add_row(str(t), *(f"{low:.6g} .. {high:.6g}" for low, high in shown))
     yield from ("", table)
+
     members = number_table("control", "energy\nu^2", "sum of |u|", "peak\n|u|")
     for name, control in report.controls.items():
         size = np.abs(control)

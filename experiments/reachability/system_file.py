@@ -35,8 +35,9 @@ class BoundTable:
 
 @dataclass(frozen=True, kw_only=True)
 class ReachableSystem:
-    """A linear system that is to reach a `target` in T `periods`, from an `initial` state; the
-    default target is 0.
+    """A linear system that is to reach a `target` in T `periods` from an `initial` state.
+
+    The default target is 0.
     """
 
     kind: ClassVar[str] = "reachable-system"
@@ -79,8 +80,9 @@ class ReachableSystem:
 
     @cached_property
     def path(self) -> Floats:
-        """A motion without control that ends at the target, shape (T + 1, n); states are relative
-        to it.
+        """A motion without control that ends at the target, shape (T + 1, n).
+
+        States are relative to it.
         """
         n = len(self.names)
         a = np.array(self.system.A)

@@ -42,8 +42,9 @@ class BoundedEncounter:
 
 @dataclass(frozen=True)
 class NeededBound:
-    """The smallest bound with which a meeting is possible, m/s^2, and the `craft`, by number, that
-    need it.
+    """The smallest bound with which a meeting is possible, m/s^2.
+
+    `craft` are the numbers of the craft that need it.
     """
 
     value_m_s2: float

@@ -128,11 +128,11 @@ def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
 
 
 def _scaled(solution: EncounterSolution) -> tuple[Floats, Floats, Floats, Floats, float, Floats]:
-    """Return the craft of positive weight in coordinates x in which their M are of order one, p =
-    middle + size back x.
+    """Return the craft of positive weight in coordinates x in which their M are of order one.
 
-    The results are the roots of M, `back`, the `middle` of the ideals, the ideals, `size`, which is
-    zero if all ideals coincide, and the weights.
+    The free values are p = middle + size back x. The results are the roots of M, `back`, the
+    `middle` of the ideals, the ideals, `size`, which is zero if all ideals coincide, and the
+    weights.
     """
     costs = [cost for cost in solution.costs if cost.craft.weight > 0.0]
     weights = np.array([cost.craft.weight for cost in costs])

@@ -257,8 +257,9 @@ def certify(solution: CaptureSolution, *, all_directions: bool = False) -> Certi
 def _followed(
     pursuer: Side, evader: Side, radius: float, latest: float, left: float
 ) -> tuple[float | None, bool, float]:
-    """Return the earliest capture or None, whether the branch reached its end, and the remaining
-    work.
+    """Return the earliest capture, or None, of a branch that is followed to its end.
+
+    The other values are whether it reached its end, and the remaining work.
     """
     pair = Pair(pursuer, evader)
     first = pair.begin(latest, radius)
