@@ -18,8 +18,12 @@ import numpy as np
 from infoset.rendezvous._arrays import Floats
 from infoset.rendezvous.pursuit_evasion._pair import FINE, MAX_RESIDUAL, ROUGH, Node, Pair
 
-_LONGEST_STEP, _SHORTEST_STEP = 0.3, 1e-6
+_LONGEST_STEP = 0.3
+"""Longest step of the duration: 20 in a revolution."""
+_SHORTEST_STEP = 1e-6
+"""Shortest step of the duration: a branch that needs a shorter one has a fold."""
 _PREDICTED_WITHIN = 3e-3
+"""Error of a predicted extremal for which steps are chosen: two or three iterations correct it."""
 _TRACKED = 1e-7
 """Tolerance of the propagation of extremals before the capture: a thousandth of the corrections
 that are accepted (`ROUGH`). Captures, and their times, are polished with `FINE`, and do not depend
@@ -76,6 +80,7 @@ def follow(
             return Branch(tuple(nodes), Ending.TIME, work)
         step = left if step > 0.9 * left else step
         work += node.duration + step
+
         guess = _predicted(nodes, node.duration + step)
         after = pair.solve(
             guess,
@@ -86,6 +91,7 @@ def follow(
             linear_tolerance=_TRACKED,
             close=ROUGH,
         )
+
         # The error of a prediction of order three is as the fourth power of the step.
         missed = math.inf if after is None else float(np.abs(after.vector - guess).max())
         if after is not None and pair.is_sound(after) and missed <= 8.0 * _PREDICTED_WITHIN:
@@ -101,6 +107,7 @@ def follow(
                 and node.duration < capture.duration <= after.duration + _SHORTEST_STEP
             ):
                 return Branch((*nodes, capture), Ending.CAPTURE, work)
+
         if step < _SHORTEST_STEP:
             return Branch(tuple(nodes), Ending.FOLD, work)
         step *= 0.4
@@ -125,7 +132,9 @@ def polish(pair: Pair, guess: Floats, duration: float, radius: float, latest: fl
         linear_tolerance=FINE,
         latest=latest,
     )
-    return fine if fine is not None and fine.residual < MAX_RESIDUAL else None
+    if fine is None or not fine.residual < MAX_RESIDUAL:
+        return None
+    return fine
 
 
 def first_crossing(before: Node, after: Node, radius: float) -> float | None:
@@ -139,6 +148,7 @@ def first_crossing(before: Node, after: Node, radius: float) -> float | None:
     dip = 4.0 / 27.0 * step * (abs(before.closing) + abs(after.closing))
     if min(before.distance, after.distance) - dip > radius:
         return None
+
     rise = (after.distance - before.distance) / step
     a = -before.closing
     b = -after.closing
@@ -155,7 +165,9 @@ def first_crossing(before: Node, after: Node, radius: float) -> float | None:
         for root in np.roots(cubic)
         if abs(root.imag) < 1e-9 and 0.0 < root.real < step
     ]
-    return before.duration + min([*times, step]) if times or after.distance <= radius else None
+    if not times and after.distance > radius:
+        return None
+    return before.duration + min([*times, step])
 
 
 def _predicted(nodes: list[Node], duration: float) -> Floats:

@@ -26,18 +26,32 @@ from infoset.rendezvous.pursuit_evasion._extremal import (
     respond,
 )
 
-FINE, COARSE = 1e-13, 1e-9
-"""Tolerances of propagation: of results, and of intermediate iterations."""
+FINE = 1e-13
+"""Tolerance of the propagation of results: some 100 steps keep the residual below 1e-11 (a
+test).
+"""
+COARSE = 1e-9
+"""Tolerance of the propagation of intermediate iterations, and of derivatives."""
 MAX_RESIDUAL = 1e-9
 """Maximum error of a result in the necessary conditions: start states, and r_E - r_P = l nu."""
-CLOSE, ROUGH = 1e-7, 1e-4
-"""Maximum last corrections of Newton's method, for the same; the remaining error is about their
-square.
-"""
+CLOSE = 1e-7
+"""Maximum last correction of Newton's method, of results: its square is below `FINE`."""
+ROUGH = 1e-4
+"""Maximum last correction of Newton's method, of intermediate extremals."""
 _MAX_ITERATIONS = 12
+"""Twice the iterations of a guess with an error of 0.1, whose digits double in each."""
 _FIRST_DURATION = 0.01
+"""Radians: gravity and thrust hardly change in so short a game, so the line of sight is a guess."""
 _MIN_OF_FIRST = 1e-9
-_FARTHEST, _NEAR, _FRACTION, _NEAR_ENOUGH = 0.7, 1e-2, 0.2, 1e-3
+"""Shortest first duration, in radians; chosen: a shorter game is lost in rounding."""
+_FARTHEST = 0.7
+"""Largest correction, in units of length and speed: beyond it another extremal may be found."""
+_NEAR = 1e-2
+"""Largest distance of the first extremal from its guess, which is nearly exact."""
+_FRACTION = 0.2
+"""Ratio of two corrections up to which derivatives are used again."""
+_NEAR_ENOUGH = 1e-3
+"""Correction up to which derivatives are used again."""
 
 
 @dataclass(frozen=True)
@@ -73,10 +87,10 @@ class ExtremalCraft:
     ) -> Floats | None:
         """Return Newton's correction of a guess, (6,), with the derivatives of another."""
         y = end_of(end_state, nu)
-        is_propagated = flow_back(
-            y, NO_VARIATIONS, self.kernel_craft(duration), 0.0, duration, tolerance
-        )
-        return response.inverse @ (self.start - y[:6]) if is_propagated else None
+        craft = self.kernel_craft(duration)
+        if not flow_back(y, NO_VARIATIONS, craft, 0.0, duration, tolerance):
+            return None
+        return response.inverse @ (self.start - y[:6])
 
     def ballistic(self, duration: float, nu: Floats) -> Floats:
         """Return a guess of the end state after a short time, shape (6,).
@@ -84,13 +98,10 @@ class ExtremalCraft:
         Gravity and thrust are constant, as at the start.
         """
         y = np.concatenate([self.start, nu, nu])
-        velocity = (
-            self.start[3:]
-            + duration * rate(y, self.mu, self.oblateness, self.thrust / self.mass)[3:]
-        )
-        return np.concatenate(
-            [self.start[:3] + 0.5 * duration * (self.start[3:] + velocity), velocity]
-        )
+        acceleration = rate(y, self.mu, self.oblateness, self.thrust / self.mass)[3:]
+        velocity = self.start[3:] + duration * acceleration
+        position = self.start[:3] + 0.5 * duration * (self.start[3:] + velocity)
+        return np.concatenate([position, velocity])
 
 
 @dataclass(frozen=True)
@@ -166,7 +177,9 @@ class Node:
         curvature of its boundary has changed from plus to minus infinity, and must stay beyond -l.
         """
         minimum, maximum = self.curvature + self.distance
-        return bool(minimum > 0.0) if self.regular else bool(minimum < 0.0 < maximum)
+        if self.regular:
+            return bool(minimum > 0.0)
+        return bool(minimum < 0.0 < maximum)
 
     @property
     def vector(self) -> Floats:
@@ -222,7 +235,9 @@ class Pair:
 
     def is_sound(self, node: Node) -> bool:
         """Return whether it is a saddle, or a nearest extremal if the evader's path is fixed."""
-        return node.is_nearest if isinstance(self.evader, KnownPath) else node.is_saddle
+        if isinstance(self.evader, KnownPath):
+            return node.is_nearest
+        return node.is_saddle
 
     def solve(
         self,
@@ -258,6 +273,7 @@ class Pair:
             linear = linear or self._linearised(state, max(tolerance, linear_tolerance), time_free)
             if linear is None:
                 return None
+
             if fresh and tolerance >= linear_tolerance:
                 rho = np.array([linear.pursuer.rho, linear.evader.rho])
             else:
@@ -268,6 +284,7 @@ class Pair:
                 if p is None or e is None:
                     return None
                 rho = np.array([p, e])
+
             change, correction = linear.step(rho, state)
             if not correction < min(_FARTHEST, 4.0 * before):
                 return None
@@ -277,6 +294,7 @@ class Pair:
                 return None
             if correction < close:
                 return linear.node(state)
+
             # The first correction only restores the start states: the second may be as great.
             uses = 0 if fresh else uses + 1
             if correction > _NEAR_ENOUGH or (uses > 1 and correction > _FRACTION * before):
@@ -304,13 +322,14 @@ class Pair:
         """
         duration = min(_FIRST_DURATION, 0.5 * latest)
         while duration > _MIN_OF_FIRST:
-            still = np.zeros(3)
-            sight = (
-                self.evader.ballistic(duration, still)[:3]
-                - self.pursuer.ballistic(duration, still)[:3]
-            )
+            # The line of sight of coasting craft.
+            coasting = np.zeros(3)
+            pursuer = self.pursuer.ballistic(duration, coasting)
+            evader = self.evader.ballistic(duration, coasting)
+            sight = evader[:3] - pursuer[:3]
             distance = float(np.linalg.norm(sight))
             nu = sight / distance
+
             guess = np.concatenate(
                 [self.pursuer.ballistic(duration, nu), self.evader.ballistic(duration, nu), nu]
             )

@@ -17,12 +17,31 @@ from infoset.rendezvous.pursuit_evasion._extremal import Response
 from infoset.rendezvous.pursuit_evasion._pair import COARSE, ROUGH, Node, Pair, Side
 
 _DIRECTIONS = 120
-_SEEDS, _MAX_PARTS = 2, 4
-_SHORT, _GAIN, _LONGEST = 1e-7, 1e-6, 40.0
+"""Number of directions of a scan: neighbours are some 20 degrees apart."""
+_SEEDS = 2
+"""Number of solved directions from which another is turned to."""
+_MAX_PARTS = 4
+"""Largest number of parts of a turn between two directions; chosen: each part costs a solution."""
+_SHORT = 1e-7
+"""Distance by which the end of another direction may be farther, the error of `_CONVERGED`."""
+_GAIN = 1e-6
+"""Distance by which another branch must be better, ten times `_SHORT`."""
+_LONGEST = 40.0
+"""Radians, some six revolutions: longest duration that is scanned for a branch."""
 _MAX_ITERATIONS = 8
+"""Twice the iterations of Newton's method between neighbours."""
 _CONVERGED = 1e-5
+"""Largest last correction of Newton's method; the remaining error is about its square."""
 _FARTHEST = 0.5
-_CLIMBS, _MAX_CLIMBING, _APART, _MIN_STRIDE = 4, 40, 0.9, 1e-4
+"""Largest correction of Newton's method: beyond it another extremal may be found."""
+_CLIMBS = 4
+"""Number of directions from which the distance is climbed; a distance has few maxima."""
+_MAX_CLIMBING = 40
+"""Largest number of steps of a climb, of a tenth of a turn or more."""
+_APART = 0.9
+"""Cosine of the smallest angle between two starts of a climb, 26 degrees."""
+_MIN_STRIDE = 1e-4
+"""Smallest step of a climb: Newton's method converges from much farther away."""
 
 
 @dataclass(frozen=True)
@@ -64,9 +83,11 @@ def scan(pair: Pair, node: Node) -> Scan:
     grid = grid[np.argsort(-(grid @ node.nu))]
     pursuer = _fan(pair.pursuer, node.pursuer, node.nu, grid, node.duration)
     evader = _fan(pair.evader, node.evader, node.nu, grid, node.duration)
+
     both = [i for i in range(len(grid)) if i in pursuer and i in evader]
     nu = grid[both]
     distance = np.array([grid[i] @ (evader[i].state - pursuer[i].state)[:3] for i in both])
+
     peaks: list[Node] = []
     for index in _starts(nu, distance):
         peak = _climb(pair, pursuer[both[index]], evader[both[index]], node.duration)
@@ -83,7 +104,9 @@ def greater(pair: Pair, node: Node) -> Node | None:
     if node.duration > _LONGEST:
         return None
     maxima = scan(pair, node).maxima
-    return maxima[0] if maxima and maxima[0].distance > node.distance + _GAIN else None
+    if not maxima or not maxima[0].distance > node.distance + _GAIN:
+        return None
+    return maxima[0]
 
 
 def directions(count: int) -> Floats:
@@ -108,6 +131,8 @@ def _fan(side: Side, state: Floats, nu: Floats, grid: Floats, duration: float) -
             if end is not None:
                 solved[i] = end
                 break
+
+    # Keep a direction only if no other end is farther along it.
     ends = np.array([first.state[:3], *(end.state[:3] for end in solved.values())])
     reach = grid @ ends.T
     return {
@@ -123,9 +148,8 @@ def _turn(side: Side, seed: End, toward: Floats, duration: float) -> End | None:
         for part in range(1, parts + 1):
             nu = seed.nu + (toward - seed.nu) * (part / parts)
             nu = nu / np.linalg.norm(nu)
-            end = end_along(
-                side, here.state + here.response.by_nu @ (here.plane @ (nu - here.nu)), nu, duration
-            )
+            guess = here.state + here.response.by_nu @ (here.plane @ (nu - here.nu))
+            end = end_along(side, guess, nu, duration)
             if end is None:
                 break
             here = end
@@ -183,6 +207,7 @@ def _climb(pair: Pair, pursuer: End, evader: End, duration: float) -> Node | Non
         )
         if peak is not None and peak.is_saddle and peak.distance >= value:
             return peak
+
         slope = rise - value * evader.nu
         while stride > _MIN_STRIDE:
             nu = evader.nu + stride * slope / max(float(np.linalg.norm(slope)), 1e-3)

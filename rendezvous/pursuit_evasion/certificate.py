@@ -1,13 +1,13 @@
 """Checks that a capture is a saddle point, as independent as possible of the solution's method.
 
-The Hamiltonian is that of Wang's slides, "Optimal control": H_P + H_E, constant, and one in their
-scale. The other checks are not from there.
+The Hamiltonian is the one of Wang's slides, "Optimal control": H_P + H_E, constant, and one in
+their scale. The other checks are not from the slides.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -34,19 +34,33 @@ from infoset.rendezvous.pursuit_evasion.solution import CaptureSolution
 from infoset.rendezvous.pursuit_evasion.steering import Policy
 
 MAX_HAMILTONIAN_DRIFT = 1e-8
+"""Relative: the Hamiltonian is constant to the errors of propagation, ten times `MAX_RESIDUAL`."""
 MAX_INTEGRATOR_GAP = 1e-7
 """In units of length: metres of a geostationary orbit."""
 MAX_GAIN_S = 1e-2
+"""Difference of capture times by which a deviation must be better: above their rounding."""
 MAX_EXCESS = 1e-6
 """In units of length: the scan is less accurate than the solution of the game."""
 MAX_UNDECIDED = 0.5
 """Share of the directions that may be undecided in a claim: a scan that compares less than half of
 them has not looked at most of the alternatives. `geo-pursuit` leaves 47 of 120 undecided."""
 
-_PANELS, _POINTS, _MAX_CHANGES = 32, 8, 3
+_PANELS = 32
+"""Number of panels of the integral of the Hamiltonian: one in half a revolution of the longest
+game.
+"""
+_POINTS = 8
+"""Points of the rule on each panel: its error is below the errors of propagation."""
+_MAX_CHANGES = 3
+"""Largest number of changes of branch in the response to a deviation; chosen: each takes
+seconds.
+"""
 _BEYOND = 1.0 + 1e-6
+"""Duration until which responses are followed, by the capture time: includes the capture itself."""
 _SECOND_TOLERANCE = 1e-12
+"""Tolerance of the second integrator, as small as LSODA allows."""
 _MAX_WORK = 2.0 * MAX_WORK
+"""Limit of the work of all deviations together: twice the limit of the game."""
 
 
 @dataclass(frozen=True)
@@ -156,11 +170,9 @@ class Certificate:
         if not self.directions_tried:
             return ("the other directions at the capture were not compared",)
         undecided = self.directions_tried - self.directions_found
-        return (
-            (f"{undecided} of {self.directions_tried} directions were not decided",)
-            if undecided
-            else ()
-        )
+        if not undecided:
+            return ()
+        return (f"{undecided} of {self.directions_tried} directions were not decided",)
 
     @property
     def is_mostly_undecided(self) -> bool:
@@ -202,12 +214,18 @@ def certify(solution: CaptureSolution, *, all_directions: bool = False) -> Certi
     radius = scaled.radius
     paths = extremal_paths(pursuer, evader, node)
     drift, min_distance = _along(paths, node)
+
+    # The pursuer deviates from a fixed evader.
     latest = node.duration * _BEYOND
-    alone, conclusive, left = _followed(
-        pursuer, KnownPath(paths[1].state_at), radius, latest, _MAX_WORK
-    )
-    if alone is None and conclusive:
-        alone = node.duration
+    alone = _followed(pursuer, KnownPath(paths[1].state_at), radius, latest, _MAX_WORK)
+    alone_s: float | None = None
+    if alone.capture is not None:
+        alone_s = alone.capture * units.time_s
+    elif alone.conclusive:
+        alone_s = node.duration * units.time_s
+
+    # The evader deviates, and the pursuer responds.
+    left = alone.work_left
     deviations: list[Deviation] = []
     for policy in Policy if evader.thrust > 0.0 else ():
         try:
@@ -215,23 +233,20 @@ def certify(solution: CaptureSolution, *, all_directions: bool = False) -> Certi
         except PathError:
             deviations.append(Deviation(policy.value, None, False))
             continue
-        found, conclusive, left = _followed(pursuer, KnownPath(path.state_at), radius, latest, left)
-        deviations.append(
-            Deviation(policy.value, None if found is None else found * units.time_s, conclusive)
-        )
-    looked = scan(scaled.pair, node) if all_directions else None
+        response = _followed(pursuer, KnownPath(path.state_at), radius, latest, left)
+        left = response.work_left
+        captured_s = None if response.capture is None else response.capture * units.time_s
+        deviations.append(Deviation(policy.value, captured_s, response.conclusive))
+
+    scanned = scan(scaled.pair, node) if all_directions else None
+    max_excess_m: float | None = None
+    if scanned is not None:
+        peaks = [peak.distance for peak in scanned.maxima]
+        excess = max([float(scanned.distance.max(initial=-np.inf)), *peaks]) - radius
+        if np.isfinite(excess):
+            max_excess_m = float(excess) * units.length_m
+
     earlier_m = solution.curve.distance_m[solution.curve.duration_s < capture.time_s * (1.0 - 1e-9)]
-    excess = None
-    if looked is not None:
-        excess = (
-            max(
-                [
-                    float(looked.distance.max(initial=-np.inf)),
-                    *(peak.distance for peak in looked.maxima),
-                ]
-            )
-            - radius
-        )
     return Certificate(
         residual=capture.residual,
         hamiltonian_drift=drift,
@@ -242,29 +257,31 @@ def certify(solution: CaptureSolution, *, all_directions: bool = False) -> Certi
         no_earlier_capture=bool(len(earlier_m)) and bool((earlier_m > game.capture_radius_m).all()),
         min_distance_m=min_distance * units.length_m,
         above_the_planet=min_distance * units.length_m > game.gravity.planet_radius_m,
-        pursuer_alone_s=None if alone is None else alone * units.time_s,
+        pursuer_alone_s=alone_s,
         evader_deviations=tuple(deviations),
         capture_s=capture.time_s,
-        directions_found=0 if looked is None else len(looked.nu),
-        directions_tried=0 if looked is None else looked.tried,
-        max_excess_m=None
-        if excess is None or not np.isfinite(excess)
-        else float(excess) * units.length_m,
+        directions_found=0 if scanned is None else len(scanned.nu),
+        directions_tried=0 if scanned is None else scanned.tried,
+        max_excess_m=max_excess_m,
         unit_length_m=units.length_m,
     )
 
 
-def _followed(
-    pursuer: Side, evader: Side, radius: float, latest: float, left: float
-) -> tuple[float | None, bool, float]:
-    """Return the earliest capture, or None, of a branch that is followed to its end.
+class _Followed(NamedTuple):
+    """End of a branch: the earliest capture, whether it reached an end, and the remaining work."""
 
-    The other values are whether it reached its end, and the remaining work.
-    """
+    capture: float | None
+    conclusive: bool
+    work_left: float
+
+
+def _followed(pursuer: Side, evader: Side, radius: float, latest: float, left: float) -> _Followed:
+    """Follow the branch of two sides to its capture, or to the latest time."""
     pair = Pair(pursuer, evader)
     first = pair.begin(latest, radius)
     if first is None:
-        return None, False, left
+        return _Followed(None, False, left)
+
     branch = follow(pair, first, radius, latest, left)
     left -= branch.work
     for _ in range(_MAX_CHANGES):
@@ -274,8 +291,8 @@ def _followed(
         branch = follow(pair, better, radius, latest, left)
         left -= branch.work
     if branch.ending is Ending.CAPTURE:
-        return branch.last.duration, True, left
-    return None, branch.ending is Ending.TIME, left
+        return _Followed(branch.last.duration, True, left)
+    return _Followed(None, branch.ending is Ending.TIME, left)
 
 
 def _along(paths: tuple[ExtremalPath, ExtremalPath], node: Node) -> tuple[float, float]:
@@ -340,9 +357,8 @@ def _forward_rates(time: float, y: Floats, craft: ExtremalCraft) -> Floats:
     p = y[9:]
     size = float(np.linalg.norm(p))
     out[:3] = y[3:6]
-    out[3:6] = _gravity(y[:3], craft) + craft.thrust / (craft.mass - craft.flow * time) * p / max(
-        size, 1e-300
-    )
+    push = craft.thrust / (craft.mass - craft.flow * time)
+    out[3:6] = _gravity(y[:3], craft) + push * p / max(size, 1e-300)
     out[6:9] = -_gravity(y[:3] + 1e-30j * p, craft).imag / 1e-30
     out[9:] = -y[6:9]
     return out

@@ -23,9 +23,18 @@ PathNow = Callable[[float], Floats]
 HIT_M = 100.0
 """Distance that counts as capture of a point: the accuracy of a last leg without observation."""
 
-_OUTPUT_TIMES = 65
-_PAST, _WIDE, _PATIENCE = 1.05, 2.0, 1.0
-_MAX_PLANS, _LONGEST = 10_000, 1e3
+_LOOKS = 65
+"""Number of times in a leg at which the distance is computed before its minimum is refined."""
+_PAST = 1.05
+"""Length of the last leg by the time to the predicted capture, to include the closest approach."""
+_WIDE = 2.0
+"""Factor of the drift of a leg within which a capture is looked for: thrust adds to the drift."""
+_PATIENCE = 1.0
+"""Delay of a capture, by the time to it, up to which a plan from scratch replaces the last one."""
+_MAX_PLANS = 10_000
+"""Largest number of plans: five times the default of the command, `MAX_PLANS`."""
+_LONGEST = 1e3
+"""Longest game of a plan, in radians; chosen: above the longest duration of any game by default."""
 
 
 @dataclass(frozen=True)
@@ -43,9 +52,7 @@ class Observation:
     @property
     def is_exact(self) -> bool:
         """Whether the pursuer observes the evader exactly."""
-        return (
-            self.delay_s == 0.0 and self.position_error_m == 0.0 and self.velocity_error_m_s == 0.0
-        )
+        return not any((self.delay_s, self.position_error_m, self.velocity_error_m_s))
 
 
 class Ended(Enum):
@@ -87,9 +94,9 @@ def fly(
 ) -> PursuitFlight:
     """Simulate a pursuer that computes and follows a new plan at times `replan_s` apart.
 
-    `steering` is that of the evader; None is optimal against the true state of the pursuer. No
-    `observation` observes the evader exactly; otherwise `seed` is that of its errors. `solution` is
-    that of the game, if it is known.
+    `steering` steers the evader; None is optimal against the true state of the pursuer. No
+    `observation` means that the evader is observed exactly; otherwise `seed` determines the errors.
+    `solution` is the solution of the game, if it is known.
 
     Raises
     ------
@@ -162,11 +169,13 @@ class _Pursuit:
             ended = self._end_in_leg(pursuer, evader, spell, last)
             if ended is not None:
                 return ended
+
             self._past.append((self._time, evader))
             mass = self._pursuer.mass - self._pursuer.flow * spell
             self._pursuer = replace(self._pursuer, start=pursuer.at(spell)[:6], mass=mass)
             self._evader = replace(self._evader, start=evader(spell), mass=evader_mass)
             self._time += spell
+
             planned = self._plan(plan, spell, self._seen(plan))
             known = plan
             if planned is None:
@@ -184,10 +193,10 @@ class _Pursuit:
             evader = replace(evader, thrust=0.0, flow=0.0)
         pair = Pair(self._pursuer, evader)
         latest = min(_lasts(self._pursuer, self._dry[0]), _lasts(evader, self._dry[1]), _LONGEST)
-        kept = (
-            replace(before, duration=before.duration - spell) if before.duration > spell else None
-        )
-        if kept is not None:
+
+        kept: Node | None = None
+        if before.duration > spell:
+            kept = replace(before, duration=before.duration - spell)
             node = pair.solve(
                 kept.vector,
                 kept.duration,
@@ -200,10 +209,14 @@ class _Pursuit:
                 return node
         if float(np.linalg.norm(evader.start[:3] - self._pursuer.start[:3])) <= self._radius:
             return kept
+
+        afresh: Node | None = None
         first = pair.begin(latest, self._radius)
-        branch = None if first is None else follow(pair, first, self._radius, latest, self._work)
-        self._work -= 0.0 if branch is None else branch.work
-        afresh = branch.last if branch is not None and branch.ending is Ending.CAPTURE else None
+        if first is not None:
+            branch = follow(pair, first, self._radius, latest, self._work)
+            self._work -= branch.work
+            if branch.ending is Ending.CAPTURE:
+                afresh = branch.last
         # Near the end a point may be unreachable by metres: a near miss is better than another
         # revolution.
         if kept is not None and (
@@ -217,6 +230,7 @@ class _Pursuit:
         if self._steering is None:
             path = ExtremalPath(self._evader, own.evader, own.nu, own.duration)
             return (lambda time: path.at(time)[:6]), self._evader.mass - self._evader.flow * spell
+
         units = self._units
         begin = self._time
         steering = self._steering
@@ -224,42 +238,36 @@ class _Pursuit:
         spent = self._evader.mass <= self._dry[1] + self._evader.flow * spell
 
         def direction(time: float, state: Floats) -> Floats:
-            return (
-                np.zeros(3)
-                if spent
-                else np.asarray(steering((begin + time) * units.time_s, state * scale))
-            )
+            if spent:
+                return np.zeros(3)
+            return np.asarray(steering((begin + time) * units.time_s, state * scale))
 
         steered = steered_path(self._evader, direction, spell)
-        return (lambda time: np.asarray(steered.solution(time)[:6])), float(
-            steered.solution(spell)[6]
-        )
+        mass = float(steered.solution(spell)[6])
+        return (lambda time: np.asarray(steered.solution(time)[:6])), mass
 
     def _seen(self, plan: Node) -> ExtremalCraft:
         """Return the evader as the pursuer observes it."""
         seen = self._observation
         if seen.is_exact:
             return self._evader
+
         delay = min(seen.delay_s / self._units.time_s, self._time)
         state = self._evader.start
         if delay > 0.0:
             at = self._time - delay
             begin, path = next(leg for leg in reversed(self._past) if leg[0] <= at)
             state = path(at - begin)
-        errors = np.repeat(
-            [
-                seen.position_error_m / self._units.length_m,
-                seen.velocity_error_m_s / self._units.speed_m_s,
-            ],
-            3,
-        )
+
+        position_error = seen.position_error_m / self._units.length_m
+        velocity_error = seen.velocity_error_m_s / self._units.speed_m_s
+        errors = np.repeat([position_error, velocity_error], 3)
         state = state + errors * self._random.standard_normal(6)
         if delay > 0.0:
             # As in the plan: full thrust in its current direction, which turns slowly.
             believed = plan.costates[1][3:]
-            since = steered_path(
-                replace(self._evader, start=state), lambda _time, _state: believed, delay
-            )
+            delayed = replace(self._evader, start=state)
+            since = steered_path(delayed, lambda _time, _state: believed, delay)
             state = since.state_at(delay)[0]
         return replace(self._evader, start=state)
 
@@ -279,19 +287,22 @@ class _Pursuit:
             return None
         if self._radius == 0.0 and not last:
             return None
-        times = np.linspace(0.0, spell, _OUTPUT_TIMES)
+
+        times = np.linspace(0.0, spell, _LOOKS)
         values = np.array([distance(time) for time in times])
         if self._radius > 0.0:
             inside = np.flatnonzero(values <= self._radius)
             if not len(inside):
                 return None
             first = int(inside[0])
-            at = (
-                brentq(lambda time: distance(time) - self._radius, times[first - 1], times[first])
-                if first
-                else 0.0
-            )
+            at = 0.0
+            if first:
+                at = brentq(
+                    lambda time: distance(time) - self._radius, times[first - 1], times[first]
+                )
             return self._flight(Ended.CAPTURED, self._time + at, distance(at))
+
+        # The last leg to a point: its closest approach.
         near = int(np.argmin(values))
         low = times[max(0, near - 1)]
         high = times[min(_OUTPUT_TIMES - 1, near + 1)]
@@ -325,5 +336,7 @@ def _lasts(craft: ExtremalCraft, dry: float) -> float:
 
     It is a little less for a craft without dry mass, whose acceleration diverges.
     """
+    if not craft.flow > 0.0:
+        return np.inf
     share = 1.0 if dry > 0.0 else 0.999
-    return share * (craft.mass - dry) / craft.flow if craft.flow > 0.0 else np.inf
+    return share * (craft.mass - dry) / craft.flow

@@ -1,6 +1,6 @@
 """The game: two craft with thrust, in a planet's gravity, and the distance that counts as capture.
 
-It is that of Wang's slides (Bauman University), after Shen and Casalino, Journal of Guidance,
+It is the game of Wang's slides (Bauman University), after Shen and Casalino, Journal of Guidance,
 Control, and Dynamics 41(8), 2018, p. 1823. Its nondimensional form has units of length, time and
 mass for which mu is one.
 """
@@ -18,6 +18,7 @@ from infoset.rendezvous.two_body import orbit_fault, semi_major_axis_m
 Vector = tuple[float, float, float]
 
 STANDARD_GRAVITY_M_S2 = 9.80665
+"""Standard acceleration of gravity, exact by definition: CGPM, 1901."""
 LONGEST_REVOLUTIONS = 15.0
 """Default of the longest duration of a game, in revolutions of the pursuer."""
 
@@ -85,9 +86,9 @@ class Player:
     @property
     def burn_time_s(self) -> float:
         """Return the time until the propellant is spent; infinite without mass flow."""
-        return (
-            (self.mass_kg - self.dry_mass_kg) / self.flow_kg_s if self.flow_kg_s > 0.0 else math.inf
-        )
+        if not self.flow_kg_s > 0.0:
+            return math.inf
+        return (self.mass_kg - self.dry_mass_kg) / self.flow_kg_s
 
     @property
     def acceleration_m_s2(self) -> float:
@@ -186,9 +187,9 @@ def units_of(game: Game) -> Units:
 def scaled_craft(player: Player, gravity: Gravity, units: Units) -> ExtremalCraft:
     """Return a player as a nondimensional craft."""
     force = units.mass_kg * units.length_m / units.time_s**2
+    state_units = np.repeat([units.length_m, units.speed_m_s], 3)
     return ExtremalCraft(
-        start=np.array([*player.position_m, *player.velocity_m_s])
-        / np.repeat([units.length_m, units.speed_m_s], 3),
+        start=np.array([*player.position_m, *player.velocity_m_s]) / state_units,
         thrust=player.thrust_n / force,
         mass=player.mass_kg / units.mass_kg,
         flow=player.flow_kg_s * units.time_s / units.mass_kg,
@@ -200,15 +201,12 @@ def scaled_craft(player: Player, gravity: Gravity, units: Units) -> ExtremalCraf
 def scaled_game(game: Game, units: Units | None = None) -> ScaledGame:
     """Return a nondimensional game; without `units` those of `units_of` are used."""
     units = units or units_of(game)
-    pursuer, evader = (
-        scaled_craft(player, game.gravity, units) for player in (game.pursuer, game.evader)
-    )
     return ScaledGame(
         units,
-        pursuer,
-        evader,
-        game.capture_radius_m / units.length_m,
-        horizon_s(game) / units.time_s,
+        pursuer=scaled_craft(game.pursuer, game.gravity, units),
+        evader=scaled_craft(game.evader, game.gravity, units),
+        radius=game.capture_radius_m / units.length_m,
+        latest=horizon_s(game) / units.time_s,
     )
 
 

@@ -23,8 +23,10 @@ from infoset.rendezvous.pursuit_evasion.solution import CaptureSolution
 Direction = Callable[[float, Floats], Floats]
 """Direction of thrust, shape (3,), of a time and a state: any length, zero to coast."""
 
-_TOLERANCE = 1e-12
+_PATH_TOLERANCE = 1e-12
+"""Tolerance of steered paths, near the smallest that DOP853 reaches."""
 _MAX_RATES = 50_000
+"""Largest number of evaluations in a path: about a second, and 50 times a path without turns."""
 
 
 class PathError(ArithmeticError):
@@ -67,9 +69,8 @@ class ExtremalPath:
         return y[:6], rate(y, self.craft.mu, self.craft.oblateness, self.craft.thrust / mass)[3:]
 
     def _carry(self, y: Floats, begin: float, end: float) -> None:
-        if not flow_back(
-            y, NO_VARIATIONS, self.craft.kernel_craft(self.duration), begin, end, FINE
-        ):
+        craft = self.craft.kernel_craft(self.duration)
+        if not flow_back(y, NO_VARIATIONS, craft, begin, end, FINE):
             raise PathError("an extremal of the solution cannot be propagated")
 
 
@@ -120,8 +121,8 @@ def steered_path(craft: ExtremalCraft, direction: Direction, duration: float) ->
         (0.0, duration),
         np.append(craft.start, craft.mass),
         method="DOP853",
-        rtol=_TOLERANCE,
-        atol=_TOLERANCE,
+        rtol=_PATH_TOLERANCE,
+        atol=_PATH_TOLERANCE,
         dense_output=True,
     )
     if not path.success:
@@ -131,7 +132,8 @@ def steered_path(craft: ExtremalCraft, direction: Direction, duration: float) ->
 
 def _rates(time: float, state: Floats, craft: ExtremalCraft, direction: Direction) -> Floats:
     y = np.zeros(STATES)
-    y[:6], y[9:] = state[:6], direction(time, state[:6])
+    y[:6] = state[:6]
+    y[9:] = direction(time, state[:6])
     out = np.zeros(7)
     out[:6] = rate(y, craft.mu, craft.oblateness, craft.thrust / state[6])
     out[6] = -craft.flow if y[9:].any() else 0.0
@@ -200,11 +202,14 @@ def _sampled(path: ExtremalPath, times: Floats, units: Units) -> PlayerHistory:
     craft = path.craft
     mass = craft.mass - craft.flow * times
     size = np.linalg.norm(y[:, 9:], axis=1)
-    direction = np.where(size[:, None] > 0.0, y[:, 9:] / np.maximum(size, 1e-300)[:, None], path.nu)
+    along_costate = y[:, 9:] / np.maximum(size, 1e-300)[:, None]
+    direction = np.where(size[:, None] > 0.0, along_costate, path.nu)
+
     # The costate of the mass, by the trapezoid rule: this is drawn, not computed with.
     rate = size * craft.flow / mass**2
     lost = np.append(np.cumsum((0.5 * (rate[1:] + rate[:-1]) * np.diff(times))[::-1])[::-1], 0.0)
     switching = size / mass + lost
+
     return PlayerHistory(
         position_m=y[:, :3] * units.length_m,
         velocity_m_s=y[:, 3:6] * units.speed_m_s,

@@ -18,6 +18,7 @@ from infoset.rendezvous.pursuit_evasion.solution import (
 )
 
 _MAX_BRANCHES = 6
+"""Largest number of changes of branch; chosen: each search takes seconds."""
 
 
 def solve(
@@ -47,6 +48,7 @@ def solve(
         return CaptureSolution(
             game, units, CertificateVerdict.BRANCH_NOT_CERTIFIED, None, 0, empty, 0.0
         )
+
     nodes: list[Node] = []
     branch = follow(pair, first, radius, latest)
     changes = 0
@@ -59,9 +61,10 @@ def solve(
             break
         nodes += branch.nodes if branch.ending is Ending.FOLD else branch.nodes[:-1]
         branch = follow(pair, better, radius, latest, MAX_WORK - work)
-        changes = changes + 1
-        work = work + branch.work
+        changes += 1
+        work += branch.work
     nodes += branch.nodes
+
     curve = DistanceCurve(
         np.array([node.duration for node in nodes]) * units.time_s,
         np.array([node.distance for node in nodes]) * units.length_m,
@@ -70,11 +73,9 @@ def solve(
     looked_at_s = branch.last.duration * units.time_s
     if branch.ending is Ending.CAPTURE:
         capture = _capture(game, units, branch.last)
-        verdict = (
-            CertificateVerdict.CAPTURED
-            if capture.is_local_saddle
-            else CertificateVerdict.BRANCH_NOT_CERTIFIED
-        )
+        verdict = CertificateVerdict.BRANCH_NOT_CERTIFIED
+        if capture.is_local_saddle:
+            verdict = CertificateVerdict.CAPTURED
         return CaptureSolution(game, units, verdict, capture, changes, curve, looked_at_s)
     if branch.ending is Ending.TIME:
         verdict, exhausted = _uncaptured(game)
@@ -113,13 +114,11 @@ def _uncaptured(game: Game) -> tuple[CertificateVerdict, str | None]:
     pursuer = game.pursuer
     evader = game.evader
     end_s = horizon_s(game)
+    # More than the 0.999 of `horizon_s`, by which a game ends before its propellant.
     slack = 1.0 - 2e-3
     if evader.burn_time_s * slack <= end_s and evader.burn_time_s < pursuer.burn_time_s:
         return CertificateVerdict.PROPELLANT_EXHAUSTED, "evader"
     spent = "pursuer" if pursuer.burn_time_s * slack <= end_s else None
-    stronger = pursuer.acceleration_m_s2 > evader.acceleration_m_s2
-    return (
-        CertificateVerdict.PROPELLANT_EXHAUSTED
-        if spent and stronger
-        else CertificateVerdict.ESCAPES
-    ), spent
+    if spent and pursuer.acceleration_m_s2 > evader.acceleration_m_s2:
+        return CertificateVerdict.PROPELLANT_EXHAUSTED, spent
+    return CertificateVerdict.ESCAPES, spent
