@@ -6,7 +6,7 @@ They list, show, copy and check files.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, NamedTuple
@@ -169,7 +169,7 @@ class _Checked(NamedTuple):
 
     name: str
     fingerprint: str
-    keys: dict[str, object]
+    keys: Mapping[str, object]
     facts: Sequence[str] = ()
     warnings: Sequence[str] = ()
 

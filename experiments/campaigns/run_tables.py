@@ -168,7 +168,7 @@ def correlations(folder: CampaignFolder) -> pd.DataFrame:
     """
     # Components of one step share the ranks of the miss.
     start = start_columns(folder.manifest.scenario)
-    groups = [(name,) for name in start]
+    groups: list[tuple[str, ...]] = [(name,) for name in start]
     if fits(("miss_m", *start), folder.finished_runs):
         groups = [start]
     steps = [Step(("miss_m", *names), _correlations_with_miss) for names in groups]
@@ -254,7 +254,7 @@ def _rows_of_worst(folder: CampaignFolder) -> pd.DataFrame:
 def heading(folder: CampaignFolder) -> dict[str, Any]:
     """Return the keys with which every JSON file of a campaign or a sweep begins."""
     manifest = folder.manifest
-    keys = {
+    keys: dict[str, Any] = {
         "versions": versions(),
         "kind": manifest.kind,
         "scenario": manifest.scenario.name,

@@ -160,7 +160,8 @@ def limits(table: SweepTable) -> pd.DataFrame:
 def _limits_along(axis: Axis, cells: pd.DataFrame) -> Iterator[dict[str, float]]:
     above = above_bound(cells)
     met = (cells["requirement"] == Decision.MET.value).to_numpy()
-    decided = np.flatnonzero(met | (cells["requirement"] == Decision.NOT_MET.value))
+    is_decided = met | (cells["requirement"] == Decision.NOT_MET.value)
+    decided = np.flatnonzero(is_decided).tolist()
 
     for left, right in itertools.pairwise(decided):
         if met[left] == met[right]:
@@ -185,7 +186,8 @@ def _between(axis: Axis, left: int, right: int, share: float) -> float:
     near = axis.values[left]
     far = axis.values[right]
     if axis.scale == "log":
-        return near * (far / near) ** share
+        value: float = near * (far / near) ** share
+        return value
     return near + share * (far - near)
 
 

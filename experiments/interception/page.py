@@ -113,7 +113,7 @@ def _sets_of(
     for previous, step in zip([-2, *kept], kept, strict=False):
         if step != previous + 1:
             sets.states.append(before[step])
-        sets.states += [record.sections[step], before[step + 1]]
+        sets.states.extend([record.sections[step], before[step + 1]])
         count = len(sets.states)
         sets.of_step.append((count - 3, count - 2, count - 1))
     return sets

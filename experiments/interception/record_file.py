@@ -163,7 +163,7 @@ def _to_arrays(record: Record) -> Arrays:
         missing = unknown if kind.is_lateral else unknown[:, 0]
         arrays[name] = record.measured.get(kind.name, missing)
     for name, column in _RESULT.items():
-        values = np.ma.asarray(getattr(record.result, column.field), float)
+        values: Any = np.ma.asarray(getattr(record.result, column.field), float)
         arrays[name] = np.ma.filled(values, np.nan)
     return {name: np.asarray(values, dtype=MEMBERS[name].dtype) for name, values in arrays.items()}
 
