@@ -1,5 +1,4 @@
-"""The set of differences of two motions along one axis with equal measurements, and its farthest
-member.
+"""Differences of two motions along one axis with equal measurements, and the farthest one.
 
 The difference of two motions with the same impulses, pulled back to t = 0, is a vector s of offset
 and velocity. To first order, the differences with equal measurements are (Theorem 5a of
@@ -26,10 +25,12 @@ from infoset.sensors import Sensor
 from infoset.sim.bound.coasting import Coasting
 
 MARGIN = 1e-6
-"""Reserve as a share of each limit, for rounding in flights of the two motions."""
+"""Reserve as a share of each limit, for rounding in flights of the two motions. Chosen: it lowers a
+bound by a millionth, and the errors in simulated pairs stay within their bounds (test_pair_flight).
+"""
 POSITION, PREDICTED_MISS = 0, 1
-"""Columns of the strips of a step: limits of the difference of the positions w, and of that of w +
-V_w x/c.
+"""Columns of the strips of a step: limits of the differences of the positions w, and of the
+predicted misses w + V_w x/c.
 """
 
 
@@ -53,21 +54,22 @@ class FarthestDifference(NamedTuple):
 
 
 class Segments(NamedTuple):
-    """Segments [-1, 1] (x, y) whose sum is a set, in the order of their angles from 0 to pi, and
-    their origin.
+    """Segments [-1, 1] (x, y) whose sum is a set, in the order of their angles from 0 to pi.
+
+    Each segment has a number in the order in which segments were made. Cuts remove segments or
+    parts of them, and make a new segment of the parts.
 
     Parameters
     ----------
     x, y : ndarray
-        What is left of each segment of the sum.
+        The rest of each segment of the sum, in the order of the angles.
     number, share : ndarray
-        Number of the segment that it was, in the order in which segments were made, and the share
-        of it that is left.
+        Number of the whole segment, and the share of it that is left, in the same order.
     first_part : ndarray
-        First of the parts of each segment ever made, by its number.
+        Index of the first part of each segment ever made, by its number.
     part, part_share : ndarray
-        Number of the segment of each part, and the share of it that is the part, negative if it is
-        reversed.
+        For each part: the number of the segment that it comes from, and its share of this segment,
+        negative if it is reversed.
     """
 
     x: Floats
@@ -112,8 +114,9 @@ def insert_segment(
 
 @allocation_free
 def add_segment(segments: Segments, count: int, made: int, x: float, y: float) -> tuple[int, float]:
-    """Add a segment to the sum; return the number of segments and the sign of its direction from 0
-    to pi.
+    """Add a segment to the sum, and return the number of segments and a sign.
+
+    The stored segment is the sign times (x, y), so that its angle is from 0 to pi.
     """
     sign = 1.0
     if y < 0.0 or (y == 0.0 and x < 0.0):
@@ -125,63 +128,67 @@ def add_segment(segments: Segments, count: int, made: int, x: float, y: float) -
     return count, sign
 
 
-@allocation_free
-def cut_by_strip(
-    segments: Segments, count: int, made: int, normal_x: float, normal_y: float, limit: float
-) -> tuple[int, int]:
-    """Cut the sum by abs(normal s) <= limit; return the number of its segments and of those made so
-    far.
+class Strip(NamedTuple):
+    """Normal of a strip abs(normal s) <= limit, and direction of its border, from 0 to pi."""
 
-    Lemma 20a: the corner is the vertex where abs(normal s) is greatest. On each side of it segments
-    are removed, the last one in part, until each side has lost half of the excess of the corner
-    over the limit. The new segment along the border is the sum of what was removed. Its signs
-    follow from the order of the segments, because that of a height is rounded if a segment is
-    parallel to the border. Cost: O(count).
+    normal_x: float
+    normal_y: float
+    border_x: float
+    border_y: float
+
+
+class Removed(NamedTuple):
+    """Sum of what a cut removed.
+
+    Parameters
+    ----------
+    parts : int
+        Number of all parts so far, also of earlier segments.
+    length : float
+        Component of the sum along the border, times the length of the border's direction.
     """
-    height = 0.0
-    for i in range(count):
-        height += abs(normal_x * segments.x[i] + normal_y * segments.y[i])
-    excess = height - limit
-    if not excess > 0.0:
-        return count, made
 
+    parts: int
+    length: float
+
+
+@allocation_free
+def strip_of(normal_x: float, normal_y: float) -> Strip:
+    """Return the strip with a normal."""
     border_x = -normal_y
     border_y = normal_x
     if border_y < 0.0 or (border_y == 0.0 and border_x < 0.0):
         border_x = -border_x
         border_y = -border_y
-    corner = find_place(segments, count, border_x, border_y)
+    return Strip(normal_x, normal_y, border_x, border_y)
 
-    length = 0.0
-    parts = segments.first_part[made]
-    for side in range(2):
-        to_remove = 0.5 * excess
-        for step in range(count):
-            if to_remove <= 0.0:
-                break
-            if side == 0:
-                i = (corner + step) % count
-                sign = 1.0 if i >= corner else -1.0
-            else:
-                i = (corner - 1 - step) % count
-                sign = 1.0 if i < corner else -1.0
-            if segments.share[i] == 0.0:
-                continue
 
-            lost = abs(normal_x * segments.x[i] + normal_y * segments.y[i])
-            removed = 1.0 if lost <= to_remove else to_remove / lost
-            to_remove -= lost
-            length += sign * removed * (border_x * segments.x[i] + border_y * segments.y[i])
-            segments.part[parts] = segments.number[i]
-            segments.part_share[parts] = sign * removed * segments.share[i]
-            parts += 1
-            left = 1.0 - removed
-            segments.x[i] *= left
-            segments.y[i] *= left
-            segments.share[i] *= left
+@allocation_free
+def remove_part(
+    segments: Segments, i: int, sign: float, to_remove: float, strip: Strip, removed: Removed
+) -> tuple[float, Removed]:
+    """Remove a segment, or the part of it with the height `to_remove`.
 
+    Return the height that is still to be removed, not positive if the segment was enough, and the
+    sum of what was removed. `sign` is the sign of the segment in this sum.
+    """
+    height = abs(strip.normal_x * segments.x[i] + strip.normal_y * segments.y[i])
+    share = 1.0 if height <= to_remove else to_remove / height
+    along = strip.border_x * segments.x[i] + strip.border_y * segments.y[i]
+    segments.part[removed.parts] = segments.number[i]
+    segments.part_share[removed.parts] = sign * share * segments.share[i]
+
+    left = 1.0 - share
+    segments.x[i] *= left
+    segments.y[i] *= left
+    segments.share[i] *= left
+    return to_remove - height, Removed(removed.parts + 1, removed.length + sign * share * along)
+
+
+@allocation_free
+def remove_whole_segments(segments: Segments, count: int) -> int:
+    """Close the gaps of segments of which nothing is left, and return the number of the others."""
     kept = 0
-    place = 0
     for i in range(count):
         if segments.share[i] == 0.0:
             continue
@@ -190,13 +197,80 @@ def cut_by_strip(
         segments.number[kept] = segments.number[i]
         segments.share[kept] = segments.share[i]
         kept += 1
-        if i < corner:
-            place = kept
-    segments.first_part[made + 1] = parts
-    length /= border_x * border_x + border_y * border_y
+    return kept
+
+
+@allocation_free
+def cut_by_strip(
+    segments: Segments, count: int, made: int, normal_x: float, normal_y: float, limit: float
+) -> tuple[int, int]:
+    """Cut the sum by abs(normal s) <= limit; return its number of segments, and of all ever made.
+
+    Lemma 20a: the corner is the vertex where abs(normal s) is greatest. On each side of it segments
+    are removed, the last one in part, until each side has lost half of the excess of the corner
+    over the limit. The new segment along the border is the sum of the removed parts. Their signs
+    follow from the order of the segments: the sign of a height is rounding if a segment is parallel
+    to the border. Cost: O(count).
+    """
+    height = 0.0
+    for i in range(count):
+        height += abs(normal_x * segments.x[i] + normal_y * segments.y[i])
+    excess = height - limit
+    if not excess > 0.0:
+        return count, made
+
+    # Segments with a smaller angle than the border are before the corner.
+    strip = strip_of(normal_x, normal_y)
+    corner = find_place(segments, count, strip.border_x, strip.border_y)
+
+    removed = Removed(segments.first_part[made], 0.0)
+    for side in range(2):
+        to_remove = 0.5 * excess
+        for step in range(count):
+            if to_remove <= 0.0:
+                break
+            # Away from the corner; past the end of the list the edges are reversed segments.
+            i = (corner + step) % count if side == 0 else (corner - 1 - step) % count
+            sign = 1.0 if (i >= corner) == (side == 0) else -1.0
+            if segments.share[i] > 0.0:
+                to_remove, removed = remove_part(segments, i, sign, to_remove, strip, removed)
+
+    place = 0
+    for i in range(corner):
+        if segments.share[i] > 0.0:
+            place += 1
+    count = remove_whole_segments(segments, count)
+
+    segments.first_part[made + 1] = removed.parts
+    border_square = strip.border_x * strip.border_x + strip.border_y * strip.border_y
+    length = removed.length / border_square
     if length > 0.0:
-        kept = insert_segment(segments, kept, place, length * border_x, length * border_y, made)
-    return kept, made + 1
+        x = length * strip.border_x
+        y = length * strip.border_y
+        count = insert_segment(segments, count, place, x, y, made)
+    return count, made + 1
+
+
+@allocation_free
+def write_shares(
+    segments: Segments, count: int, made: int, towards: Floats, shares: Floats
+) -> None:
+    """Write the shares of the segments ever made, in [-1, 1] up to rounding, in the farthest one.
+
+    The signs of the segments of the sum are passed down to the parts of each, the youngest first.
+    """
+    for i in range(count):
+        along = towards[0] * segments.x[i] + towards[1] * segments.y[i]
+        shares[segments.number[i]] = segments.share[i] if along >= 0.0 else -segments.share[i]
+    for number in range(made - 1, -1, -1):
+        for part in range(segments.first_part[number], segments.first_part[number + 1]):
+            shares[segments.part[part]] += shares[number] * segments.part_share[part]
+
+
+@allocation_free
+def within_one(value: float) -> float:
+    """Return a number limited to [-1, 1]: a sum of shares exceeds it by rounding."""
+    return min(1.0, max(-1.0, value))
 
 
 @compiled
@@ -221,8 +295,9 @@ def farthest_difference(
         Number of steps whose strips cut.
     """
     steps, strips = limits.shape
+    # Each width, acceleration and cut makes at most one segment. A strip removes at most two
+    # segments in part, and each segment is removed as a whole once.
     made_at_most = 2 + steps + common * strips
-    # A strip removes at most two segments in part, and each segment is removed as a whole once.
     parts_at_most = made_at_most + 2 * common * strips
     segments = Segments(
         np.empty(made_at_most),
@@ -233,12 +308,15 @@ def farthest_difference(
         np.empty(parts_at_most, dtype=np.int64),
         np.empty(parts_at_most),
     )
+    signs = np.empty(made_at_most)
+    number_of_push = np.empty(common, dtype=np.int64)
+
+    # Distance by the accelerations after each step, which no measurement limits.
     later = np.zeros(steps + 1)
     for k in range(steps - 1, -1, -1):
         later[k] = later[k + 1] + abs(towards[0] * pushes[k, 0] + towards[1] * pushes[k, 1])
 
-    signs = np.empty(made_at_most)
-    number_of_push = np.empty(common, dtype=np.int64)
+    # S_0: the segments 0 and 1 are the offset and the velocity.
     count = ZERO
     made = ZERO
     for i in range(2):
@@ -246,6 +324,7 @@ def farthest_difference(
         width_y = widths[1] if i == 1 else 0.0
         count, signs[made] = add_segment(segments, count, made, width_x, width_y)
         made += 1
+
     farthest = np.empty(common + 1)
     farthest[0] = abs(towards[0] * widths[0]) + abs(towards[1] * widths[1]) + later[0]
     for k in range(common):
@@ -255,37 +334,39 @@ def farthest_difference(
                 count, made = cut_by_strip(
                     segments, count, made, normal[0], normal[1], limits[k, strip]
                 )
+
         farthest[k + 1] = later[k]
         for i in range(count):
             farthest[k + 1] += abs(towards[0] * segments.x[i] + towards[1] * segments.y[i])
+
+        # The accelerations after the last common step are not limited: `later` contains them.
         if k + 1 < common:
             count, signs[made] = add_segment(segments, count, made, pushes[k, 0], pushes[k, 1])
             number_of_push[k] = made
             made += 1
 
-    # The signs of the segments of the sum, passed down to the parts of each, the youngest one
-    # first.
-    values = np.zeros(made)
-    for i in range(count):
-        along = towards[0] * segments.x[i] + towards[1] * segments.y[i]
-        values[segments.number[i]] = segments.share[i] if along >= 0.0 else -segments.share[i]
-    for number in range(made - 1, -1, -1):
-        for part in range(segments.first_part[number], segments.first_part[number + 1]):
-            values[segments.part[part]] += values[number] * segments.part_share[part]
-
+    shares = np.zeros(made)
+    write_shares(segments, count, made, towards, shares)
     start = np.empty(2)
     for i in range(2):
-        start[i] = min(1.0, max(-1.0, signs[i] * values[i]))
+        start[i] = within_one(signs[i] * shares[i])
     chosen = np.empty(steps)
     for k in range(steps):
         if k + 1 < common:
             number = number_of_push[k]
-            chosen[k] = min(1.0, max(-1.0, signs[number] * values[number]))
+            chosen[k] = within_one(signs[number] * shares[number])
         else:
-            chosen[k] = (
-                1.0 if towards[0] * pushes[k, 0] + towards[1] * pushes[k, 1] >= 0.0 else -1.0
-            )
+            along = towards[0] * pushes[k, 0] + towards[1] * pushes[k, 1]
+            chosen[k] = 1.0 if along >= 0.0 else -1.0
     return FarthestDifference(farthest, start, chosen)
+
+
+class DifferenceMember(NamedTuple):
+    """A difference along one axis: at t = 0, and the acceleration over each step."""
+
+    offset_m: float
+    velocity_m_s: float
+    acceleration_m_s2: Floats
 
 
 class AxisDifferences:
@@ -310,6 +391,7 @@ class AxisDifferences:
         axis: int,
     ) -> None:
         box = model.bounds
+        # Rows and columns of the position and the velocity along the axis.
         own = [axis, motion.axes + axis]
         transition = motion.transition[:, own][:, :, own]
         positions = transition[:, 0]
@@ -335,20 +417,20 @@ class AxisDifferences:
                 )
 
     def farthest_m(self) -> Floats:
-        """Return the maximum distances at the arrival with equal measurements in the first 0, 1,
-        ..., all steps.
+        """Return the maximum distances at the arrival, shape (steps + 1,).
+
+        The measurements are equal in the first 0, 1, ..., all steps.
         """
         return self._farthest(self.limits_m, len(self.limits_m)).farthest
 
-    def member(self, limits_m: Floats, common_steps: int) -> tuple[float, float, Floats]:
+    def member(self, limits_m: Floats, common_steps: int) -> DifferenceMember:
         """Return the farthest difference with equal measurements in the first steps.
 
-        `limits_m` replaces the attribute; an infinite limit leaves a measurement out. The
-        difference is an offset and a velocity at t = 0, and the acceleration over each step.
+        `limits_m` replaces the attribute; an infinite limit leaves a measurement out.
         """
         found = self._farthest(limits_m, common_steps)
         offset_m, velocity_m_s = (found.start * self._widths).tolist()
-        return offset_m, velocity_m_s, found.pushes * self._acceleration_m_s2
+        return DifferenceMember(offset_m, velocity_m_s, found.pushes * self._acceleration_m_s2)
 
     def _farthest(self, limits_m: Floats, common_steps: int) -> FarthestDifference:
         return farthest_difference(

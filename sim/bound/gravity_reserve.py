@@ -1,11 +1,10 @@
-"""What gravity can change in a pair of motions beyond first order, for the lower bound of the
-miss.
-"""
+"""Effects of gravity on a pair of motions beyond first order, for the lower bound of the miss."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,8 +13,10 @@ from infoset.guidance import Thruster
 from infoset.sim.bound.coasting import Coasting
 from infoset.sim.scenario import Sun
 
-ROUNDING = 1e-12
-"""Part of a step by which a time may be before a step and still belong to it."""
+IMPULSE_ROUNDING = 1e-12
+"""An impulse at the end of a flight counts if its time is later by this share: it is more than the
+rounding of a quotient of times, and one impulse more only makes the reserve greater.
+"""
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class GravityReserve:
     closing_m_s : float
         Minimum closing speed of the flight.
     deviation_m_s : float
-        Maximum difference of a closing speed from that of the motion without impulses.
+        Maximum difference of a closing speed from the one of the motion without impulses.
     nearer_m : ndarray, shape (n,)
         Maximum change of x by impulses, at the steps and at last until after the arrival.
     late_s : float
@@ -55,6 +56,69 @@ class GravityReserve:
     drift_m: float
     impulses_m_s: float
     stretch_per_s2: float
+
+
+class _HalfDifference(NamedTuple):
+    """Moduli of half of the difference to first order, and of its rate, at all times, shape (n,).
+
+    `reach_m` bounds the distance across x at x = 0, `disturbance_m_s2` the target's acceleration.
+    """
+
+    half_m: Floats
+    rate_m_s: Floats
+    reach_m: float
+    disturbance_m_s2: float
+
+
+class _Domain(NamedTuple):
+    """Time and space in which Lemma 21 holds, with the symbols of docs/guarantee.md.
+
+    Parameters
+    ----------
+    gap_s, horizon_s : float
+        Time gamma after the arrival that the bounds include, and its end H.
+    impulses_m_s : float
+        Maximum sum S of the impulses until H.
+    size_m : float
+        Bound of the deviation of a target, h.
+    nearest_m : float
+        Minimum distance R from the Sun.
+    gradient_per_s2 : float
+        G = K/R^3.
+    turned : float
+        (omega H)^2, with omega^2 = 2 G.
+    growth : float
+        k = cosh(omega H).
+    """
+
+    gap_s: float
+    horizon_s: float
+    impulses_m_s: float
+    size_m: float
+    nearest_m: float
+    gradient_per_s2: float
+    turned: float
+    growth: float
+
+
+class _GravityChanges(NamedTuple):
+    """Bounds of Lemma 21.
+
+    Parameters
+    ----------
+    position_m, speed_m_s : float
+        Part 1: epsilon and epsilon'.
+    stretch_per_s2 : float
+        Part 2: k omega^2 / 6, as in `GravityReserve`.
+    deviation_m_s, between_m_s : float
+        Part 3: v' at the steps, and v'' between them.
+    """
+
+    position_m: float
+    speed_m_s: float
+    stretch_per_s2: float
+    deviation_m_s: float
+    between_m_s: float
 
 
 def gravity_reserve(
@@ -81,65 +145,130 @@ def gravity_reserve(
 
     Notes
     -----
-    docs/guarantee.md, Lemma 21, has the symbols and the proof.
+    docs/guarantee.md, Lemma 21 and its corollary, has the symbols and the proof.
     """
-    axes = motion.axes
-    arrival_s = motion.arrival_s
-    closing = motion.closing_speed_m_s
-
-    def impulses_until(end_s: float) -> float:
-        steps = math.floor(end_s / step_s * (1.0 + ROUNDING)) + 1
-        return min(thruster.budget_m_s, thruster.max_impulse_m_s * steps)
-
     if sun is None:
-        nothing = np.zeros(len(closing))
-        minimum = float(closing.min())
-        impulses = impulses_until(arrival_s + reach_m / minimum)
-        return GravityReserve(0.0, 0.0, 0.0, minimum, 0.0, nothing, 0.0, 0.0, impulses, 0.0)
+        return _reserve_in_free_space(motion, reach_m, thruster, step_s)
+
+    axes = motion.axes
+    half = _HalfDifference(
+        0.5 * np.linalg.norm(difference[:axes], axis=0),
+        0.5 * np.linalg.norm(difference[axes:], axis=0),
+        reach_m,
+        disturbance_m_s2,
+    )
+    domain = _domain(motion, half, sun, thruster, step_s)
+    if domain is None:
+        return None
+    return _corollary(motion, half, domain, _lemma_21(motion, domain))
+
+
+def _reserve_in_free_space(
+    motion: Coasting, reach_m: float, thruster: Thruster, step_s: float
+) -> GravityReserve:
+    closing = motion.closing_speed_m_s
+    minimum = float(closing.min())
+    return GravityReserve(
+        position_m=0.0,
+        speed_m_s=0.0,
+        across_m_s=0.0,
+        closing_m_s=minimum,
+        deviation_m_s=0.0,
+        nearer_m=np.zeros(len(closing)),
+        late_s=0.0,
+        drift_m=0.0,
+        impulses_m_s=_impulses_until(motion.arrival_s + reach_m / minimum, thruster, step_s),
+        stretch_per_s2=0.0,
+    )
+
+
+def _impulses_until(end_s: float, thruster: Thruster, step_s: float) -> float:
+    """Return the maximum sum of impulses until a time, m/s."""
+    steps = math.floor(end_s / step_s * (1.0 + IMPULSE_ROUNDING)) + 1
+    return min(thruster.budget_m_s, thruster.max_impulse_m_s * steps)
+
+
+def _domain(
+    motion: Coasting, half: _HalfDifference, sun: Sun, thruster: Thruster, step_s: float
+) -> _Domain | None:
+    """Return the domain of Lemma 21, or None if its assumptions are not met."""
     parameter = sun.gravitational_parameter_m3_s2
     near = motion.nearest_m
-    half, rate = (
-        0.5 * np.linalg.norm(part, axis=0) for part in (difference[:axes], difference[axes:])
-    )
-    # The proof needs all bounds until the closest approach, some time after x = 0: gap bounds it,
-    # as is checked below.
-    guess_m = impulses_until(arrival_s) * arrival_s * parameter / near**3 * arrival_s**2
-    gap = max(0.5 * step_s, 2.0 * (reach_m + float(half[-1]) + guess_m) / float(closing.min()))
+    arrival_s = motion.arrival_s
+
+    # The bounds must hold until the closest approach, some time after x = 0: the gap is a guess of
+    # this time that `_corollary` checks, twice the one without the effect of gravity on impulses.
+    impulses = _impulses_until(arrival_s, thruster, step_s)
+    guess_m = impulses * arrival_s * parameter / near**3 * arrival_s**2
+    slowest = float(motion.closing_speed_m_s.min())
+    gap = max(0.5 * step_s, 2.0 * (half.reach_m + float(half.half_m[-1]) + guess_m) / slowest)
     horizon = arrival_s + gap
-    impulses = impulses_until(horizon)
-    size = float((half + gap * rate).max()) + 0.5 * disturbance_m_s2 * gap**2
+    impulses = _impulses_until(horizon, thruster, step_s)
+
+    size = float((half.half_m + gap * half.rate_m_s).max()) + 0.5 * half.disturbance_m_s2 * gap**2
     nearest = (
         near
         - motion.speed_m_s * gap
         - 2.0 * parameter * (gap / near) ** 2
         - 2.0 * max(size, impulses * horizon)
     )
+    # 2 K (gap / near)^2 bounds the effect of gravity in the gap only if the distance is not halved.
     if nearest < 0.5 * near:
         return None
+
     gradient = parameter / nearest**3
-    turned = 2.0 * gradient * horizon**2  # the square of omega H
+    turned = 2.0 * gradient * horizon**2
+    # cosh(2) is more than the limit of 2 below, so that a greater argument is refused too.
     growth = math.cosh(min(math.sqrt(turned), 2.0))
     if growth > 2.0 or gradient * gap**2 > 1.0 / 3.0 or 12.0 * size * (growth - 1.0) > nearest:
         return None
-    distances, speeds = (
-        np.linalg.norm(part, axis=0) for part in (motion.states[:axes], motion.states[axes:])
+    return _Domain(gap, horizon, impulses, size, nearest, gradient, turned, growth)
+
+
+def _lemma_21(motion: Coasting, domain: _Domain) -> _GravityChanges:
+    axes = motion.axes
+    distances = np.linalg.norm(motion.states[:axes], axis=0)
+    speeds = np.linalg.norm(motion.states[axes:], axis=0)
+    farthest = float((distances + domain.gap_s * speeds).max())
+    position = 6.0 * domain.size_m**2 / domain.nearest_m * domain.turned * domain.growth
+    by_size = 4.0 * domain.gradient_per_s2 * domain.size_m * domain.horizon_s
+    by_impulses = 0.5 * domain.impulses_m_s * domain.turned * domain.growth
+    return _GravityChanges(
+        position_m=position,
+        speed_m_s=2.0 * position / domain.horizon_s,
+        stretch_per_s2=domain.gradient_per_s2 * domain.growth / 3.0,
+        deviation_m_s=by_size + by_impulses,
+        between_m_s=3.0 * domain.gradient_per_s2 * farthest * domain.gap_s,
     )
-    between = 3.0 * gradient * float((distances + gap * speeds).max()) * gap
-    deviation = 4.0 * gradient * size * horizon + 0.5 * impulses * turned * growth
-    lateral = motion.states[axes:-1]
-    across = float(np.linalg.norm(lateral - lateral[:, :1], axis=0).max()) + deviation + between
-    minimum = float(closing.min()) - deviation - between
-    position = 6.0 * size**2 / nearest * turned * growth
-    speed = 2.0 * position / horizon
-    stretch = gradient * growth / 3.0
-    nearer_m = impulses * stretch * np.append(motion.times_s[:-1], horizon) ** 3
+
+
+def _corollary(
+    motion: Coasting, half: _HalfDifference, domain: _Domain, changes: _GravityChanges
+) -> GravityReserve | None:
+    """Return the bounds of equation (25), or None if the closest approach may be after H."""
+    lateral = motion.states[motion.axes : -1]
+    turn = float(np.linalg.norm(lateral - lateral[:, :1], axis=0).max())
+    slowest = float(motion.closing_speed_m_s.min())
+    minimum = slowest - changes.deviation_m_s - changes.between_m_s
+    times_s = np.append(motion.times_s[:-1], domain.horizon_s)
+    nearer_m = domain.impulses_m_s * changes.stretch_per_s2 * times_s**3
     nearer_end = float(nearer_m[-1])
-    if minimum <= 0.0 or nearer_end + position + float(half[-1]) + reach_m > gap * minimum:
+    to_pass = nearer_end + changes.position_m + float(half.half_m[-1]) + half.reach_m
+    if minimum <= 0.0 or to_pass > domain.gap_s * minimum:
         return None
-    late = (nearer_end + 0.5 * position) / minimum
-    drift = late * (
-        2.0 * float(rate[-1]) + speed + (disturbance_m_s2 + 4.0 * gradient * size) * late
-    )
+
+    late = (nearer_end + 0.5 * changes.position_m) / minimum
+    acceleration = half.disturbance_m_s2 + 4.0 * domain.gradient_per_s2 * domain.size_m
+    drift = late * (2.0 * float(half.rate_m_s[-1]) + changes.speed_m_s + acceleration * late)
     return GravityReserve(
-        position, speed, across, minimum, deviation, nearer_m, late, drift, impulses, stretch
+        position_m=changes.position_m,
+        speed_m_s=changes.speed_m_s,
+        across_m_s=turn + changes.deviation_m_s + changes.between_m_s,
+        closing_m_s=minimum,
+        deviation_m_s=changes.deviation_m_s,
+        nearer_m=nearer_m,
+        late_s=late,
+        drift_m=drift,
+        impulses_m_s=domain.impulses_m_s,
+        stretch_per_s2=changes.stretch_per_s2,
     )

@@ -1,6 +1,4 @@
-"""A lower bound of the miss that any strategy can guarantee, from two motions with the same
-measurements.
-"""
+"""A lower bound of the miss that a strategy can guarantee, from motions with equal measurements."""
 
 from __future__ import annotations
 
@@ -14,11 +12,14 @@ from infoset.arrays import Floats
 from infoset.sim.bound.pair_of_motions import UNLIMITED, PairApproach, TruthPair
 from infoset.sim.scenario import Scenario, need_scenario
 
-LABELS_A_PERIOD, PERIODS_LOOKED_AT = 8, 7
-"""The bound oscillates with the label; the period is the distance travelled between two
-measurements.
+LABELS_A_PERIOD = 8
+"""Number of labels in a period of the bound, which oscillates with the label; the period is the
+distance travelled between two measurements. Chosen: refinements find the maximum between them.
 """
+PERIODS_LOOKED_AT = 7
+"""Maximum number of examined periods. Chosen: the bound changes little from one to the next."""
 REFINEMENTS = 5
+"""Number of times that the distance between labels is halved around the best one: to 1/32."""
 _BOUND = attrgetter("bound_m")
 
 
@@ -62,9 +63,8 @@ class LowerBound:
     def curve(self, vx_m_s: float) -> tuple[Floats, Floats]:
         """Return labels and bounds of one velocity along x, m."""
         pairs = [pair for pair in self.by_label if pair.vx_m_s == vx_m_s]
-        return np.array([pair.label_m for pair in pairs]), np.array(
-            [pair.bound_m for pair in pairs]
-        )
+        labels_m = np.array([pair.label_m for pair in pairs])
+        return labels_m, np.array([pair.bound_m for pair in pairs])
 
 
 def lower_bound(
@@ -83,7 +83,7 @@ def lower_bound(
     Raises
     ------
     TypeError
-        If `scenario` is no `Scenario`.
+        If `scenario` is not a `Scenario`.
 
     Notes
     -----
@@ -101,57 +101,73 @@ def lower_bound(
 
     In space, each axis has its own sets of differences, and the impulses limit the modulus. The two
     motions of a pair differ along both axes, each by as much as possible, so the bound is not below
-    that of one axis.
+    the bound of one axis.
     """
     need_scenario(scenario)
-    model = scenario.set_model
-    slow = max(model.bounds.vx_m_s)
-    fast = min(model.bounds.vx_m_s)
-    speeds = sorted({fast, min(max(-model.closing_speed_m_s, fast), slow), slow})
+    speeds = _examined_speeds(scenario)
     grids = [label_grid(scenario, speed) for speed in speeds]
-    refinements = [2 * REFINEMENTS if len(grid) > 1 else 0 for grid in grids]
-    total = sum(len(grid) for grid in grids) + sum(refinements)
+    total = sum(len(grid) + _refinements(grid) for grid in grids)
     done = 0
     by_label: dict[tuple[float, float], TruthPair] = {}
     best: list[TruthPair] = []
-    for speed, grid, extra in zip(speeds, grids, refinements, strict=True):
+    for speed, grid in zip(speeds, grids, strict=True):
         tried: list[TruthPair] = []
         width = float(np.diff(grid).min(initial=np.inf))
-        labels = grid.tolist()
-        for index in range(len(grid) + extra):
-            if index >= len(grid):
-                # Refine around the best label: half a width to each side, repeatedly.
-                width *= 0.5 if (index - len(grid)) % 2 == 0 else 1.0
-                side = 1.0 if (index - len(grid)) % 2 else -1.0
+        for index in range(len(grid) + _refinements(grid)):
+            if index < len(grid):
+                label_m = float(grid[index])
+            else:
+                # Half a width to each side of the best label, then half of that, and so on.
+                is_first_side = (index - len(grid)) % 2 == 0
+                width *= 0.5 if is_first_side else 1.0
+                side = -1.0 if is_first_side else 1.0
                 label_m = max(tried, key=_BOUND).label_m + side * width
-                labels.append(min(max(label_m, model.bounds.x_m[0]), model.bounds.x_m[1]))
-            approach = PairApproach(scenario, labels[index], speed)
-            tried.append(max(approach.best_pair(), approach.single(), key=UNLIMITED))
-            by_label[speed, labels[index]] = tried[-1]
+                lower, upper = scenario.set_model.bounds.x_m
+                label_m = min(max(label_m, lower), upper)
+            tried.append(_best_at(scenario, label_m, speed))
+            by_label[speed, label_m] = tried[-1]
             done += 1
             if progress is not None:
                 progress(done / total)
         best.append(max(tried, key=_BOUND))
+
     best.sort(key=_BOUND, reverse=True)
-    return LowerBound(
-        tuple(best),
-        tuple(pair for _, pair in sorted(by_label.items(), key=lambda item: item[0])),
-    )
+    in_order = sorted(by_label.items(), key=lambda item: item[0])
+    return LowerBound(tuple(best), tuple(pair for _, pair in in_order))
+
+
+def _examined_speeds(scenario: Scenario) -> list[float]:
+    """Return both ends of the interval of V_x and the nominal one, in ascending order, m/s."""
+    model = scenario.set_model
+    slow = max(model.bounds.vx_m_s)
+    fast = min(model.bounds.vx_m_s)
+    nominal = min(max(-model.closing_speed_m_s, fast), slow)
+    return sorted({fast, nominal, slow})
+
+
+def _refinements(grid: Floats) -> int:
+    """Return the number of labels beside those of a grid: none if the range is exactly known."""
+    return 2 * REFINEMENTS if len(grid) > 1 else 0
+
+
+def _best_at(scenario: Scenario, label_m: float, vx_m_s: float) -> TruthPair:
+    """Return the best pair or single motion of a label."""
+    approach = PairApproach(scenario, label_m, vx_m_s)
+    return max(approach.best_pair(), approach.single(), key=UNLIMITED)
 
 
 def label_grid(scenario: Scenario, vx_m_s: float) -> Floats:
-    """Return the labels to examine, m, in ascending order: whole periods of the bound, evenly
-    spaced, ends included.
+    """Return the labels to examine, m, in ascending order.
+
+    They are evenly spaced in whole periods of the bound, ends included.
     """
-    lower, upper = scenario.set_model.bounds.x_m
-    period = (
-        -vx_m_s
-        * scenario.set_model.step_s
-        * scenario.set_model.steps_in(scenario.set_model.angle_sensor.period_s)
-    )
+    model = scenario.set_model
+    lower, upper = model.bounds.x_m
+    period = -vx_m_s * model.step_s * model.steps_in(model.angle_sensor.period_s)
     whole = max(1, int(np.ceil((upper - lower) / period)))
     if whole <= PERIODS_LOOKED_AT:
         return np.unique(np.linspace(lower, upper, whole * LABELS_A_PERIOD + 1))
+
     starts = np.linspace(lower, upper - period, PERIODS_LOOKED_AT)
     places = starts[:, None] + np.linspace(0.0, period, LABELS_A_PERIOD + 1)[None, :]
     return np.unique(np.minimum(places, upper))
@@ -160,13 +176,11 @@ def label_grid(scenario: Scenario, vx_m_s: float) -> Floats:
 def pair_at(
     scenario: Scenario, label_m: float, vx_m_s: float, *, last_common_step: int | None = None
 ) -> TruthPair:
-    """Find the pair of motions, or the single one, with the maximum bound for x = label and V_x =
-    vx at t = 0.
+    """Find the motions with the maximum bound for x = label and V_x = vx at t = 0.
 
     `last_common_step` is the last step of a pair with the same measurements; None searches for the
     best one and considers single motions.
     """
-    approach = PairApproach(scenario, label_m, vx_m_s)
-    if last_common_step is not None:
-        return approach.pair(last_common_step)
-    return max(approach.best_pair(), approach.single(), key=UNLIMITED)
+    if last_common_step is None:
+        return _best_at(scenario, label_m, vx_m_s)
+    return PairApproach(scenario, label_m, vx_m_s).pair(last_common_step)

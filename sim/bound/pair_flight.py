@@ -1,6 +1,4 @@
-"""Flight of the two true motions of a lower bound, with any strategy, and the noise that makes them
-look alike.
-"""
+"""Simulation of the two true motions of a lower bound, and the noise that hides the difference."""
 
 from __future__ import annotations
 
@@ -20,12 +18,13 @@ from infoset.sim.results import Results
 from infoset.sim.scenario import Scenario
 
 STEPS_BEYOND = 2
-"""Maximum number of simulated steps after the one in which x = 0."""
+"""Maximum number of simulated steps after the step with x = 0. Chosen: a flight that takes longer
+raises IndexError.
+"""
 
 
 class PairNoise:
-    """Measurements that are the same for the two truths of a pair up to some step, and exact after
-    it.
+    """Measurements that are equal for the two truths of a pair up to a step, and exact after it.
 
     Engagements 2k and 2k + 1 of a batch are a pair. Both get the same measurements, so a strategy
     that uses nothing else acts alike in both.
@@ -50,13 +49,12 @@ class PairNoise:
         """Measure the middle of each pair, or after the last common step the true values."""
         if sight.step > self.last_common_step:
             return {name: sensor.true_value(sight) for name, sensor in sight.sensors.items()}
-        measured = {
-            name: middle(sensor.true_value(sight)) for name, sensor in sight.sensors.items()
-        }
+
+        measured = {}
         for name, sensor in sight.sensors.items():
-            self.max_share = max(
-                self.max_share, float(np.abs(sensor.error(sight, measured[name])).max())
-            )
+            measured[name] = middle(sensor.true_value(sight))
+            share = float(np.abs(sensor.error(sight, measured[name])).max())
+            self.max_share = max(self.max_share, share)
         return measured
 
 
@@ -80,22 +78,19 @@ class PairFlight:
     max_error_share: float
 
 
-def fly_pair(
-    scenario: Scenario,
-    pair: TruthPair,
-    strategy: Strategy | None = None,
-) -> PairFlight:
+def fly_pair(scenario: Scenario, pair: TruthPair, strategy: Strategy | None = None) -> PairFlight:
     """Simulate two motions with the same measurements up to the last common step.
 
-    `strategy` None is the scenario's. The pair replaces the noise of the scenario and the manoeuvre
-    of its target. For every deterministic strategy, the greater one of the two misses is at least
-    `pair.bound_m`.
+    The default strategy is the scenario's. The pair replaces the noise of the scenario and the
+    manoeuvre of its target. For every deterministic strategy, the greater one of the two misses is
+    at least `pair.bound_m`.
     """
     acceleration_m_s2 = pair.acceleration_m_s2
     nothing = np.zeros((*acceleration_m_s2.shape[:-1], STEPS_BEYOND))
     target_m_s2 = np.concatenate([acceleration_m_s2, nothing], axis=-1)
     draws = Draws(pair.position_m, pair.velocity_m_s, {}, np.zeros_like(target_m_s2))
     noise = PairNoise(pair.last_common_step)
+
     flight = Engagements(scenario, draws, strategy, noise=noise, target_m_s2=target_m_s2)
     impulses: list[Floats] = []
     while flight.flying:

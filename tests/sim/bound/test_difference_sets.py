@@ -154,7 +154,7 @@ KINDS = [
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("number", range(12))
-def test_farthest_differences_are_those_of_rational_polygons(kind: str, number: int) -> None:
+def test_farthest_differences_equal_the_maxima_of_rational_polygons(kind: str, number: int) -> None:
     case = Case(kind, number)
     steps = len(case.pushes)
 
@@ -191,7 +191,7 @@ def test_farthest_member_is_in_all_strips_and_reaches_the_maximum(kind: str, num
         assert case.towards @ member == pytest.approx(found.farthest[-1], abs=ROUNDING * case.size)
 
 
-def test_strip_that_is_left_out_does_not_cut() -> None:
+def test_strip_with_an_infinite_limit_does_not_cut() -> None:
     case = Case("flight", 1)
     limits = case.limits.copy()
     limits[1:] = np.inf

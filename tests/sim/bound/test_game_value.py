@@ -111,20 +111,20 @@ def other_speed(scenario: Scenario) -> Scenario:
         (lambda scenario: replace(scenario, rate_sensor=RateSensor(0.5, 1e-6)), "rate sensor"),
     ],
 )
-def test_each_assumption_has_its_reason(
+def test_unmet_assumption_is_named_as_reason(
     change: Callable[[Scenario], Scenario], reason: str
 ) -> None:
     assert why_no_value(known()) == ()
     assert why_no_value(change(known())) == (reason,)
 
 
-def test_start_in_the_rectangle_is_a_second_reason_of_the_papers_model() -> None:
+def test_paper_model_with_a_start_in_a_rectangle_has_two_reasons() -> None:
     published = replace(known().set_model, model=Model.PAPER, initial_set=InitialSet.RECTANGLE)
     reasons = why_no_value(replace(known(), **of_model(published)))
     assert reasons == ("model paper", "starts in a rectangle of angle and rate")
 
 
-def test_reserve_of_a_weak_engine_by_hand() -> None:
+def test_reserve_of_a_weak_engine_equals_its_formula() -> None:
     """All 61 impulses of 0.5 m/s correct 460 of 1100 m; the one at 5 km is below the threshold."""
     scenario = known(z_m=(900.0, 1100.0), vz_m_s=0.0)
     engine = replace(scenario.thruster, max_impulse_m_s=0.5, min_impulse_m_s=0.0)
@@ -143,7 +143,7 @@ def test_reserve_of_a_weak_engine_by_hand() -> None:
     assert bound_m + reserve.total_m == pytest.approx(left_m + 0.5 * 5e3 / SPEED_M_S)
 
 
-def test_reserve_of_one_impulse_by_hand() -> None:
+def test_reserve_of_one_impulse_equals_its_formula() -> None:
     """One impulse 10 s before the arrival: the first and the 41st image leave 174 m, which the dead
     zone increases.
     """
@@ -189,7 +189,7 @@ CAMERA = Camera(0.5, 5e-5, 20.0, first_image_s=20.0, last_image_s=1.0)
     ids=["published", "dead zone", "schedule", "disturbance", "camera"],
 )
 @pytest.mark.parametrize("noise", [NoiseKind.GAME, NoiseKind.RANDOM])
-def test_no_miss_of_symmetric_miss_exceeds_bound_and_reserve(
+def test_misses_of_symmetric_miss_are_at_most_bound_and_reserve(
     change: Callable[[Scenario], Scenario], noise: NoiseKind
 ) -> None:
     scenario = change(replace(known(), noise=noise))

@@ -387,7 +387,7 @@ def test_bound_is_near_the_linear_program_with_the_gravity_gradient(
     )
 
 
-def test_the_bound_of_pairs_changes_gradually_with_gravity() -> None:
+def test_bound_of_pairs_changes_gradually_with_gravity() -> None:
     """2 G T^2 from 0.006 % to 49 %. Gravity also changes the arrival, and so the range at the last
     common step.
     """
@@ -403,7 +403,7 @@ def test_the_bound_of_pairs_changes_gradually_with_gravity() -> None:
     assert bounds[9] > 0.7 * bounds[0]
 
 
-def test_transition_matrices_are_those_of_two_body_gravity() -> None:
+def test_transition_matrices_agree_with_two_integrated_motions() -> None:
     """Differences of two integrated motions, with a manoeuvre, along all axes; 2 G T^2 is 24 %."""
     scenario = replace(skew(), sun=Sun(40.0 * SUN, 60e9, 1.0, 0.6))
     pair = pair_at(scenario, 140000.5e3, -1999.99, last_common_step=200)

@@ -148,7 +148,9 @@ def test_bound_of_the_nominal_approach(
 
 
 @pytest.mark.parametrize(("last_common_step", "bound_m"), [(0, 101.5), (1, 3.0)])
-def test_two_measurements_by_hand(last_common_step: int, bound_m: float) -> None:
+def test_bound_of_two_measurements_equals_its_formula(
+    last_common_step: int, bound_m: float
+) -> None:
     """Without disturbance the two truths differ by dz(t) = dz(0) + t dv, and T = 2 s.
 
     Measurements at t = 0 (x = 2000 m) and t = 1 s (x = 1000 m) that can be the same mean |dz(0)| <=
@@ -171,7 +173,7 @@ def test_two_measurements_by_hand(last_common_step: int, bound_m: float) -> None
     assert pair.bound_m == pytest.approx(bound_m * cosine(half_width + 1.5), rel=3e-6)
 
 
-def test_two_measurements_by_hand_without_a_binding_box() -> None:
+def test_bound_of_two_measurements_equals_its_formula_without_a_binding_box() -> None:
     """As above, V_z within 5 m/s: dz(2) = 2 dz(1) - dz(0) is at most 2 * 2 + 4 = 8 m, so 4 m with
     both the same.
 
@@ -198,7 +200,7 @@ def test_two_measurements_by_hand_without_a_binding_box() -> None:
 
 
 @pytest.mark.parametrize("slope", [0.01, 0.3])
-def test_the_bound_is_of_the_min_distance_of_an_oblique_flight(slope: float) -> None:
+def test_bound_is_the_minimum_distance_of_an_oblique_flight(slope: float) -> None:
     """As above with both measurements the same, no budget, and V_z within 2 m/s of `slope` times
     the closing speed.
 
@@ -251,7 +253,7 @@ FALLING = {
     ],
     ids=["range", "rate", "distance"],
 )
-def test_far_from_the_axis_measurements_can_be_the_same(scenario: Scenario) -> None:
+def test_measurements_far_from_the_axis_can_be_the_same(scenario: Scenario) -> None:
     """Terms that are quadratic in the slope: of the distance and of cos^2(alpha) in the rate."""
     pair = pair_at(scenario, 2000.0, -1000.0, last_common_step=1)
     flight = fly_pair(scenario, pair)
@@ -259,7 +261,7 @@ def test_far_from_the_axis_measurements_can_be_the_same(scenario: Scenario) -> N
     assert 0.0 < pair.bound_m <= flight.results.miss_m.max()
 
 
-def test_a_precise_range_sensor_limits_the_pair() -> None:
+def test_precise_range_sensor_limits_the_pair() -> None:
     """At the slope q, the distances of the two differ by at most q |dz|: not more than 2e-5 of the
     range.
 
@@ -278,7 +280,7 @@ def test_a_precise_range_sensor_limits_the_pair() -> None:
     )
 
 
-def test_budget_limits_what_can_be_corrected() -> None:
+def test_budget_limits_the_correction_by_impulses() -> None:
     """From 10 km at 1 km/s, impulses from step 5 on: arms 5, 4, 3, 2 and 1 s, 2 m/s each.
 
     The budget of 5 m/s is best spent as 2, 2 and 1 m/s at the first three: 10 + 8 + 3 = 21 m, not
@@ -291,7 +293,7 @@ def test_budget_limits_what_can_be_corrected() -> None:
     assert pair_at(poor, 10e3, -1000.0, last_common_step=4).correction_m == pytest.approx(21.0)
 
 
-def test_gravity_on_both_motions_is_allowed_for() -> None:
+def test_bound_subtracts_a_reserve_for_gravity_on_both_motions() -> None:
     """A flight of 4 h at 0.3 au, with the Sun across the approach: the arrival is later, and images
     are nearer.
     """
@@ -366,7 +368,7 @@ def test_bounds_in_space_by_the_last_common_step(
     assert joint.bound_m == pytest.approx(box_m, abs=0.05)
 
 
-def test_the_pair_in_space_is_admissible(asteroid: Scenario) -> None:
+def test_pair_in_space_is_admissible(asteroid: Scenario) -> None:
     """The y axis has smaller errors and another box."""
     scenario = in_space(asteroid, error_at_nominal_range_y_rad=1e-4)
     bounds = replace(scenario.set_model.bounds, y_m=(500.0, 900.0))
@@ -403,7 +405,7 @@ def test_the_pair_in_space_is_admissible(asteroid: Scenario) -> None:
     [{"impulses_s": (80.0, 45.0, 5.0)}, {"last_impulse_s": 8.0, "delay_steps": 3}],
     ids=["times", "cut-off"],
 )
-def test_with_a_schedule_the_best_last_common_step_is_found(
+def test_best_last_common_step_is_found_with_a_schedule(
     asteroid: Scenario, fields: dict[str, Any]
 ) -> None:
     """The best of all steps, most of which are no candidates."""
@@ -433,7 +435,7 @@ def test_best_pair_is_the_best_of_all_last_common_steps(case: str) -> None:
     assert found.bound_m == max(every) > approach.single().bound_m
 
 
-def test_two_measurements_in_space_by_hand() -> None:
+def test_bound_of_two_measurements_in_space_equals_its_formula() -> None:
     """As in the plane, with V_z within 2 m/s and V_y within 1 m/s, both measurements the same and
     no impulse left.
 

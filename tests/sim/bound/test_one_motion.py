@@ -55,7 +55,7 @@ def offset(z_m: tuple[float, float], **engine: Any) -> Scenario:
     ],
     ids=["all", "budget", "delay", "cut-off", "schedule"],
 )
-def test_a_far_start_misses_by_what_all_impulses_leave(
+def test_bound_of_a_far_start_is_its_miss_less_all_impulses(
     engine: dict[str, Any], given: list[float]
 ) -> None:
     """From z = 10 km the target ends at 10 km + nu T^2/2, and an impulse at 0.5 k s moves that by T
@@ -80,7 +80,7 @@ def test_a_far_start_misses_by_what_all_impulses_leave(
     assert flight.results.miss_m[0] == pytest.approx(found.bound_m, rel=1e-4)
 
 
-def test_in_space_a_far_start_is_a_corner_of_the_box() -> None:
+def test_farthest_start_in_space_is_a_corner_of_the_box() -> None:
     """The impulses limit the modulus: the corner (-4, 10) km less what all of them move."""
     planar = offset((8e3, 10e3))
     scenario = in_space(planar)
@@ -93,7 +93,7 @@ def test_in_space_a_far_start_is_a_corner_of_the_box() -> None:
     assert pair.bound_m == pytest.approx(left_m * cosine(0.5 * 201), rel=5e-6)
 
 
-def test_the_middle_of_a_pair_adds_nothing_to_pair_and_single_motion() -> None:
+def test_middle_of_a_pair_adds_nothing_to_pair_and_single_motion() -> None:
     """max(0, |c0| - C_s) + W_s - A_s of a pair around c0 is one of the other two bounds, as C_s =
     A_-1 - A_s.
     """

@@ -59,7 +59,7 @@ def nothing_known() -> InformationSetView:
     return InformationSet(SetModel(100.0, 1.0, box, SENSOR, model=Model.PAPER), 4).view()
 
 
-def test_pairs_are_measured_in_the_middle_until_it_is_late(
+def test_pairs_are_measured_in_the_middle_to_the_last_common_step(
     nothing_known: InformationSetView,
 ) -> None:
     noise = PairNoise(3)
