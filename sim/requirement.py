@@ -7,7 +7,7 @@ import math
 import re
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,8 +19,11 @@ from infoset.sim.statistics import estimate_hits, number_text, order_statistics,
 from infoset.sim.stopping_rule import DIGITS, QUANTITIES, QuantileName
 
 CONFIDENCE = 0.95
+"""Confidence of all intervals and decisions: the usual level, which commands print."""
 MAX_RUNS_NEEDED = 1_000_000
-"""Maximum number of runs that `RequirementVerdict.runs_needed` names."""
+"""Maximum of `RequirementVerdict.runs_needed`. Chosen: more runs mean that the estimate is at
+the bound.
+"""
 _TAIL = 0.5 * (1.0 - CONFIDENCE)
 _CAUSES = "|".join(cause.value for cause in MissCause)
 _FORM = re.compile(
@@ -29,8 +32,10 @@ _FORM = re.compile(
 )
 _DEFAULT_LEVEL = "99"
 """Quantile, in percent, of a requirement that names none."""
-_STEPS = 50
-"""Steps of bisection for an end of an interval."""
+_BISECTIONS = 50
+"""Bisections for an end of an interval: 2^-50 is near the rounding of a share."""
+_SAMPLE_SIZES = 2000
+"""Number of sizes that `runs_needed` tries first, 0.7 % apart: sizes between two are tried next."""
 
 
 class Decision(Enum):
@@ -76,8 +81,9 @@ class Requirement(Checked):
         return self.quantile.quantity
 
     def numbers(self, column: Any) -> Floats:
-        """Return the values of the quantity in a table of runs; a run without one does not satisfy
-        the bound.
+        """Return the values of the quantity in a table of runs.
+
+        A run without a value does not satisfy the bound.
         """
         return np.asarray(column.to_numpy(np.float64, na_value=np.inf))
 
@@ -88,8 +94,9 @@ class Requirement(Checked):
 
 @dataclass(frozen=True)
 class HitRequirement(Checked):
-    """A lower bound of the probability of a hit, `hit>=0.95`, or of no miss of one cause,
-    `no-engine>=0.99`.
+    """A lower bound of the probability of a hit, or of no miss with one cause.
+
+    It is written `hit>=0.95`, or `no-engine>=0.99` for a cause.
 
     Parameters
     ----------
@@ -108,7 +115,7 @@ class HitRequirement(Checked):
 
     @property
     def name(self) -> str:
-        """What is required, without its probability."""
+        """Name of the required event."""
         return "hit" if self.cause is None else f"no-{self.cause.value}"
 
     @property
@@ -122,9 +129,7 @@ class HitRequirement(Checked):
         return self.share
 
     def numbers(self, column: Any) -> Floats:
-        """Return 1 for the runs of a table that hit, or do not have the cause, and 0 for the
-        others.
-        """
+        """Return 1 for runs of a table that hit, or do not have the cause, and 0 for the others."""
         if self.cause is not None:
             return np.asarray(column != self.cause.value, dtype=np.float64)
         return np.asarray(column.to_numpy(np.float64, na_value=0.0))
@@ -138,20 +143,21 @@ AnyRequirement = Requirement | HitRequirement
 
 
 def parse_requirement(text: str) -> AnyRequirement:
-    """Read a requirement, in which `miss_m<10` is the 99 % quantile; raise ValueError for any other
-    text.
+    """Read a requirement; raise ValueError for another text.
+
+    The text `miss_m<10` without a quantile means the 99 % quantile.
     """
     match = _FORM.fullmatch(text[:100])
     if match is None:
         raise ValueError(
-            'must be hit>=SHARE, no-CAUSE>=SHARE or QUANTITY pLEVEL<BOUND, for example "hit>=0.95" or "miss_m p99<10", '
+            "must be hit>=SHARE, no-CAUSE>=SHARE or QUANTITY pLEVEL<BOUND, for example "
+            '"hit>=0.95" or "miss_m p99<10", '
             f"with a cause of {_CAUSES.replace('|', ', ')}, and a quantity of "
             f"{', '.join(QUANTITIES)}; found {text[:100]!r}"
         )
     if match["share"] is not None:
-        return HitRequirement(
-            float(match["share"]), MissCause(match["cause"]) if match["cause"] else None
-        )
+        cause = MissCause(match["cause"]) if match["cause"] else None
+        return HitRequirement(float(match["share"]), cause)
     quantile = QuantileName.of_percent(match["quantity"], match["level"] or _DEFAULT_LEVEL)
     return Requirement(quantile, float(match["bound"]))
 
@@ -207,11 +213,11 @@ def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Requ
     Let K of n runs satisfy the bound, and q be the required share. The requirement is met if the
     hypothesis that the true share is at most q is rejected, and not met if the hypothesis that it
     is at least q is rejected, each at the level 2.5 %. With a fixed n the tests are the exact
-    binomial ones. They are equivalent to a comparison of the bound with the interval of order
+    binomial tests. They are equivalent to a comparison of the bound with the interval of order
     statistics of `estimate_quantiles`, or with the Clopper-Pearson interval.
 
     Repeated looks at such an interval until it decides would make errors more frequent than 5 %. If
-    `watched`, the tests are those of a confidence sequence, which holds for all n at once: the
+    `watched`, the tests are a confidence sequence, which holds for all n at once: the
     likelihood ratio of a uniform mixture of all shares above (below) q to the share q exceeds 40 at
     any n with a probability of at most 2.5 % if the true share is at most (at least) q. The first n
     that decides is final: more runs never change a decision.
@@ -223,40 +229,21 @@ def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Requ
     sequences, Annals of Statistics 49(2).
     """
     size = values.size
-    share = requirement.share
     if not size or np.isnan(values).any():
         raise ValueError("a requirement needs at least one value, and none may be NaN")
     holding = np.cumsum(requirement.holds(values))
-    first, last = _ranks(size, share, watched)
-    value: float | None
-    lower: float | None
-    upper: float | None
     if isinstance(requirement, Requirement):
-        ordered = np.sort(values)
-        with np.errstate(invalid="ignore"):  # infinite values
-            value = _finite(np.quantile(ordered, share)) if shows(size, share) else None
-        lower = _finite(ordered[first - 1]) if first >= 1 else None
-        upper = _finite(ordered[last - 1]) if last <= size else None
+        estimate = _estimated_quantile(values, requirement.share, watched)
     else:
-        estimate = estimate_hits(int(holding[-1]), size, CONFIDENCE)
-        value = estimate.probability
-        lower = estimate.lower
-        upper = estimate.upper
-        if watched:
-            lower, upper = share_interval(int(holding[-1]), size)
+        estimate = _estimated_share(int(holding[-1]), size, watched)
+    value, lower, upper = estimate
     known = int(np.isfinite(values).sum())
-    if watched:
-        met, missed = (
-            p_value <= _TAIL for p_value in p_values(np.arange(1, size + 1), holding, share)
-        )
-    else:
-        met = holding[-1:] >= last
-        missed = holding[-1:] < first
-    decided = np.flatnonzero(met | missed)
-    if not decided.size:
-        needed = runs_needed(int(holding[-1]), size, share)
-        return RequirementVerdict(Decision.UNDECIDED, size, value, lower, upper, needed, known)
-    decision = Decision.MET if met[decided[0]] else Decision.NOT_MET
+
+    decision = _decision(holding, requirement.share, watched)
+    if decision is Decision.UNDECIDED:
+        needed = runs_needed(int(holding[-1]), size, requirement.share)
+        return RequirementVerdict(decision, size, value, lower, upper, needed, known)
+
     # A decision at an earlier run stays valid, although the last interval may contain the bound
     # again.
     if (decision is Decision.MET) == isinstance(requirement, Requirement):
@@ -264,6 +251,54 @@ def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Requ
     else:
         lower = requirement.bound if lower is None else max(lower, requirement.bound)
     return RequirementVerdict(decision, size, value, lower, upper, size, known)
+
+
+class _Estimate(NamedTuple):
+    """`value`, `lower` and `upper` of `RequirementVerdict`."""
+
+    value: float | None
+    lower: float | None
+    upper: float | None
+
+
+def _estimated_quantile(values: Floats, level: float, watched: bool) -> _Estimate:
+    size = values.size
+    first, last = _ranks(size, level, watched)
+    ordered = np.sort(values)
+    value = None
+    if shows(size, level):
+        with np.errstate(invalid="ignore"):  # infinite values
+            value = _finite(np.quantile(ordered, level))
+    lower = _finite(ordered[first - 1]) if first >= 1 else None
+    upper = _finite(ordered[last - 1]) if last <= size else None
+    return _Estimate(value, lower, upper)
+
+
+def _estimated_share(count: int, size: int, watched: bool) -> _Estimate:
+    estimate = estimate_hits(count, size, CONFIDENCE)
+    if watched:
+        return _Estimate(estimate.probability, *share_interval(count, size))
+    return _Estimate(estimate.probability, estimate.lower, estimate.upper)
+
+
+def _decision(holding: Integers, share: float, watched: bool) -> Decision:
+    """Return the first decision of a sample.
+
+    `holding` is the number of the first 1, 2, ..., n runs that satisfy the bound.
+    """
+    size = len(holding)
+    if watched:
+        at_most, at_least = p_values(np.arange(1, size + 1), holding, share)
+        met = at_most <= _TAIL
+        missed = at_least <= _TAIL
+    else:
+        first, last = _ranks(size, share, watched)
+        met = holding[-1:] >= last
+        missed = holding[-1:] < first
+    decided = np.flatnonzero(met | missed)
+    if not decided.size:
+        return Decision.UNDECIDED
+    return Decision.MET if met[decided[0]] else Decision.NOT_MET
 
 
 def _finite(value: float) -> float | None:
@@ -284,13 +319,12 @@ def _ranks(size: int, share: float, watched: bool) -> tuple[int, int]:
 
 
 def share_interval(count: int, runs: int) -> tuple[float, float]:
-    """Return the 95 % confidence interval of a share after `runs` runs of a confidence sequence
-    (`judge`).
-    """
+    """Return the 95 % confidence interval of a share by the confidence sequence of `judge`."""
 
     def end(index: int, outside: float) -> float:
+        """Return the end toward `outside`, where the p-value of an index is the tail."""
         inside = count / runs
-        for _ in range(_STEPS):
+        for _ in range(_BISECTIONS):
             middle = 0.5 * (inside + outside)
             if p_values(runs, count, middle)[index] > _TAIL:
                 inside = middle
@@ -298,22 +332,24 @@ def share_interval(count: int, runs: int) -> tuple[float, float]:
                 outside = middle
         return outside
 
-    return end(0, 0.0) if count else 0.0, end(1, 1.0) if count < runs else 1.0
+    lower = end(0, 0.0) if count else 0.0
+    upper = end(1, 1.0) if count < runs else 1.0
+    return lower, upper
 
 
 def decides(runs: ArrayLike, count: ArrayLike, share: float) -> Flags:
-    """Return whether a confidence sequence decides a requirement: `count` of `runs` satisfy its
-    bound (`judge`).
+    """Return whether the confidence sequence of `judge` decides a requirement.
+
+    `count` of `runs` satisfy its bound.
     """
     return np.asarray(np.minimum(*p_values(runs, count, share)) <= _TAIL)
 
 
 def p_values(runs: ArrayLike, count: ArrayLike, share: ArrayLike) -> tuple[Floats, Floats]:
-    """Return the p-values of the hypotheses that the true share is at most, and at least, a given
-    share.
+    """Return the p-values of the hypotheses that the true share is at most, and at least, a share.
 
-    `count` is the number of those of n `runs` that satisfy the bound; it may be fractional. The
-    values are inverse likelihood ratios, and hold for all numbers of runs at once: see `judge`.
+    `count` of n `runs` satisfy the bound; it may be fractional. The p-values are inverse likelihood
+    ratios, and hold for all numbers of runs at once: see `judge`.
     """
     from scipy.special import betainc, betaln  # slow to load, and few commands need it
 
@@ -328,8 +364,7 @@ def p_values(runs: ArrayLike, count: ArrayLike, share: ArrayLike) -> tuple[Float
 
 
 def runs_needed(count: int, runs: int, share: float) -> int | None:
-    """Return the approximate number of runs that decide a requirement with `watched=True`; see
-    `RequirementVerdict`.
+    """Return the approximate number of runs that decide a requirement with `watched=True`.
 
     None is more than `MAX_RUNS_NEEDED`. If all runs satisfy the bound so far, it is the minimum
     number that can decide.
@@ -338,7 +373,7 @@ def runs_needed(count: int, runs: int, share: float) -> int | None:
     def deciding(sizes: Integers) -> Integers:
         return sizes[decides(sizes, count / runs * sizes, share) & (sizes > runs)]
 
-    sizes = np.unique(np.geomspace(1, MAX_RUNS_NEEDED, 2000).astype(np.int64))
+    sizes = np.unique(np.geomspace(1, MAX_RUNS_NEEDED, _SAMPLE_SIZES).astype(np.int64))
     enough = deciding(sizes)
     if not enough.size:
         return None

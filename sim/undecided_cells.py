@@ -1,4 +1,4 @@
-"""Runs are added to the cells of a campaign or a sweep until a rule is decided in each cell."""
+"""Cells of a campaign or a sweep, to which runs are added until a rule is decided in each."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from infoset.sim.stopping_rule import StoppingRule
 from infoset.sim.storage import CampaignFolder
 
 GROWTH = 1.05
-"""A sample grows by at least this factor between two checks of a quantile: one after each chunk
-would cost O(N^2).
+"""A sample grows by at least this factor between two checks of a quantile: a check after each chunk
+would cost O(N^2), and a campaign is at most 5 % longer than needed.
 """
 
 
@@ -26,15 +26,16 @@ class CellSample:
     """Runs of one noise of a cell, by which a rule is decided.
 
     A quantile is checked after certain numbers of chunks, which depend neither on the workers nor
-    on their speed: a campaign stops at the same run on one worker and on a hundred, in one session
-    and in ten. O(N log N) over a campaign. A requirement is checked after each run.
+    on their speed: a campaign stops at the same run with any number of workers and interruptions.
+    The cost is O(N log N) over a campaign. A requirement is checked after each run.
     """
 
     def __init__(self, rule: StoppingRule | AnyRequirement, chunks: int) -> None:
         self.decided = False
         self._rule = rule
         self._last = chunks
-        self._count, self._next_check = 0, 1
+        self._count = 0
+        self._next_check = 1
         self._values: Floats = np.empty(0)
 
     def add(self, values: Floats) -> None:
@@ -42,6 +43,7 @@ class CellSample:
         self._count += 1
         before = len(self._values)
         self._values = np.append(self._values, values[~np.isnan(values)])
+
         if not isinstance(self._rule, StoppingRule):
             runs = np.arange(1, len(self._values) + 1)
             counts = np.cumsum(self._rule.holds(self._values))
@@ -53,9 +55,7 @@ class CellSample:
 
 @dataclass
 class _Cell:
-    """Progress of a cell: its chunks, the number of judged ones, and the judged runs of each
-    noise.
-    """
+    """Progress of a cell: its chunks, the number of judged ones, and the judged runs by noise."""
 
     chunks: list[range]
     samples: dict[str, CellSample]
@@ -64,8 +64,7 @@ class _Cell:
 
 
 class UndecidedCells:
-    """The chunks that must still be simulated, and those that were simulated before an earlier
-    chunk.
+    """The chunks that must still be simulated, and simulated ones that wait for an earlier chunk.
 
     The number of runs in the manifest of the folder is the limit of each cell, `min_runs` its
     minimum number. The rule is decided for each noise. A chunk is stored only if
@@ -91,8 +90,9 @@ class UndecidedCells:
 
     @property
     def runs(self) -> tuple[int, ...]:
-        """Engagements stored without a gap from run 0 on, for each cell; empty if the rule has
-        stopped none.
+        """Engagements stored without a gap from run 0 on, for each cell.
+
+        It is empty if the rule has stopped no cell.
         """
         if not any(map(self._is_decided, self._cells)):
             return ()
@@ -103,16 +103,15 @@ class UndecidedCells:
         return tuple(counts)
 
     def missing(self) -> Iterator[tuple[int, range]]:
-        """Yield the chunks to simulate: the next one of each cell that is undecided at that time,
-        in rounds.
-        """
+        """Yield the chunks to simulate: in rounds, the next one of each undecided cell."""
         for cell, runs in self._folder.manifest.chunks():
             if not self._is_done(self._cells[cell]) and not self._folder.has(cell, runs):
                 yield cell, runs
 
     def store(self, cell: int, runs: Sequence[int], results: Results) -> None:
-        """Write a simulated chunk once all chunks before it are written; discard it if its cell is
-        then decided.
+        """Write a simulated chunk once all chunks before it are written.
+
+        It is discarded if its cell is decided by then.
         """
         self._cells[cell].waiting[runs] = results
         self._advance(cell)
@@ -125,9 +124,7 @@ class UndecidedCells:
         return cell.judged == len(cell.chunks) or self._is_decided(cell)
 
     def _advance(self, number: int) -> None:
-        """Judge the chunks of a cell in their order, up to the first unknown chunk or the decision
-        of the cell.
-        """
+        """Judge the chunks of a cell in order, up to the first unknown chunk or the decision."""
         cell = self._cells[number]
         while not self._is_done(cell):
             runs = cell.chunks[cell.judged]
@@ -135,9 +132,11 @@ class UndecidedCells:
                 self._folder.write(number, runs, cell.waiting.pop(runs))
             elif not self._folder.has(number, runs):
                 return
+
             frame = self._folder.read_chunks([(number, runs)], ["noise", self._rule.quantity])
             for noise, sample in cell.samples.items():
                 values = frame.loc[frame["noise"] == noise, self._rule.quantity]
                 sample.add(self._rule.numbers(values))
             cell.judged += 1
+
         cell.waiting.clear()

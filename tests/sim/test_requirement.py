@@ -98,7 +98,7 @@ def test_looks_after_every_run_are_wrong_in_at_most_5_percent(share: float) -> N
     assert wrong(fixed) > 0.12
 
 
-def test_a_decision_is_final() -> None:
+def test_watched_decision_is_not_changed_by_later_runs() -> None:
     values = np.concatenate([np.ones(600), np.full(40, 20.0)])
     decided = judge(values[:600], P99, watched=True)
     later = judge(values, P99, watched=True)
@@ -123,7 +123,7 @@ def test_intervals_of_a_share_are_where_the_p_values_are_2_5_percent(hits: int, 
         assert (judged.lower, judged.upper) == (estimate.lower, estimate.upper)
 
 
-def test_hits_decide() -> None:
+def test_hit_requirement_is_decided_after_enough_runs() -> None:
     required = parse_requirement(" hit >= 0.95 ")
     assert required == parse_requirement("hit>0.95") == HitRequirement(0.95)
     assert str(required) == "hit>=0.95"
@@ -141,7 +141,7 @@ def test_hits_decide() -> None:
 @pytest.mark.parametrize(
     "text", ["guaranteed_miss_m<25", " guaranteed_miss_m < 25 ", "guaranteed_miss_m p99<25"]
 )
-def test_a_requirement_without_a_quantile_is_that_of_p99(text: str) -> None:
+def test_requirement_without_a_quantile_uses_p99(text: str) -> None:
     required = parse_requirement(text)
     assert required == Requirement(QuantileName("guaranteed_miss_m", 0.99), 25.0)
     assert str(required) == "guaranteed_miss_m p99<25"
@@ -175,7 +175,7 @@ def test_a_requirement_without_a_quantile_is_that_of_p99(text: str) -> None:
         *("miss_m p0<10", "miss_m p100<10", "miss_m p٩٩<10"),
     ],
 )
-def test_no_requirement(text: str) -> None:
+def test_malformed_requirement_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match=r"must be|there is no quantity|must lie between"):
         parse_requirement(text)
 
@@ -197,39 +197,55 @@ def test_runs_without_a_value_do_not_satisfy_the_bound() -> None:
 
 
 @pytest.mark.parametrize("values", [[], [math.nan], [1.0, math.nan]])
-def test_no_sample_for_a_decision(values: list[float]) -> None:
+def test_sample_without_values_or_with_nan_is_refused(values: list[float]) -> None:
     with pytest.raises(ValueError, match="at least one value, and none may be NaN"):
         judge(np.array(values), P99, watched=True)
 
 
-def test_the_min_fixed_number_of_runs_that_decides() -> None:
-    for share, minimum in (("0.99", 368), ("0.95", 72)):
-        assert Decimal(share) ** (minimum - 1) > Decimal("0.025") >= Decimal(share) ** minimum
-        required = HitRequirement(float(share))
-        for size in (minimum - 1, minimum):
-            met = judge(np.ones(size), required, watched=False).decision is Decision.MET
-            assert met is (size == minimum)
+@pytest.mark.parametrize(("share", "minimum"), [("0.99", 368), ("0.95", 72)])
+def test_fixed_number_of_hits_decides_from_the_exact_minimum_on(share: str, minimum: int) -> None:
+    assert Decimal(share) ** (minimum - 1) > Decimal("0.025") >= Decimal(share) ** minimum
+    required = HitRequirement(float(share))
+
+    fewer = judge(np.ones(minimum - 1), required, watched=False)
+    enough = judge(np.ones(minimum), required, watched=False)
+
+    assert fewer.decision is Decision.UNDECIDED
+    assert enough.decision is Decision.MET
 
 
-def test_runs_needed_by_hand() -> None:
-    for exact, minimum in ((Fraction("0.99"), 535), (Fraction("0.95"), 105)):
-        assert (
-            exact_p_value(minimum - 1, minimum - 1, exact)
-            > Fraction("0.025")
-            >= exact_p_value(minimum, minimum, exact)
-        )
-        assert runs_needed(20, 20, float(exact)) == minimum
+@pytest.mark.parametrize(("share", "minimum"), [("0.99", 535), ("0.95", 105)])
+def test_runs_needed_are_the_exact_minimum_if_all_runs_satisfy(share: str, minimum: int) -> None:
+    exact = Fraction(share)
+    assert exact_p_value(minimum - 1, minimum - 1, exact) > Fraction("0.025")
+    assert exact_p_value(minimum, minimum, exact) <= Fraction("0.025")
+
+    assert runs_needed(20, 20, float(exact)) == minimum
+
+
+def test_runs_needed_are_none_if_the_estimate_is_at_the_bound() -> None:
     assert runs_needed(19, 20, 0.95) is None
-    # The number is that of --until decided, by which the runs are added.
-    for watched in (True, False):
-        assert judge(np.ones(20), P99, watched=watched).runs_needed == 535
-        assert judge(np.ones(20), HitRequirement(0.95), watched=watched).runs_needed == 105
-    for count, runs, share in ((20, 20, 0.99), (97, 100, 0.95), (180, 200, 0.95)):
-        needed = runs_needed(count, runs, share)
-        assert needed is not None
-        sizes = np.arange(runs + 1, 2 * needed)
-        first = sizes[decides(sizes, np.round(count / runs * sizes), share).argmax()]
-        assert first == pytest.approx(needed, rel=0.15)
+
+
+@pytest.mark.parametrize("watched", [True, False])
+def test_verdict_has_the_runs_needed_of_watched_runs(watched: bool) -> None:
+    assert judge(np.ones(20), P99, watched=watched).runs_needed == 535
+    assert judge(np.ones(20), HitRequirement(0.95), watched=watched).runs_needed == 105
+
+
+@pytest.mark.parametrize(
+    ("count", "runs", "share"), [(20, 20, 0.99), (97, 100, 0.95), (180, 200, 0.95)]
+)
+def test_runs_needed_are_near_the_first_number_that_decides(
+    count: int, runs: int, share: float
+) -> None:
+    needed = runs_needed(count, runs, share)
+    assert needed is not None
+
+    sizes = np.arange(runs + 1, 2 * needed)
+    first = sizes[decides(sizes, np.round(count / runs * sizes), share).argmax()]
+
+    assert first == pytest.approx(needed, rel=0.15)
 
 
 @pytest.mark.parametrize("watched", [False, True])

@@ -149,7 +149,7 @@ def test_more_runs_in_each_cell_change_no_decision(
             assert decision in (Decision.UNDECIDED, judge(long, REQUIRED, watched=True).decision)
 
 
-def test_what_does_not_fit_together(asked: Campaign) -> None:
+def test_campaign_with_incompatible_arguments_is_refused(asked: Campaign) -> None:
     with pytest.raises(ValueError, match="max_runs must be at least 16"):
         RunsUntil(REQUIRED, max_runs=15, min_runs=16)
     with pytest.raises(ValueError, match="cell_runs must contain 4 numbers"):
