@@ -231,7 +231,7 @@ def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Requ
     size = values.size
     if not size or np.isnan(values).any():
         raise ValueError("a requirement needs at least one value, and none may be NaN")
-    holding = np.cumsum(requirement.holds(values))
+    holding = np.cumsum(requirement.holds(values), dtype=np.int64)
     if isinstance(requirement, Requirement):
         estimate = _estimated_quantile(values, requirement.share, watched)
     else:

@@ -9,10 +9,13 @@ import subprocess
 import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 from infoset.engine.section_passes import step_all
 from infoset.kernels import cache_folder
 
+STEP: Any = step_all
+"""The kernel of a step of the engine: nearly all commands and tests use it."""
 BESIDE_EACH_OTHER = (
     ("bound --budget 0", "engage dart-2022"),
     ("reach rendezvous-2021", "observe", "pursuit"),
@@ -24,7 +27,7 @@ the engine, of polytopes and observers, and of the pursuit.
 
 def compile_first() -> None:
     """Compile the kernels, if the cache has none of the engine's."""
-    folder = cache_folder(step_all.py_func)
+    folder = cache_folder(STEP.py_func)
     if folder is None or any(folder.glob("*.nbi")):
         return
     with ThreadPoolExecutor(len(BESIDE_EACH_OTHER)) as threads:

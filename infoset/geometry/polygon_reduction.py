@@ -33,7 +33,7 @@ class Removal(NamedTuple):
 class CheapestEdge(NamedTuple):
     """The first vertex of an edge, and the point where its neighbours meet."""
 
-    index: int
+    first: int
     x: float
     y: float
 
@@ -66,9 +66,9 @@ def reduce_outward(points: Points, count: int, cap: int) -> int:
     is_hull = False
     while count > cap:
         edge = cheapest_edge(points, count)
-        if edge.index >= 0:
-            put(points, edge.index, edge.x, edge.y)
-            for i in range(following(edge.index, count), count - 1):
+        if edge.first >= 0:
+            put(points, edge.first, edge.x, edge.y)
+            for i in range(following(edge.first, count), count - 1):
                 move(points, i + 1, i)
             count -= 1
             is_hull = False

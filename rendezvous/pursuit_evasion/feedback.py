@@ -23,7 +23,7 @@ PathNow = Callable[[float], Floats]
 HIT_M = 100.0
 """Distance that counts as capture of a point: the accuracy of a last leg without observation."""
 
-_LOOKS = 65
+_OUTPUT_TIMES = 65
 """Number of times in a leg at which the distance is computed before its minimum is refined."""
 _PAST = 1.05
 """Length of the last leg by the time to the predicted capture, to include the closest approach."""
@@ -288,7 +288,7 @@ class _Pursuit:
         if self._radius == 0.0 and not last:
             return None
 
-        times = np.linspace(0.0, spell, _LOOKS)
+        times = np.linspace(0.0, spell, _OUTPUT_TIMES)
         values = np.array([distance(time) for time in times])
         if self._radius > 0.0:
             inside = np.flatnonzero(values <= self._radius)

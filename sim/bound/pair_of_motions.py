@@ -557,7 +557,7 @@ class PairApproach:
         farthest = sighting.farthest_m
         turned = 1.0 + (1.0 + sighting.fastest_m_s / closing) * farthest / sighting.nearest_m
         by_slope = turned * sighting.shift_m + rates[-1] * farthest / closing
-        return beyond + sighting.slope * by_slope
+        return np.asarray(beyond + sighting.slope * by_slope)
 
     def _first_order_shares(self, sighting: _Sighting, difference: Floats, column: int) -> Floats:
         """Return the maximum over the axes of the first-order difference by its limit."""
