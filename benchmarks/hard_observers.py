@@ -1,5 +1,4 @@
-"""Steps of observers whose sets are small, flat or singular: processor times, and true states that
-the sets lost.
+"""Times of observers whose sets are small, flat or singular, and true states outside of them.
 
     python -m benchmarks.hard_observers
 
@@ -37,9 +36,7 @@ def random_case(seed: int) -> Case:
 
 
 def degenerate_case(seed: int) -> Case:
-    """Return a system of three or four states that may be singular, flat, exact, or in different
-    units.
-    """
+    """Return a system of three or four states: singular, flat, exact, or in different units."""
     random = np.random.default_rng(seed + 100_000)
     n = int(random.choice([3, 4]))
     outputs = int(random.integers(1, 4))
@@ -58,6 +55,7 @@ def degenerate_case(seed: int) -> Case:
     c = c / units
     generators = generators * units
     half = half * units
+
     start = Zonotope.box(-half, half)
     disturbance = Zonotope(np.zeros(n), generators)
     states = [random.choice([-1.0, 1.0], n) * half]

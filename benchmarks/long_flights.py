@@ -93,37 +93,43 @@ def cost(scenario: Scenario, steps: int) -> Cost:
     longer = of_steps(scenario, steps)
     simulate(longer, 1 if steps > STEPS[0] else 2)
     flight = Engagements(longer, draw(longer, range(BATCH), 1))
-    maximum = means = looks = sections = 0
-    spent_s, before = 0.0, 0
+    most_vertices = 0
+    most_sections = 0
+    means = []
+    spent_s = 0.0
+    steps_before_arrival = 0
     while flight.flying:
         began_s = time.process_time()
         flight.advance()
         elapsed_s = time.process_time() - began_s
         if flight._information._state.some_left.any():
             break
-        spent_s = spent_s + elapsed_s
-        before = flight.step
+        spent_s += elapsed_s
+        steps_before_arrival = flight.step
         if flight.step % (steps // 50) == 0:
             counts = vertices(flight)
-            looks = looks + 1
-            means = means + counts.mean()
-            maximum = max(maximum, int(counts.max()))
-            sections = max(sections, int(flight._information.section_counts.max()))
+            means.append(counts.mean())
+            most_vertices = max(most_vertices, int(counts.max()))
+            most_sections = max(most_sections, int(flight._information.section_counts.max()))
+
+    # The step in which the first label leaves belongs to the arrival.
     began_s = time.process_time() - elapsed_s
     while flight.flying:
         flight.advance()
     results = flight.results(np.arange(BATCH))
     arrival_s = time.process_time() - began_s
+
     tracemalloc.start()
     simulate(longer, SMALL_BATCH)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
+
     return Cost(
-        step_us=1e6 * spent_s / (BATCH * before),
+        step_us=1e6 * spent_s / (BATCH * steps_before_arrival),
         arrival_ms=1e3 * arrival_s / BATCH,
-        mean_vertices=means / looks,
-        max_vertices=maximum,
-        max_sections=sections,
+        mean_vertices=float(np.mean(means)),
+        max_vertices=most_vertices,
+        max_sections=most_sections,
         memory_mb=peak / SMALL_BATCH / 1e6,
         miss_m=float(np.median(results.miss_m)),
         guaranteed_miss_m=float(np.median(results.guaranteed_miss_m.compressed())),

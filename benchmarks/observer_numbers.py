@@ -1,13 +1,12 @@
-"""Set-steps of observers: of the published one, ours and those of others, and of systems of three
-and four states.
+"""Times of observers: the published example, also with other libraries, and larger systems.
 
 ``python -m benchmarks.observer_numbers [SYSTEMS]``, with the number of random systems, 80 by
 default. A set-step is a prediction and a measurement of one set. The errors of the published
-example are those of the bounds of the last set, against exact rational arithmetic; it is also
-computed with shapely's objects, and with zonoopt if it is installed. The excess of the other
-systems is that of the widths of the last set, which was reduced, over the exact ones, for the
-Clohessy-Wiltshire case and the first 80 systems. The true state must be inside at every step. A
-step of a random system is timed three times, and the least time counts.
+example are the errors of the bounds of its last set, compared with exact rational arithmetic; it is
+also computed with shapely's objects, and with zonoopt if it is installed. The other systems have
+three and four states. Their excess compares the widths of the last set, which was reduced, with the
+exact ones, for the Clohessy-Wiltshire case and the first 80 systems. The true state must be inside
+at every step. A step of a random system is timed three times, and the least time counts.
 """
 
 from __future__ import annotations
@@ -32,7 +31,9 @@ from tests.infoset.observer.test_random_observers import System
 Floats = NDArray[np.float64]
 
 RUNS = 10_000
+"""Runs of the batch."""
 ROUNDS = 7
+"""Repetitions, of which the shortest counts."""
 EXACT = np.array(
     [
         [-0.10623093461203588, -0.2540037859300611],
@@ -41,7 +42,9 @@ EXACT = np.array(
 )
 """Bounds of the last set, rounded from rational numbers."""
 TARGET_BATCH_US = 0.5
+"""Target of the time of a set-step in a batch, us."""
 SYSTEMS = 80
+"""Default number of random systems."""
 
 
 def main() -> None:
@@ -49,16 +52,17 @@ def main() -> None:
     problem = load_problem("observer-2005")
     measured = problem.measured
     assert measured is not None
-    rows: list[tuple[str, float, float]] = []
     notes = [
         f"target of the batch: at most {TARGET_BATCH_US} us; one run: at most the time of shapely"
     ]
-    for name, count, run in (
-        (f"LinearObserver, batch of {RUNS}", RUNS, lambda: ours(problem, measured, RUNS)),
-        ("LinearObserver, one run", 1, lambda: ours(problem, measured, None)),
-        ("shapely objects, one run", 1, lambda: with_shapely(problem, measured)),
-    ):
-        rows.append((name, *timed(run, count * len(measured))))
+    steps = len(measured)
+    timings = {
+        f"LinearObserver, batch of {RUNS}": timed(
+            lambda: ours(problem, measured, RUNS), RUNS * steps
+        ),
+        "LinearObserver, one run": timed(lambda: ours(problem, measured, None), steps),
+        "shapely objects, one run": timed(lambda: with_shapely(problem, measured), steps),
+    }
     try:
         zonoopt = importlib.import_module("zonoopt")
     except ImportError:
@@ -68,26 +72,18 @@ def main() -> None:
             ("zonoopt, sets alone", False),
             ("zonoopt, sets and bounds", True),
         ):
-            rows.append(
-                (
-                    name,
-                    *timed(
-                        partial(with_zonoopt, zonoopt, problem, measured, bounds), len(measured)
-                    ),
-                )
-            )
+            run = partial(with_zonoopt, zonoopt, problem, measured, bounds)
+            timings[name] = timed(run, steps)
     lines = [
         f"{name:36} {us:10.3f} us a set-step   error of the bounds {error:.2g}"
-        for name, us, error in rows
+        for name, (us, error) in timings.items()
     ]
     print("\n".join([*lines, *notes]))
     print_many_states(int(sys.argv[1]) if len(sys.argv) > 1 else SYSTEMS)
 
 
 def print_many_states(count: int) -> None:
-    """Print the times of polytopes: relative motion on a circular orbit, and random systems of 30
-    steps.
-    """
+    """Print the times of relative motion on a circular orbit, and of random systems of 30 steps."""
     random_runs(range(8))  # compiles the kernels
     print_row(
         "Clohessy-Wiltshire, 500 steps",
@@ -99,8 +95,9 @@ def print_many_states(count: int) -> None:
 
 
 def random_runs(seeds: Iterable[int]) -> list[tuple[Floats, Floats]]:
-    """Return the times and the excess of random systems: the least times of three runs, so without
-    interruptions.
+    """Return the times and the excess of random systems.
+
+    The times are the least of three runs, without interruptions.
     """
     runs = []
     for one in map(System, seeds):
@@ -125,13 +122,17 @@ def print_row(name: str, runs: list[tuple[Floats, Floats]]) -> None:
 
 
 def clohessy_wiltshire() -> tuple[LinearObserver, Floats, Floats, Floats, float]:
-    """Return an observer of motion in a plane near a craft at 1.1e-3 rad/s: 30 s, 10 m and 1e-4
-    m/s^2.
+    """Return an observer of motion in a plane near a craft at 1.1e-3 rad/s, and its arguments.
+
+    The step is 30 s, the noise 10 m and the disturbance 1e-4 m/s^2.
     """
     rate = 1.1e-3
     pushed = np.zeros((6, 6))
-    pushed[:2, 2:4] = pushed[2:4, 4:] = np.eye(2)
-    pushed[2, 0], pushed[2, 3], pushed[3, 2] = 3.0 * rate**2, 2.0 * rate, -2.0 * rate
+    pushed[:2, 2:4] = np.eye(2)
+    pushed[2:4, 4:] = np.eye(2)
+    pushed[2, 0] = 3.0 * rate**2
+    pushed[2, 3] = 2.0 * rate
+    pushed[3, 2] = -2.0 * rate
     moved = expm(30.0 * pushed)
     c = np.eye(2, 4)
     a = moved[:4, :4]
@@ -151,9 +152,7 @@ def steps_of(
     steps: int,
     seed: int,
 ) -> tuple[Floats, Floats]:
-    """Return the processor times of the steps, ms, and the relative excess of the widths at the
-    last one.
-    """
+    """Return the processor times of the steps, ms, and the relative excess of the last widths."""
     random = np.random.default_rng(seed)
     times = []
     state = np.zeros(len(a))
@@ -194,15 +193,11 @@ def ours(problem: ObserverProblem, measured: Floats, runs: int | None) -> Floats
 
 
 def with_shapely(problem: ObserverProblem, measured: Floats) -> Floats:
-    """Return the same with one shapely object a step: hulls of points, and intersections with
-    strips.
-    """
+    """Return the same bounds by one shapely object a step: hulls of points, cut by strips."""
     assert isinstance(problem.disturbance_set, Zonotope)
-    w, (normal,), half = (
-        problem.disturbance_set.generators[0],
-        np.array(problem.system.C),
-        problem.noise.half_width[0],
-    )
+    w = problem.disturbance_set.generators[0]
+    (normal,) = np.array(problem.system.C)
+    half = problem.noise.half_width[0]
     along = 100.0 * np.array([-normal[1], normal[0]])
     polygon = shapely.box(-3.0, -3.0, 3.0, 3.0)
     for k, (y,) in enumerate(measured):
@@ -217,9 +212,7 @@ def with_shapely(problem: ObserverProblem, measured: Floats) -> Floats:
 
 
 def with_zonoopt(zonoopt: Any, problem: ObserverProblem, measured: Floats, bounds: bool) -> Floats:
-    """Return the same with constrained zonotopes; with their bounds at every step, or at the last
-    one alone.
-    """
+    """Return the same bounds by constrained zonotopes, computed at every step or at the last."""
     sparse = importlib.import_module("scipy.sparse").csc_matrix
     assert isinstance(problem.disturbance_set, Zonotope)
 

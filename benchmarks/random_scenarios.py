@@ -1,5 +1,4 @@
-"""Random scenarios of the guaranteed model: every sensor, fast and slow, near and far, with and
-without a Sun.
+"""Random scenarios of the guaranteed model, with all sensors, speeds and ranges.
 
     from benchmarks.random_scenarios import camera_scenario, gravity_scenario, random_scenario
     scenario = random_scenario(7, rate_sensor=True)
@@ -36,15 +35,16 @@ from infoset.sim.gravity import on_board_model
 from infoset.sim.scenario import of_model
 
 SOLAR_PARAMETER_M3_S2 = 1.324948e20
+"""Gravitational parameter of the Sun in the paper's scenario."""
 STRATEGIES = ("symmetric-miss", "patient")
+"""Strategies of random scenarios, in equal shares."""
 
 
 def random_scenario(number: int, *, rate_sensor: bool) -> Scenario:
-    """Return the random scenario with a number, with or without a rate sensor; about half have a
-    range sensor.
+    """Return the random scenario with a number, with or without a rate sensor.
 
-    Speeds are 1 to 100 km/s, steps 0.01 to 10 s and 16 to 126 of them, angle errors 1e-6 to 1e-2
-    rad, sections 3 to 500.
+    About half of the scenarios have a range sensor. Speeds are 1 to 100 km/s, steps 0.01 to 10 s
+    and 16 to 126 of them, angle errors 1e-6 to 1e-2 rad, sections 3 to 500.
     """
     generator = np.random.default_rng(
         np.random.SeedSequence(entropy=18, spawn_key=(number, int(rate_sensor)))
@@ -58,12 +58,11 @@ def random_scenario(number: int, *, rate_sensor: bool) -> Scenario:
 
 
 def gravity_scenario(number: int) -> Scenario:
-    """Return the random scenario with a number, in strong gravity of a planet, a star or a body
-    between.
+    """Return the random scenario with a number, in strong gravity of a planet or a star.
 
     The range is 0.3 % to 90 % of the distance from the attractor, and the speed 0.5 to 100 times
-    that of the orbit. In a third of the scenarios the target starts near the attractor, and is up
-    to 1000 times as fast. One of two is in space.
+    the speed of a circular orbit. In a third of the scenarios the target starts near the attractor,
+    and is up to 1000 times as fast. One of two is in space.
 
     Raises
     ------
@@ -137,11 +136,11 @@ def gravity_scenario(number: int) -> Scenario:
 
 
 def camera_scenario(number: int) -> Scenario:
-    """Return the random scenario with a number, with a camera; two of three are in space, one in
-    eight has rates.
+    """Return the random scenario with a number, with a camera.
 
-    The centroid error is a tenth of the range threshold, or less. The bias, the first and the last
-    image, and the probability of a lost image are random.
+    Two of three are in space, one in eight has rates. The centroid error is a tenth of the range
+    threshold, or less. The bias, the first and the last image, and the probability of a lost image
+    are random.
     """
     generator = np.random.default_rng(np.random.SeedSequence(entropy=22, spawn_key=(number,)))
     scenario = random_scenario(number, rate_sensor=number % 8 == 5)
@@ -173,20 +172,19 @@ def camera_scenario(number: int) -> Scenario:
 
     dispersion = in_space(scenario.dispersion)
     # The box contains the dispersion, which is smaller than the box of z in some scenarios.
-    known = replace(
-        in_space(model.bounds), y_m=(-model.bounds.z_m[1] * max(scale, 1.0), model.bounds.z_m[1])
-    )
-    known = replace(
-        known, vy_m_s=(-model.bounds.vz_m_s[1], model.bounds.vz_m_s[1] * max(scale, 1.0))
-    )
+    z_m = model.bounds.z_m[1]
+    vz_m_s = model.bounds.vz_m_s[1]
+    wider = max(scale, 1.0)
+    known = replace(model.bounds, y_m=(-z_m * wider, z_m), vy_m_s=(-vz_m_s, vz_m_s * wider))
     thruster = replace(scenario.thruster, pointing_error_rad=float(generator.choice([0.0, 0.02])))
     spatial = replace(model, bounds=known, angle_sensor=sensor)
     return replace(scenario, **of_model(spatial), dispersion=dispersion, thruster=thruster)
 
 
 def scheduled(scenario: Scenario, number: int) -> Scenario:
-    """Return the scenario with a random delay of up to three steps, and a cut-off or up to five
-    times of impulses.
+    """Return the scenario with a random delay and schedule.
+
+    The delay is up to three steps; the schedule has up to five times of impulses, or a cut-off.
     """
     generator = np.random.default_rng(np.random.SeedSequence(entropy=23, spawn_key=(number,)))
     arrival_s = scenario.nominal_arrival_s
@@ -207,6 +205,11 @@ def scheduled(scenario: Scenario, number: int) -> Scenario:
 
 
 def _drawn(generator: np.random.Generator, number: int, rate_sensor: bool) -> Scenario:
+    """Return a scenario that may be invalid.
+
+    The order of the draws must not change: a number would give another scenario.
+    """
+
     def decades(minimum: float, maximum: float) -> float:
         return float(10.0 ** generator.uniform(minimum, maximum))
 
@@ -262,7 +265,19 @@ def _drawn(generator: np.random.Generator, number: int, rate_sensor: bool) -> Sc
             bounds, z_m=(-0.5 * z_m, 0.5 * z_m), vz_m_s=(-0.5 * vz_m_s, 0.5 * vz_m_s)
         )
     rate_error_rad_s = error_rad / step_s * decades(-2.5, 0.5)
-    kinds = [manoeuvre for manoeuvre in Manoeuvre if manoeuvre is not Manoeuvre.NONE]
+
+    range_sensor = None
+    if often(0.5):
+        range_sensor = RangeSensor(step_s * int(generator.integers(1, 5)), decades(-3.0, -0.5))
+    strategy = STRATEGIES[int(generator.integers(len(STRATEGIES)))]
+    rates = None
+    if rate_sensor:
+        rates = RateSensor(step_s * int(generator.integers(1, 4)), rate_error_rad_s)
+    target = None
+    if disturbance_m_s2 > 0.0 and often(0.7):
+        kinds = [manoeuvre for manoeuvre in Manoeuvre if manoeuvre is not Manoeuvre.NONE]
+        manoeuvre = kinds[int(generator.integers(len(kinds)))]
+        target = Target(manoeuvre, disturbance_m_s2, 0.1 * flight_s)
     return Scenario(
         name=f"random-{number}",
         description="",
@@ -270,21 +285,13 @@ def _drawn(generator: np.random.Generator, number: int, rate_sensor: bool) -> Sc
         nominal_range_m=range_m,
         dispersion=dispersion,
         **of_model(model),
-        range_sensor=RangeSensor(step_s * int(generator.integers(1, 5)), decades(-3.0, -0.5))
-        if often(0.5)
-        else None,
+        range_sensor=range_sensor,
         thruster=thruster,
-        strategy=STRATEGIES[int(generator.integers(len(STRATEGIES)))],
+        strategy=strategy,
         # Draws contain tie choices only with this noise; `soundness` uses them as additional random
         # numbers.
         noise=NoiseKind.GAME,
         tie=TieRule.RANDOM,
-        rate_sensor=RateSensor(step_s * int(generator.integers(1, 4)), rate_error_rad_s)
-        if rate_sensor
-        else None,
-        target=(
-            Target(kinds[int(generator.integers(len(kinds)))], disturbance_m_s2, 0.1 * flight_s)
-            if disturbance_m_s2 > 0.0 and often(0.7)
-            else None
-        ),
+        rate_sensor=rates,
+        target=target,
     )

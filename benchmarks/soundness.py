@@ -67,9 +67,7 @@ KINDS = (
 
 @dataclass(frozen=True)
 class BoundedPairNoise:
-    """Noise of pairs: engagements 2 k and 2 k + 1 both measure their mean, within the bounds of
-    each.
-    """
+    """Noise of pairs: engagements 2 k and 2 k + 1 measure their mean, within the bounds."""
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> dict[str, Floats]:
         """Measure the mean of both engagements of a pair."""
@@ -77,22 +75,21 @@ class BoundedPairNoise:
         for name, sensor in sight.sensors.items():
             true = sensor.true_value(sight)
             wanted = sight.alpha_rad if name == "angle" else true
-            measured[name] = (
-                true.copy() if name == "range" else sensor.nearest(sight, middle(wanted))
-            )
+            if name == "range":
+                measured[name] = true.copy()
+            else:
+                measured[name] = sensor.nearest(sight, middle(wanted))
         return measured
 
 
 @dataclass(frozen=True)
 class MixedNoise:
-    """Noise of different kinds in one batch; engagements 2 k and 2 k + 1 have kind k modulo the
-    number of kinds.
-    """
+    """Noises of all kinds in one batch: engagements 2 k and 2 k + 1 have kind k, repeated."""
 
     parts: tuple[MeasurementNoise, ...]
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> dict[str, Floats]:
-        """Measure with all kinds, and choose that of each engagement."""
+        """Measure with all kinds, and choose the measurements of each engagement's kind."""
         kind = kind_of(sight.range_m.size)
         measurements = [part.measure(sight, predicted) for part in self.parts]
         return {
@@ -129,18 +126,17 @@ def every_noise(draws: Draws) -> MixedNoise:
 
 
 def in_space(scenario: Scenario, number: int) -> Scenario:
-    """Return the scenario out of the plane: another y axis and direction of the Sun for every
-    number.
-    """
+    """Return the scenario in space, with another y axis and direction of the Sun by number."""
     random = np.random.default_rng(np.random.SeedSequence(entropy=21, spawn_key=(number,)))
     model = scenario.set_model
     sun = scenario.sun
     sensor = model.angle_sensor
     assert isinstance(sensor, AngleSensor)
     if random.uniform() < 0.25:  # a bound that rises with range
-        swapped = sensor.error_at_zero_range_rad, sensor.error_at_nominal_range_rad
         sensor = replace(
-            sensor, error_at_nominal_range_rad=swapped[0], error_at_zero_range_rad=swapped[1]
+            sensor,
+            error_at_nominal_range_rad=sensor.error_at_zero_range_rad,
+            error_at_zero_range_rad=sensor.error_at_nominal_range_rad,
         )
     differ = random.uniform() < 0.5
     sensor = replace(

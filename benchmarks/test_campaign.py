@@ -35,10 +35,12 @@ from infoset.experiments.campaigns.run_tables import summary
 from infoset import StateBox
 from infoset.sim import Campaign, CampaignNoise
 
-# The last seconds of the interception with three sections: a million of these engagements take minutes.
+# The last seconds of the interception with three sections: a million engagements take minutes.
 whole = load_scenario('asteroid-1997')
 known = StateBox(z_m=(-1e3, 1e3), x_m=(190e3, 250e3), vz_m_s=(-50.0, 50.0), vx_m_s=(-59e3, -57e3))
-start = StateBox(z_m=(-500.0, 500.0), x_m=(210e3, 230e3), vz_m_s=(-50.0, 50.0), vx_m_s=(-58.1e3, -57.9e3))
+start = StateBox(
+    z_m=(-500.0, 500.0), x_m=(210e3, 230e3), vz_m_s=(-50.0, 50.0), vx_m_s=(-58.1e3, -57.9e3)
+)
 model = replace(whole.set_model, bounds=known, sections=3, fewest_sections=2)
 short = replace(whole, set_model=model, dispersion=start, range_sensor=None)
 
@@ -59,7 +61,8 @@ except SystemExit as left:
 
 _PEAK = """
 from pathlib import Path
-(line,) = [line for line in Path('/proc/self/status').read_text().splitlines() if line.startswith('VmHWM')]
+lines = Path('/proc/self/status').read_text().splitlines()
+(line,) = [line for line in lines if line.startswith('VmHWM')]
 print(line.split()[1])
 """
 

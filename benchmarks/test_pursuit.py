@@ -62,9 +62,7 @@ def test_cold(benchmark: BenchmarkFixture, game: Game, under: Check) -> None:
 
 
 def rates(t: float, y: Floats, thrust: float, mass: float, flow: float) -> Floats:
-    """Right-hand side of state and costate of the pursuer, or of the evader with its costate
-    negated, for mu = 1.
-    """
+    """Rates of state and costate of a player, for mu = 1; the evader's costate is negated."""
     r = y[:3]
     lv = y[9:]
     square = float(r @ r)
@@ -78,37 +76,38 @@ def rates(t: float, y: Floats, thrust: float, mass: float, flow: float) -> Float
 
 
 def test_compared_with_scipy(game: Game, solved: CaptureSolution, at_least: Check) -> None:
-    """Compare with `solve_ivp` (DOP853) and `fsolve` on 13 unknowns, from a guess with a relative
-    error of 1e-4.
+    """Compare with `solve_ivp` (DOP853) and `fsolve` on 13 unknowns.
 
-    SciPy's right-hand side is scalar Python with few array operations. The solver of the project
-    has no guess.
+    Their guess has a relative error of 1e-4. SciPy's right-hand side is scalar Python with few
+    array operations. The solver of the project has no guess.
     """
     assert solved.capture is not None
     units = units_of(game)
     node = solved.capture.extremal
     crafts = [scaled_craft(player, game.gravity, units) for player in (game.pursuer, game.evader)]
 
-    def miss(unknown: Floats) -> Floats:
-        p, e = (
-            solve_ivp(
-                rates,
-                (0.0, unknown[12]),
-                np.concatenate([craft.start, unknown[6 * k : 6 * k + 6]]),
-                method="DOP853",
-                rtol=1e-10,
-                atol=1e-12,
-                args=(craft.thrust, craft.mass, craft.flow),
-            ).y[:, -1]
-            for k, craft in enumerate(crafts)
+    def end_of(k: int, unknown: Floats) -> Floats:
+        craft = crafts[k]
+        motion = solve_ivp(
+            rates,
+            (0.0, unknown[12]),
+            np.concatenate([craft.start, unknown[6 * k : 6 * k + 6]]),
+            method="DOP853",
+            rtol=1e-10,
+            atol=1e-12,
+            args=(craft.thrust, craft.mass, craft.flow),
         )
+        return np.asarray(motion.y[:, -1])
+
+    def miss(unknown: Floats) -> Floats:
+        p = end_of(0, unknown)
+        e = end_of(1, unknown)
         return np.concatenate(
             [p[:3] - e[:3], p[6:9] - e[6:9], p[9:], e[9:], [p[6:9] @ p[6:9] - 1.0]]
         )
 
-    guess = np.concatenate([node.costates[0], node.costates[1], [node.duration]]) * (
-        1.0 + 1e-4 * np.cos(np.arange(13))
-    )
+    found = np.concatenate([node.costates[0], node.costates[1], [node.duration]])
+    guess = found * (1.0 + 1e-4 * np.cos(np.arange(13)))
     times: list[float] = []
 
     def scipy() -> None:

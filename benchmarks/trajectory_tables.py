@@ -58,7 +58,7 @@ J2000 = datetime(2000, 1, 1, 12)
 
 
 class Encounter(NamedTuple):
-    """A random encounter: its kind, its files by name, and what DOP853 finds.
+    """A random encounter: its kind, its files by name, and its B-plane by DOP853.
 
     `is_sound` is whether the segment of the epoch has the frame and centre of the other file.
     """
@@ -132,7 +132,7 @@ def random_encounter(number: int) -> Encounter:
 
 
 def outcome_of(encounter: Encounter, folder: Path) -> Outcome:
-    """Return what the program makes of an encounter, whose files are written into a folder."""
+    """Return the outcome of an encounter; its files are written into a folder."""
     for name, text in encounter.files.items():
         (folder / name).write_text(text, encoding="utf-8")
     try:
@@ -146,9 +146,7 @@ def outcome_of(encounter: Encounter, folder: Path) -> Outcome:
 
 
 def kepler(state: Floats, times_s: Floats) -> Floats:
-    """Return an elliptic orbit around the Sun at times from a state, shape (n, 2, 3), by the
-    functions f and g.
-    """
+    """Return states of an elliptic orbit around the Sun, shape (n, 2, 3), by f and g."""
     position, velocity = state
     distance = np.linalg.norm(position)
     axis = 1.0 / (2.0 / distance - velocity @ velocity / SUN_M3_S2)
@@ -174,8 +172,9 @@ def kepler(state: Floats, times_s: Floats) -> Floats:
 
 
 def b_plane_by_dop853(states: Floats, flight_s: float, arrival_s: float) -> Floats:
-    """Return (B.T, B.R) of two states, shape (2, 2, 3), m, with the axes `flight_s` before the
-    closest approach.
+    """Return (B.T, B.R) of two states, shape (2, 2, 3), m.
+
+    The axes are those of the time `flight_s` before the closest approach.
     """
     from scipy.integrate import solve_ivp
 
@@ -216,9 +215,8 @@ def _meeting(generator: np.random.Generator) -> tuple[Floats, Floats]:
         circular * generator.uniform(0.9, 1.1) * (turn[1] + generator.uniform(-0.2, 0.2) * turn[0])
     )
     relative = generator.normal(size=3)
-    relative *= (
-        circular * generator.uniform(0.1, 0.27) / np.linalg.norm(relative)
-    )  # both orbits are ellipses
+    # So slow that both orbits are ellipses.
+    relative *= circular * generator.uniform(0.1, 0.27) / np.linalg.norm(relative)
     miss = np.cross(relative, generator.normal(size=3))
     miss *= generator.uniform(0.0, 5e3) / np.linalg.norm(miss)
     position = distance * turn[0]
@@ -228,8 +226,9 @@ def _meeting(generator: np.random.Generator) -> tuple[Floats, Floats]:
 def _row_times(
     steps: str, change: int, is_reversed: bool, generator: np.random.Generator
 ) -> list[Fraction]:
-    """Return the times of the rows around a change of the step, s from J2000 in the table's scale
-    (TAI for UTC).
+    """Return the times of the rows around a change of the step, s from J2000.
+
+    The scale is the table's, and TAI for UTC.
     """
     first, second = KINDS[steps][::-1] if is_reversed else KINDS[steps]
     if steps == "irregular":
@@ -251,7 +250,7 @@ def _epoch_near(rows: list[Fraction], generator: np.random.Generator) -> Fractio
 
 
 def _tdb(seconds: Fraction, scale: str) -> Fraction:
-    """Return the seconds from J2000 in TDB; those of UTC count as TAI."""
+    """Return the seconds from J2000 in TDB; times of UTC are given in TAI."""
     if scale == "TDB":
         return seconds
     tt = seconds if scale == "TT" else seconds + Fraction("32.184")
@@ -374,16 +373,12 @@ def main() -> int:
     print(f"{'steps':12} {'method':9} {'right':>5} {'refused':>7} {'wrong':>5}  largest error, m")
     for steps in KINDS:
         for method in METHODS:
-            print(
-                _line(
-                    f"{steps:12} {method:9}",
-                    [
-                        each
-                        for each in found
-                        if (each.encounter.steps, each.encounter.method) == (steps, method)
-                    ],
-                )
-            )
+            of_kind = [
+                each
+                for each in found
+                if each.encounter.steps == steps and each.encounter.method == method
+            ]
+            print(_line(f"{steps:12} {method:9}", of_kind))
     print(_line(f"{'all':22}", found))
     reasons = Counter(_reason(each.refusal) for each in found if each.refusal)
     print("refused:", ", ".join(f"{count} {reason}" for reason, count in reasons.most_common()))
