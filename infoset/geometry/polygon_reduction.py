@@ -33,7 +33,7 @@ class Removal(NamedTuple):
 class CheapestEdge(NamedTuple):
     """The first vertex of an edge, and the point where its neighbours meet."""
 
-    first: int
+    start: int
     x: float
     y: float
 
@@ -66,9 +66,9 @@ def reduce_outward(points: Points, count: int, cap: int) -> int:
     is_hull = False
     while count > cap:
         edge = cheapest_edge(points, count)
-        if edge.first >= 0:
-            put(points, edge.first, edge.x, edge.y)
-            for i in range(following(edge.first, count), count - 1):
+        if edge.start >= 0:
+            put(points, edge.start, edge.x, edge.y)
+            for i in range(following(edge.start, count), count - 1):
                 move(points, i + 1, i)
             count -= 1
             is_hull = False
@@ -82,7 +82,7 @@ def reduce_outward(points: Points, count: int, cap: int) -> int:
 
 @allocation_free
 def cheapest_edge(points: Points, count: int) -> CheapestEdge:
-    """Return the edge whose removal adds the minimum area; its index is -1 if there is none.
+    """Return the edge whose removal adds the minimum area; its start is -1 if there is none.
 
     A polygon that is not convex has none, and a thin one may have none.
     """
