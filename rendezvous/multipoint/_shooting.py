@@ -20,23 +20,35 @@ from infoset.rendezvous.two_body import coast
 R, V, L_R, L_V = 0, 3, 6, 9
 """First rows of the position, the velocity and their costates."""
 STEP_RAD = 0.1
+"""Turn of a circular orbit in the longest step: errors are then about 1e-12 a revolution."""
 SMALLEST_COSTATE = 1e-300
 """A smaller costate limits no step: it stands for zero in a division."""
-MAX_STEPS = 50_000
+MAX_PATH_STEPS = 50_000
+"""Largest number of steps of a segment: some 800 revolutions."""
 MIN_RADIUS = 0.02
 """A trajectory nearer to the centre, relative to its initial distance, counts as falling into
 it.
 """
-TOLERANCE = 1e-11
+RESIDUAL_TOLERANCE = 1e-11
+"""Largest residual of a trajectory, in units of its block: ten times the errors of the steps."""
 ON_THE_WAY = 1e-4
-ROUNDING = 1e-8
+"""Largest residual of the trajectories from which others are continued."""
+RESIDUAL_ROUNDING = 1e-8
 """A smaller residual that no longer decreases is rounding."""
 MIN_STEP = 1.0 / 64.0
+"""Smallest part of the residual that is removed in a step; chosen: beyond, the search has
+failed.
+"""
 MIN_STEP_FROM_NEAR = 1.0 / 8.0
+"""The same from a trajectory of other times: if it is not near, coasting is the better start."""
 _ROUNDS = 12
+"""Largest number of rounds of Newton's method, whose digits double in each with new derivatives."""
 _FAST = 0.2
+"""Ratio of two residuals up to which derivatives are used again."""
 _MAX_CORRECTION = 0.5
+"""Largest residual, in units of the block: beyond it Newton's method diverges."""
 _FIRST_STEP = 0.3
+"""Residual that is removed in the first step, below `_MAX_CORRECTION`."""
 
 
 @allocation_free
@@ -59,6 +71,8 @@ def _rates(
     fifth = third / squared
     along = r0 * l0 + r1 * l1 + r2 * l2
     slope[12, 0] = 0.5 * (l0 * l0 + l1 * l1 + l2 * l2)
+
+    # Rates that are parts of the state, of all columns.
     for column in range(z.shape[1]):
         for axis in range(3):
             slope[axis, column] = z[3 + axis, column]
@@ -66,6 +80,8 @@ def _rates(
     for axis in range(3):
         slope[3 + axis, 0] = -third * z[axis, 0] + z[9 + axis, 0]
         slope[6 + axis, 0] = third * z[9 + axis, 0] - 3.0 * fifth * along * z[axis, 0]
+
+    # Variations: d and e are the variations of position and of lambda_v.
     for column in range(1, z.shape[1]):
         d0 = z[0, column]
         d1 = z[1, column]
@@ -127,7 +143,7 @@ def propagate(z: Floats, duration: float) -> bool:
     no_y = np.zeros(0)
     no_slopes = np.zeros((STAGES, 0))
     left = duration
-    for _ in range(MAX_STEPS):
+    for _ in range(MAX_PATH_STEPS):
         if not column_size(z, R) > MIN_RADIUS:
             return False
         step = min(left, longest_step(z))
@@ -287,9 +303,8 @@ class ShotPath(Path):
         """Return states and costates, shapes (k, 6), at k times from the start to the last node."""
         times = np.asarray(time_s, dtype=np.float64)
         values = np.zeros((len(times), 12))
-        which = (
-            np.searchsorted([shot.block.start_s for shot in self.shots], times, side="right") - 1
-        )
+        starts_s = [shot.block.start_s for shot in self.shots]
+        which = np.searchsorted(starts_s, times, side="right") - 1
         for index, shot in enumerate(self.shots):
             rows = np.flatnonzero(which == index)
             end = float(shot.block.time_s[-1])
@@ -359,14 +374,17 @@ def _residual(block: Block, unknowns: Floats, slopes: Floats | None = None) -> F
         if node < last:
             z[6:9, 0] -= unknowns[jump]
             z[6:9, 7 + 3 * node : 10 + 3 * node] -= np.eye(3)
-    residual[-3:] = z[3:6, 0] - goals[last, 3:] if block.rendezvous else z[9:12, 0]
+
+    # At the last node, the velocity of a rendezvous is given; lambda_v of a flyby is zero.
+    if block.rendezvous:
+        residual[-3:] = z[V : V + 3, 0] - goals[last, 3:]
+    else:
+        residual[-3:] = z[L_V : L_V + 3, 0]
     if slopes is not None:
-        slopes[-3:] = z[3:6, 1:] if block.rendezvous else z[9:12, 1:]
-    return (
-        residual
-        if np.isfinite(residual).all() and (slopes is None or np.isfinite(slopes).all())
-        else None
-    )
+        slopes[-3:] = z[V : V + 3, 1:] if block.rendezvous else z[L_V : L_V + 3, 1:]
+        if not np.isfinite(slopes).all():
+            return None
+    return residual if np.isfinite(residual).all() else None
 
 
 def _follow(block: Block, initial: Floats, min_step: float) -> Floats | None:
@@ -378,6 +396,7 @@ def _follow(block: Block, initial: Floats, min_step: float) -> Floats | None:
     unknowns = initial
     done = 0.0
     step = min(1.0, _FIRST_STEP / max(float(np.abs(first).max()), _FIRST_STEP))
+
     while True:
         ahead = _solved(slopes, -first)
         if ahead is None:
@@ -396,11 +415,15 @@ def _follow(block: Block, initial: Floats, min_step: float) -> Floats | None:
             step *= 0.5
             if step < min_step:
                 return None
+
         unknowns, rounds = solved
         if share == 1.0:
             return unknowns
         done = share
-        step = step * (2.0 if rounds <= 2 else 1.5 if rounds <= 4 else 1.0)
+        if rounds <= 2:
+            step *= 2.0
+        elif rounds <= 4:
+            step *= 1.5
         if _residual(block, unknowns, slopes) is None:
             return None
 
@@ -413,6 +436,7 @@ def _newton(
     Derivatives are computed again if the convergence is slow. The result is None without
     convergence.
     """
+    enough = RESIDUAL_TOLERANCE if share == 1.0 else ON_THE_WAY
     before = np.inf
     fresh = False
     for rounds in range(_ROUNDS):
@@ -420,9 +444,8 @@ def _newton(
         if residual is None:
             return None
         size = float(np.abs(residual - goal).max())
-        if size <= (TOLERANCE if share == 1.0 else ON_THE_WAY) or (
-            fresh and size <= ROUNDING and size > 0.3 * before
-        ):
+        is_rounding = fresh and size <= RESIDUAL_ROUNDING and size > 0.3 * before
+        if size <= enough or is_rounding:
             return unknowns, rounds
         if size > _MAX_CORRECTION or size > 2.0 * before:
             return None

@@ -22,9 +22,7 @@ from infoset.rendezvous.multipoint.times import MIN_SHARE, Grid, TimeLimits, roo
 from infoset.rendezvous.multipoint.tour import Meet, Tour
 
 TIMES_PER_RADIAN = 4.0
-"""25 times a revolution: the grid's lowest cost is then mostly within 5 % of the minimum near
-it.
-"""
+"""25 times a revolution: the lowest cost is then mostly within 5 % of the minimum near it."""
 MIN_TIMES = 32
 """Times of a short grid: the transitions from nearly no gap to long ones need some at any angle."""
 MAX_TIMES = 400
@@ -32,14 +30,16 @@ MAX_TIMES = 400
 MAX_ORDER_TIMES = 72
 """Times of a grid of all orders; their best ones are searched again on a finer one."""
 MAX_TRIPLES = 1e8
-"""Compared sequences of three times, which take 60 to 100 ns each; the grid of nine targets has 40
-times.
+"""Largest number of compared sequences of three times, which take 60 to 100 ns each.
+
+The grid of nine targets then has 40 times.
 """
 APART_RAD = 1.5
 """Quarter of a revolution: minima of the cost are half a revolution apart or more."""
 RANKS = 4
-"""Quadratics that are kept for two times of a given order: with one, the valley of the minimum was
-lost in 1 of 90.
+"""Number of quadratics that are kept for two times of a given order.
+
+With one, the valley of the minimum was lost in 1 of 90 cases.
 """
 START = -1
 """Number of the chaser's coasting orbit among the targets."""

@@ -20,14 +20,27 @@ FlyAt = Callable[[Floats], Path]
 MIN_SHARE = 1e-6
 """Default of the minimum gap, as a share of the available time."""
 _POLISH_ROUNDS = 8
+"""Largest number of rounds of Newton's method, which starts near a minimum."""
 _DIFFERENCE = 1e-5
+"""Step of the differences of the gradient, by the smallest gap: near the cube root of rounding."""
 _HELD = 1e-3
+"""Excess of a gap over the minimum, as a share of it, up to which the gap is held at the
+minimum.
+"""
 _WALL = 20.0
+"""Logarithm of the objective at times without a path, above the start's: a wall for the descent."""
 _MAX_WALLS = 6
+"""Number of times without a path after which a descent stops; chosen: its line search is lost."""
 _MAX_RESTARTS = 4
-_SETTLED, _WELL_SETTLED = 1e-3, 1e-6
-_ROUNDING = 1e-26
+"""Largest number of descents from the end of the last one; chosen: later ones change little."""
+_SETTLED = 1e-3
+"""Residual of a minimum, see `_unsettled`, above which the times are refused."""
+_WELL_SETTLED = 1e-6
+"""Residual of a minimum below which no further descent is made."""
+_OBJECTIVE_ROUNDING = 1e-26
+"""Square of the rounding error of states, times some hundred: an objective that is zero."""
 _MIN = float(np.finfo(float).tiny)
+"""Smallest divisor."""
 _CLOCK = 1e-9
 """Travel times below this share of the times are rounding errors, and leave no gaps."""
 
@@ -166,12 +179,13 @@ class _Trials:
         times = self.shifts_s + np.cumsum(gaps)
         self.evaluations += 1
         path = self.fly(times)
+
+        # A gap moves all later times.
         gradient = path.time_gradient.copy()
         gradient[-1] += self.price_per_s
         slope = np.cumsum(gradient[::-1])[::-1]
-        return _Trial(
-            gaps, path, path.cost + self.price_per_s * float(times[-1] - self.shifts_s[0]), slope
-        )
+        price = self.price_per_s * float(times[-1] - self.shifts_s[0])
+        return _Trial(gaps, path, path.cost + price, slope)
 
     def attempt(self, gaps: Floats) -> _Trial | None:
         """Return None instead of an error if there is no path at such times."""
@@ -240,13 +254,13 @@ def optimise_times(
     total = room_s(start_s, dwell_s, limits)
     scale = total
     if np.isinf(total):
-        scale = max(
-            (float(guess[-1]) - start_s for guess in guesses if len(guess) == count), default=0.0
-        )
+        lengths = [float(guess[-1]) - start_s for guess in guesses if len(guess) == count]
+        scale = max(lengths, default=0.0)
         if scale <= 0.0:
             raise ValueError("with the last time free, times to start from are needed")
     minimum = max(limits.min_gap_s, MIN_SHARE * scale)
     trials = _Trials(fly, shifts, limits.price_per_s, minimum, total, scale)
+
     candidates = [np.diff(np.concatenate([[0.0], np.asarray(guess) - shifts])) for guess in guesses]
     candidates += _spread(count, scale, minimum, bounded=np.isfinite(total), most=effort.starts)
     # Differences of times outside the limits by rounding, which is relative to the clock, are moved
@@ -259,6 +273,7 @@ def optimise_times(
     starts = [trial for trial in map(trials.attempt, sound) if trial is not None]
     if not starts:
         trials(sound[0])  # raises the reason
+
     followed = _valleys(starts, effort.followed)
     ends = []
     for index, start in enumerate(followed):
@@ -267,24 +282,30 @@ def optimise_times(
             progress((index + 1) / len(followed))
         if ends[-1].objective < enough:
             break
+
     best = min(ends, key=lambda trial: trial.objective)
     if effort.polished:
-        best = _polish(trials, best)
-        for _ in range(_MAX_RESTARTS):
-            if _unsettled(trials, best) <= _WELL_SETTLED:
-                break
-            again = _polish(trials, _descend(trials, best, best.gaps, effort.tolerance, enough))
-            if not again.objective < best.objective:
-                break
-            best = again
-        if not _unsettled(trials, best) <= _SETTLED:
-            raise NotSettledError(
-                f"the best times found cost {best.objective:.6g} m^2/s^3 and are no minimum: "
-                "another gap lowers the cost; start from other times, or give visits more time"
-            )
-    return BestTimes(
-        best.path, best.objective, trials.evaluations, TimeSearch(len(starts), len(ends))
-    )
+        best = _polished(trials, best, effort.tolerance, enough)
+    search = TimeSearch(len(starts), len(ends))
+    return BestTimes(best.path, best.objective, trials.evaluations, search)
+
+
+def _polished(trials: _Trials, best: _Trial, tolerance: float, enough: float) -> _Trial:
+    """Return a minimum to the last digits, descending again while it is not settled."""
+    best = _polish(trials, best)
+    for _ in range(_MAX_RESTARTS):
+        if _unsettled(trials, best) <= _WELL_SETTLED:
+            break
+        again = _polish(trials, _descend(trials, best, best.gaps, tolerance, enough))
+        if not again.objective < best.objective:
+            break
+        best = again
+    if not _unsettled(trials, best) <= _SETTLED:
+        raise NotSettledError(
+            f"the best times found cost {best.objective:.6g} m^2/s^3 and are no minimum: "
+            "another gap lowers the cost; start from other times, or give visits more time"
+        )
+    return best
 
 
 def _unsettled(trials: _Trials, best: _Trial) -> float:
@@ -305,7 +326,7 @@ def _unsettled(trials: _Trials, best: _Trial) -> float:
     # The objective of a path that costs nothing is the rounding of states.
     states = best.path.nodes.arrive
     size = (states[:, :3] ** 2).sum(axis=1) / gaps**3 + (states[:, 3:] ** 2).sum(axis=1) / gaps
-    return float(gain.max() / max(best.objective + _ROUNDING * size.sum(), _MIN))
+    return float(gain.max() / max(best.objective + _OBJECTIVE_ROUNDING * size.sum(), _MIN))
 
 
 def room_s(start_s: float, dwell_s: Floats, limits: TimeLimits) -> float:
@@ -355,9 +376,8 @@ def _valleys(starts: Sequence[_Trial], most: int) -> list[_Trial]:
     """
     ranked = sorted(starts, key=lambda trial: trial.objective)
     gaps = np.stack([trial.gaps for trial in ranked])
-    nearest = (
-        cKDTree(gaps).query(gaps, k=min(len(ranked), gaps.shape[1] + 2))[1].reshape(len(ranked), -1)
-    )
+    neighbours = min(len(ranked), gaps.shape[1] + 2)
+    nearest = cKDTree(gaps).query(gaps, k=neighbours)[1].reshape(len(ranked), -1)
     lowest = (nearest >= np.arange(len(ranked))[:, None]).all(axis=1)
     return [ranked[index] for index in np.argsort(~lowest, kind="stable")[:most]]
 
@@ -392,32 +412,28 @@ def _descend(
         size = max(trial.objective, floor)
         return float(np.log(size)), trial.slope * (scale / size)
 
-    constraints = (
-        {
-            "type": "ineq",
-            "fun": lambda x: 1.0 - (x * scale).sum() / trials.total,
-            "jac": lambda _: -shares,
-        }
-        if np.isfinite(trials.total)
-        else ()
-    )
+    within_total = {
+        "type": "ineq",
+        "fun": lambda x: 1.0 - (x * scale).sum() / trials.total,
+        "jac": lambda _: -shares,
+    }
+    bounds = np.broadcast_to(trials.minimum / scale, start.gaps.shape)
     try:
         minimum = minimize(
             value,
             start.gaps / scale,
             jac=True,
-            bounds=[
-                (float(bound), None)
-                for bound in np.broadcast_to(trials.minimum / scale, start.gaps.shape)
-            ],
-            constraints=constraints,
+            bounds=[(float(bound), None) for bound in bounds],
+            constraints=within_total if np.isfinite(trials.total) else (),
             method="SLSQP",
             options={"ftol": tolerance, "maxiter": 100},
         )
     except _StoppedError:
         return lowest
     end = trials.attempt(trials.within(np.asarray(minimum.x) * scale))
-    return end if end is not None and end.objective <= lowest.objective else lowest
+    if end is None or not end.objective <= lowest.objective:
+        return lowest
+    return end
 
 
 def _polish(trials: _Trials, best: _Trial) -> _Trial:
@@ -433,6 +449,7 @@ def _polish(trials: _Trials, best: _Trial) -> _Trial:
     if full:  # exactly at the latest time
         gaps = gaps.copy()
         gaps[gaps.argmax()] += total - gaps.sum()
+
     directions = np.eye(len(gaps))[:, ~held]
     if full:
         directions = directions @ np.linalg.svd(np.ones((1, directions.shape[1])))[2][1:].T
@@ -447,6 +464,7 @@ def _polish(trials: _Trials, best: _Trial) -> _Trial:
         hessian = 0.5 * (hessian + hessian.T)
         if not np.isfinite(hessian).all() or np.linalg.eigvalsh(hessian)[0] <= 0.0:
             break
+
         move = -directions @ np.linalg.solve(hessian, directions.T @ here.slope)
         moved = here.gaps + move
         outside = bool(
@@ -454,6 +472,7 @@ def _polish(trials: _Trials, best: _Trial) -> _Trial:
         )
         if outside or np.abs(move).max() > 0.1 * float(here.gaps.min()):
             break
+
         trial = trials(moved)
         if trial.objective > here.objective * (1.0 + 1e-12):
             break

@@ -16,6 +16,7 @@ from infoset.rendezvous.multipoint.segments import LinearPath, Nodes, Path, solv
 from infoset.rendezvous.relative_motion import LinearMotion
 
 SMOOTH = 4.0 / 3.0
+"""Ratio of the costs of the local minima of an order in linear motion; chosen, see `ruggedness`."""
 
 
 class Meet(Enum):

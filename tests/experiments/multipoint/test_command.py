@@ -25,8 +25,8 @@ def changed(old: str, new: str, text: str = THREE) -> str:
 
 
 LOCAL_MINIMUM = (
-    r"the times are a local minimum, the lowest one found by \d+ descents from the best of \d+ starting points on a "
-    r"grid of \d+ times, \d+ a revolution"
+    r"the times are a local minimum, the lowest one found by \d+ descents from the best of \d+ "
+    r"starting points on a grid of \d+ times, \d+ a revolution"
 )
 OPTIMISED = changed("optimise_times = false", "optimise_times = true")
 
@@ -37,7 +37,10 @@ def found(infoset: Command, *arguments: object) -> Any:
 
 def targets(count: int, apart_s: float = 500.0) -> str:
     """A file of so many targets."""
-    table = '[[target]]\nname = "n{0}"\nposition_m = [{0}, 10, 0]\nvelocity_m_s = [0, 0, 0]\ntime_s = {1}\n'
+    table = (
+        '[[target]]\nname = "n{0}"\nposition_m = [{0}, 10, 0]\n'
+        "velocity_m_s = [0, 0, 0]\ntime_s = {1}\n"
+    )
     return HEAD + "".join(table.format(each, apart_s * (each + 1)) for each in range(count))
 
 
@@ -173,7 +176,7 @@ min_gap_s = 1514.3
         pytest.param(2.0e6, True, marks=pytest.mark.thorough),
     ],
 )
-def test_search_of_best_times_says_how_fine_its_grid_is(
+def test_search_of_best_times_reports_its_grid(
     infoset: Command, mine: Callable[[str], Path], latest_s: float, is_coarse: bool
 ) -> None:
     file = mine(FLYBYS.format(0.4 * latest_s, 0.8 * latest_s, latest_s))
@@ -213,7 +216,7 @@ def test_best_order_is_compared_on_a_grid(infoset: Command, mine: Callable[[str]
 
 
 @pytest.mark.thorough
-def test_best_times_under_gravity_over_several_revolutions_are_said_to_be_uncertain(
+def test_best_times_over_several_revolutions_are_reported_as_uncertain(
     infoset: Command,
 ) -> None:
     results = found(infoset, "asteroid-tour", "--times", "best")
@@ -241,7 +244,8 @@ def published(chaser: str) -> str:
     station = f"position_km = [10000.0, 0.0, 0.0]\nvelocity_km_s = [0.0, {CIRCLE_KM_S}, 0.0]\n"
     return (
         'kind = "multipoint"\nname = "published"\ngravitational_parameter_km3_s2 = 398600.4418\n'
-        f'{chaser}[[target]]\nname = "station"\nmeet = "rendezvous"\ntime_s = 1583.912229856\n{station}'
+        f'{chaser}[[target]]\nname = "station"\nmeet = "rendezvous"\ntime_s = 1583.912229856\n'
+        f"{station}"
     )
 
 

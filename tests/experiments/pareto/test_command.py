@@ -149,7 +149,7 @@ def test_bound_that_no_meeting_keeps_is_refused_with_the_smallest_one(infoset: C
         "x_m=0,z_m=1e300",
     ],
 )
-def test_a_preferred_meeting_that_is_none(infoset: Command, preferred: str) -> None:
+def test_malformed_preferred_meeting_is_refused(infoset: Command, preferred: str) -> None:
     err = infoset.refused("pareto", "--prefer", preferred)
     assert "--prefer: must be a finite number for each free component" in err
     assert "for example --prefer x_m=0,z_m=0" in err

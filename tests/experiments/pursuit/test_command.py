@@ -39,7 +39,7 @@ def test_a_capture_is_at_the_capture_radius(infoset: Command) -> None:
         ((), "the other directions at the capture were not compared (add --certify)"),
     ],
 )
-def test_a_certificate_says_what_it_leaves_open(
+def test_certificate_lists_the_undecided_checks(
     options: tuple[str, ...], undecided: str, infoset: Command
 ) -> None:
     code, out, _ = infoset("pursuit", "geo-pursuit", *options)
@@ -136,7 +136,7 @@ def test_a_map(infoset: Command) -> None:
     assert lines[-1].endswith(",,,escapes")
 
 
-def test_points_of_a_map_that_are_no_game(infoset: Command) -> None:
+def test_points_of_a_map_without_a_game_have_a_verdict(infoset: Command) -> None:
     found = infoset.json(
         "pursuit-map", "--x", "phase_deg=-9:-8:2", "--y", "evader.mass_kg=900:2000:2"
     )

@@ -19,7 +19,7 @@ def with_state(position: str = "[42000.0, 100.0, 0.0]", velocity: str = "[0.0, 3
     return TEXT.partition("[evader.orbit]")[0] + STATE.format(position, velocity)
 
 
-def test_the_slides_case_is_what_the_slides_say() -> None:
+def test_problem_file_has_the_values_of_the_slides() -> None:
     game = load_problem("geo-pursuit").game
     assert (game.pursuer.thrust_n, game.evader.thrust_n) == (20.0, 10.0)
     assert (game.pursuer.mass_kg, game.pursuer.specific_impulse_s) == (2000.0, 350.0)
@@ -64,12 +64,12 @@ ORBIT = TEXT.partition("[pursuer.orbit]")[2].partition("\n\n")[0]
         ),
     ],
 )
-def test_what_is_no_game_is_refused(text: str, line: str) -> None:
+def test_file_without_a_possible_game_is_refused(text: str, line: str) -> None:
     with pytest.raises(InputError, match=rf"^mine\.toml: {re.escape(line)}"):
         read_text(PursuitProblem, text, "mine.toml")
 
 
-def test_what_maps_vary() -> None:
+def test_map_changes_the_parameters_of_its_axes() -> None:
     problem = load_problem("geo-pursuit")
     assert game_at(problem, {"thrust_ratio": 0.9}).evader.thrust_n == pytest.approx(18.0)
     assert game_at(problem, {"evader.mass_kg": 1800.0}).evader.mass_kg == 1800.0

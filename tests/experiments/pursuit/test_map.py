@@ -34,7 +34,7 @@ def test_capture_time_does_not_fall_as_the_thrust_of_the_evader_rises(phase_deg:
     assert np.all(np.diff(times_s) > 0.0)
 
 
-def test_an_extremal_continued_in_thrust_is_not_always_that_of_the_game() -> None:
+def test_extremal_continued_in_thrust_may_differ_from_the_solution() -> None:
     # Two branches exist over this column. The one at 70 % of the pursuer's thrust continues
     # smoothly up to 80 %, but there the branch from T = 0 keeps the evader away at its capture
     # time: a point cannot start at its neighbour.

@@ -98,7 +98,7 @@ def test_constraints_between_the_periods_bind() -> None:
     assert kept.between < 0.2 * loose.between
 
 
-def test_zero_out_of_reach_is_looked_for_further_on(infoset: Command) -> None:
+def test_more_periods_are_searched_if_zero_is_out_of_reach(infoset: Command) -> None:
     found = infoset.json("reach", "--set", "periods=2", "--select", "energy")
     assert found["optimal_miss"] == printed("611.79357068")
     assert (found["min_periods"], found["min_periods_searched"]) == (3, 8)
@@ -124,13 +124,11 @@ def test_zero_out_of_reach_is_looked_for_further_on(infoset: Command) -> None:
         ),
     ],
 )
-def test_what_is_wrong_is_refused(arguments: list[str], told: str, infoset: Command) -> None:
+def test_wrong_options_are_refused(arguments: list[str], told: str, infoset: Command) -> None:
     assert told in infoset.refused("reach", *arguments)
 
 
-def test_a_program_without_an_accurate_solution_is_refused(
-    infoset: Command, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_inaccurate_solution_is_refused(infoset: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     # Which programs a solver fails on depends on the machine, so here every answer fails the check.
     monkeypatch.setattr(ConeProgram, "violation_and_gap", lambda *_: (0.0, 1.0))
     err = infoset.refused("reach", CASES / "s2_2_68.toml")
@@ -139,7 +137,7 @@ def test_a_program_without_an_accurate_solution_is_refused(
     )
 
 
-def test_a_conflict_says_when_and_by_how_much(infoset: Command) -> None:
+def test_conflict_is_reported_with_period_and_amount(infoset: Command) -> None:
     settings = ["--set", "bounds.control=0.01", "--set", "initial.velocity_m_s=[2.0, -7.0, 3.0]"]
     err = infoset.refused("reach", *settings)
     assert "they conflict at t = 1 (the bound on y at t = 1" in err

@@ -116,7 +116,7 @@ def test_a_control_gives_the_nonlinear_column(
         assert numbers[number, f"nonlinear x{component + 1}({t + 1})"].verdict is expected
 
 
-def test_nonlinear_less_linear_of_table_2_is_that_of_the_model(
+def test_nonlinear_less_linear_states_of_table_2_agree_with_the_model(
     numbers: dict[tuple[int, str], NumberComparison],
 ) -> None:
     """The difference hardly depends on the control, of which four printed numbers are misprints."""

@@ -99,6 +99,6 @@ def test_options_of_a_rendezvous_are_refused(infoset: Command) -> None:
     )
 
 
-def test_the_kind_of_a_file_decides(infoset: Command) -> None:
+def test_kind_of_a_file_selects_the_computation(infoset: Command) -> None:
     Path("mine.toml").write_text('kind = "observer"\nname = "x"\n')
     assert "use infoset observe" in infoset.refused("reach", "mine.toml")

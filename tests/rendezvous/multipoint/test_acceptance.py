@@ -57,7 +57,7 @@ THREE = {
 # fmt: on
 
 
-def test_flybys_at_given_times(tours: Make) -> None:
+def test_flybys_at_given_times_have_the_published_costs(tours: Make) -> None:
     times = np.array(THREE["ts"])
     path = tours(len(times)).fly(range(len(times)), times)
     for found, key in (
@@ -73,7 +73,7 @@ def test_flybys_at_given_times(tours: Make) -> None:
     assert np.abs(path.jumps[:, 3:]).max() < 1e-12 * np.abs(path.costate_before[:, 3:]).max()
 
 
-def test_rendezvous_at_given_times(tours: Make) -> None:
+def test_rendezvous_at_given_times_have_the_published_costs(tours: Make) -> None:
     times = np.array(THREE["ts"])
     count = 3
     last = tours(count, [Meet.FLYBY] * (count - 1) + [Meet.RENDEZVOUS]).fly(range(count), times)
@@ -96,7 +96,7 @@ def test_best_times(tours: Make) -> None:
     )  # the theory prints 9 or 10 digits
 
 
-def test_a_priced_last_time(tours: Make) -> None:
+def test_last_time_with_a_price_is_the_known_one(tours: Make) -> None:
     found = best_times(tours(2), (0, 1), TimeLimits(price_per_s=1e-6), [np.array([1500.0, 3000.0])])
     np.testing.assert_allclose(found.time_s, [2905.083078, 4690.157388], rtol=NINE_DIGITS)
     assert found.path.cost == pytest.approx(0.0008170807218, rel=NINE_DIGITS)
@@ -129,7 +129,7 @@ def double_integrator(
     return motion, Nodes(at, at, states, states, np.zeros(len(times), dtype=bool))
 
 
-def test_free_space_is_a_cubic_spline() -> None:
+def test_path_in_free_space_is_a_cubic_spline() -> None:
     # Clamped at the start, natural at the end: nodes 1, -1, 2 at t = 1, 2, 3 from rest.
     motion, nodes = double_integrator([1.0, -1.0, 2.0], [1.0, 2.0, 3.0])
     path = solve_segments(motion, 0.0, np.zeros(6), nodes)
@@ -153,7 +153,7 @@ def test_out_and_back() -> None:
 
 
 @pytest.mark.parametrize("angle", [4.493409457909, 11.06652863])
-def test_where_the_papers_elimination_is_singular(tours: Make, angle: float) -> None:
+def test_path_is_found_if_the_papers_elimination_is_singular(tours: Make, angle: float) -> None:
     # n t1 at which R13(t1, t0) has no inverse; the segment solver and the dense system do not mind.
     first = angle / 1.13e-3
     times = np.array([first, first + 1700.0])

@@ -102,7 +102,7 @@ def test_rendezvous_and_stays(meets: tuple[Meet, Meet]) -> None:
         assert not path.control(inside)[2].any()
 
 
-def test_time_gradients_against_finite_differences() -> None:
+def test_time_gradient_is_the_difference_of_costs() -> None:
     case = tour((Meet.FLYBY, Meet.RENDEZVOUS))
     path = case.fly((0, 1), [2.0, 4.0])
     for index in range(2):
@@ -256,7 +256,7 @@ def test_a_start_at_the_centre_is_refused() -> None:
         KeplerTour((TourTarget("a"),), START[None], np.zeros(1), 1.0, np.zeros(6))
 
 
-def test_what_cannot_be_reached_is_told() -> None:
+def test_unreachable_targets_are_refused_with_the_reason() -> None:
     # Straight across, through the centre.
     across = (TourTarget("a"),), np.array([circular(1.0, np.pi, 0.0)]), np.zeros(1), 1.0
     with pytest.raises(NotSettledError, match="give visits more time"):

@@ -115,7 +115,7 @@ def test_flying_the_control_passes_the_nodes_at_the_cost(name: str, seed: int) -
 @pytest.mark.parametrize("name", MOTIONS)
 @given(SEEDS)
 @settings(max_examples=2, deadline=None)
-def test_time_gradients_against_finite_differences(name: str, seed: int) -> None:
+def test_time_gradient_is_the_difference_of_costs(name: str, seed: int) -> None:
     tour, times = some_tour(seed, MOTIONS[name](), dwell=True)
     order = range(len(times))
     path = tour.fly(order, times)
@@ -137,7 +137,7 @@ def test_time_gradients_against_finite_differences(name: str, seed: int) -> None
 
 @given(SEEDS)
 @settings(max_examples=10, deadline=None)
-def test_jumps_are_the_sensitivity_to_the_targets(seed: int) -> None:
+def test_jumps_are_the_derivatives_of_the_cost_by_the_targets(seed: int) -> None:
     tour, times = some_tour(seed, ClohessyWiltshire(RATE))
     path = tour.fly(range(len(times)), times)
     for index in range(len(times)):
@@ -161,7 +161,7 @@ def test_jumps_are_the_sensitivity_to_the_targets(seed: int) -> None:
 @pytest.mark.parametrize("name", ["circular", "elliptic"])
 @given(SEEDS)
 @settings(max_examples=10, deadline=None)
-def test_the_papers_dense_system_agrees(name: str, seed: int) -> None:
+def test_path_agrees_with_the_papers_dense_system(name: str, seed: int) -> None:
     tour, times = some_tour(seed, MOTIONS[name](), flybys=True)
     path = tour.fly(range(len(times)), times)
     cost, velocities = solve_dense(tour.motion, tour.start_s, tour.start_state, path.nodes)

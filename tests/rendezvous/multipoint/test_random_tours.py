@@ -146,7 +146,7 @@ CHECKS = [times_agree]
 
 
 @pytest.mark.parametrize("seed", [1097, 1099, 1428])
-def test_times_in_the_lowest_of_several_valleys(seed: int) -> None:
+def test_best_times_are_in_the_lowest_of_several_valleys(seed: int) -> None:
     # From few starts, the valley of a worse minimum was found: 1.7 to 2.6 times the minimum cost.
     times_agree(seed)
 
@@ -158,7 +158,7 @@ def test_orders_whose_stays_do_not_fit_are_left_out(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", [3, 15, 18, 76])
-def test_an_order_is_not_dropped_for_a_local_minimum_of_its_beginning(seed: int) -> None:
+def test_order_is_kept_if_its_beginning_ends_in_a_local_minimum(seed: int) -> None:
     # The cost of a beginning at a local minimum of its times bounds nothing.
     order_and_times_agree(seed)
 

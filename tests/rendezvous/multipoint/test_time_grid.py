@@ -75,7 +75,7 @@ def test_best_times_do_not_depend_on_the_guess(
     assert found.objective <= lowest
 
 
-def test_order_of_two_flybys_is_that_of_the_lower_minimum() -> None:
+def test_order_of_two_flybys_has_the_lower_minimum() -> None:
     found = best_order(TWO_FLYBYS, LIMITS, [np.array([60000.0, 120000.0])])
     assert found.order == (0, 1)
     assert found.objective <= 4.634e-8
@@ -96,7 +96,7 @@ MOTIONS = [
 @pytest.mark.parametrize("meets", MIXED)
 @pytest.mark.parametrize("dwell_s", [0.0, 0.4])
 @pytest.mark.parametrize("order_is_given", [True, False])
-def test_candidates_cost_what_their_paths_cost(
+def test_candidates_have_the_costs_of_their_paths(
     meets: list[Meet], motion: LinearMotion, dwell_s: float, order_is_given: bool
 ) -> None:
     tour = random_tour(1, meets, motion, dwell_s)
@@ -174,7 +174,9 @@ LONG = [(count, float(latest)) for count in (2, 3) for latest in np.geomspace(6.
         *(pytest.param(200 + seed, 3, 58.0, marks=pytest.mark.thorough) for seed in range(6)),
     ],
 )
-def test_best_times_are_those_of_every_time(seed: int, count: int, latest_s: float) -> None:
+def test_best_times_agree_with_a_search_of_every_time(
+    seed: int, count: int, latest_s: float
+) -> None:
     random = np.random.default_rng(seed)
     meets = [RENDEZVOUS if random.random() < 0.25 else FLYBY for _ in range(count)]
     tour = random_tour(seed, meets)

@@ -45,7 +45,7 @@ LARGE = [
 
 
 @pytest.mark.parametrize(("seed", "count"), [(0, 3), (1, 3), (2, 3), *LARGE])
-def test_branch_and_bound_finds_what_brute_force_finds(seed: int, count: int) -> None:
+def test_branch_and_bound_agrees_with_brute_force(seed: int, count: int) -> None:
     tour = random_tour(seed, count, 0.3)
     limits = TimeLimits(latest_s=1500.0 * count)
     found = best_order(tour, limits)
@@ -55,7 +55,7 @@ def test_branch_and_bound_finds_what_brute_force_finds(seed: int, count: int) ->
 
 @pytest.mark.parametrize("count", [2, 5])
 @pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
-def test_orders_of_slots_against_brute_force(count: int, share: float) -> None:
+def test_orders_of_slots_agree_with_brute_force(count: int, share: float) -> None:
     tour = random_tour(10 + count, count, share)
     slots = 1200.0 * np.arange(1.0, count + 1.0)
     found = best_order_of_slots(tour, slots)
@@ -168,7 +168,7 @@ def test_times_are_best_where_gaps_differ_by_orders_of_magnitude() -> None:
     assert (np.abs(slope * gaps) <= 1e-4 * found.objective).all()
 
 
-def test_times_that_are_no_minimum_are_no_answer(
+def test_times_that_are_not_a_minimum_are_refused(
     tours: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("infoset.rendezvous.multipoint.times._descend", lambda _, begin, *__: begin)

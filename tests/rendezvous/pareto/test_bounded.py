@@ -78,7 +78,7 @@ def test_bound_above_the_peak_changes_nothing() -> None:
     np.testing.assert_allclose(found.cost_squared, solution.cost_squared(), rtol=1e-9)
 
 
-def test_needed_bound_is_that_of_the_best_meeting_for_it() -> None:
+def test_needed_bound_is_the_smallest_peak_of_any_meeting() -> None:
     needed = needed_bound(ENCOUNTER)
 
     # The first craft has a margin; the other two decide, and their meeting is possible just above

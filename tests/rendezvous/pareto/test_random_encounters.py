@@ -160,7 +160,7 @@ def the_min_max_agrees(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", [28, 41, 98, 179, 585, 1080])
-def test_the_min_max_of_very_different_weights(seed: int) -> None:
+def test_minimax_excess_is_exact_with_very_different_weights(seed: int) -> None:
     """Sequential quadratic programming alone stops at 2 to 6e8 times the minimum; with the last
     step, 1e-4 above it.
     """

@@ -54,7 +54,7 @@ def test_an_evader_that_coasts_instead_is_captured_as_one_without_thrust(
     assert 34e3 < prograde.capture_s < 35e3
 
 
-def test_all_directions_are_looked_in(solved: CaptureSolution) -> None:
+def test_scan_finds_the_maximum_at_the_solution(solved: CaptureSolution) -> None:
     certificate = certify(solved, all_directions=True)
     assert certificate.claims_saddle_point
     assert certificate.directions_tried == 120
@@ -74,7 +74,7 @@ def test_saddle_point_is_not_claimed_if_more_than_half_of_the_directions_are_und
     assert certificate.claims_saddle_point == is_claimed
 
 
-def test_a_pursuer_that_does_better_alone_is_told(slides: MakeGame) -> None:
+def test_earlier_capture_by_the_pursuer_alone_is_reported(slides: MakeGame) -> None:
     # Close to equal thrusts l(T) stays above zero long after the planned path of the evader can be
     # met.
     certificate = certify(solve(slides(18.0, anomaly_deg=324.0)))
@@ -84,7 +84,7 @@ def test_a_pursuer_that_does_better_alone_is_told(slides: MakeGame) -> None:
     assert any("the pursuer alone captures" in each for each in certificate.failures)
 
 
-def test_a_capture_that_is_off_is_told(solved: CaptureSolution) -> None:
+def test_inexact_capture_is_reported(solved: CaptureSolution) -> None:
     assert solved.capture is not None
     node = solved.capture.extremal
     off = replace(node, pursuer=node.pursuer + 1e-5, duration=node.duration * 1.001)
@@ -94,7 +94,7 @@ def test_a_capture_that_is_off_is_told(solved: CaptureSolution) -> None:
     assert any("second integrator" in each for each in failures)
 
 
-def test_a_path_that_turns_too_fast_is_told(
+def test_path_that_turns_too_fast_is_reported(
     solved: CaptureSolution, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("infoset.rendezvous.pursuit_evasion.paths._MAX_RATES", 100)

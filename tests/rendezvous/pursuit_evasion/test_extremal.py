@@ -40,7 +40,7 @@ def test_gravity_is_the_gradient_of_the_potential(
 
 
 @pytest.mark.parametrize("oblateness", OBLATENESS)
-def test_variations_are_differences(oblateness: float) -> None:
+def test_variations_agree_with_finite_differences(oblateness: float) -> None:
     nu = np.array([0.3, 0.9, -0.2])
     nu /= np.linalg.norm(nu)
     plane = across(nu)
@@ -132,7 +132,7 @@ def test_a_guess_that_cannot_be_propagated_has_an_infinite_residual() -> None:
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 6])
-def test_an_inverse_and_its_determinant(count: int) -> None:
+def test_invert_agrees_with_the_definition_of_inverse_and_determinant(count: int) -> None:
     random = np.random.default_rng(count)
     matrix = random.normal(size=(count, count)) * 10.0 ** random.integers(-3, 4, size=(count, 1))
     matrix[0, 0] = 0.0 if count > 1 else 2.0  # the first pivot is in another row

@@ -40,7 +40,7 @@ def test_receding_horizon(
 
 
 @pytest.mark.parametrize("policy", [Policy.NORMAL, Policy.RETROGRADE])
-def test_what_a_held_plan_loses_vanishes_with_the_time_it_is_held(
+def test_loss_of_a_held_plan_vanishes_with_the_time_between_plans(
     policy: Policy, solved: CaptureSolution
 ) -> None:
     # Within a leg the pursuer does not answer: its loss is of high order in the leg.
@@ -52,7 +52,7 @@ def test_what_a_held_plan_loses_vanishes_with_the_time_it_is_held(
     assert losses[1] < losses[0] / 50.0
 
 
-def test_old_and_noisy_sight_costs_time(slides: MakeGame) -> None:
+def test_delayed_and_noisy_observation_delays_the_capture(slides: MakeGame) -> None:
     solution = solve(slides(capture_radius_m=20e3))
     assert solution.capture is not None
     noisy = fly(

@@ -91,7 +91,7 @@ def test_a_coasting_evader_is_captured_the_first_time_it_can_be(slides: MakeGame
 
 @pytest.mark.parametrize("thrust_n", [20.0, 25.0])
 @pytest.mark.parametrize("radius_m", [0.0, 100e3])
-def test_an_evader_that_is_not_weaker_is_not_said_to_be_captured(
+def test_evader_that_is_not_weaker_is_not_reported_as_captured(
     thrust_n: float, radius_m: float, slides: MakeGame
 ) -> None:
     solution = solve(slides(thrust_n, capture_radius_m=radius_m))
@@ -106,7 +106,7 @@ def test_an_evader_that_is_not_weaker_is_not_said_to_be_captured(
         )
 
 
-def test_propellant_that_is_spent_too_early(slides: MakeGame) -> None:
+def test_verdict_is_exhausted_if_propellant_is_spent_before_the_capture(slides: MakeGame) -> None:
     solution = solve(slides(dry_kg=1800.0))
     assert (solution.verdict, solution.exhausted) == (
         CertificateVerdict.PROPELLANT_EXHAUSTED,
@@ -116,7 +116,7 @@ def test_propellant_that_is_spent_too_early(slides: MakeGame) -> None:
     assert solution.looked_at_s < 45343.6
 
 
-def test_a_game_is_looked_at_as_long_as_it_says(slides: MakeGame) -> None:
+def test_game_is_searched_until_its_longest_duration(slides: MakeGame) -> None:
     game = slides()
     solution = solve(Game(game.gravity, game.pursuer, game.evader, longest_s=20e3))
     assert (solution.verdict, solution.exhausted) == (CertificateVerdict.ESCAPES, None)
@@ -219,7 +219,7 @@ def test_other_geometries_agree_with_an_independent_solver(
     assert independent_capture(game, capture) == pytest.approx(capture.time_s, rel=1e-7)
 
 
-def test_where_the_branch_folds_another_one_keeps_the_evader_farther(slides: MakeGame) -> None:
+def test_solution_changes_to_a_better_branch_at_a_fold(slides: MakeGame) -> None:
     game = slides(18.0, anomaly_deg=330.0)
     plain = solve(game, change_branch=False)
     changed = solve(game)
