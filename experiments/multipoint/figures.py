@@ -31,7 +31,9 @@ from infoset.experiments.common.units import length_unit
 from infoset.experiments.multipoint.report import MultipointReport
 
 _TRACK_POINTS = 241
+"""Number of points on the track of a target; chosen for smooth curves."""
 _MAX_NAMED = 12
+"""Largest number of visits with names in a figure: more names overlap."""
 _SUN_M3_S2 = 1.32712440018e20
 _TARGET: dict[str, Any] = {
     "color": LIMIT,

@@ -103,19 +103,15 @@ class MultipointProblem:
                 "orbit_rate_rad_s (Hill's axes) or gravitational_parameter_m3_s2 (inertial axes) "
                 "is needed, not both"
             )
-        bodies = {
-            "chaser": self.chaser,
-            **{f"target.{i}": target for i, target in enumerate(self.target, start=1)},
-        }
+        bodies = {"chaser": self.chaser}
+        for number, target in enumerate(self.target, start=1):
+            bodies[f"target.{number}"] = target
         rate = self.orbit_rate_rad_s
         mu = self.gravitational_parameter_m3_s2
         if rate is not None:
             check_rate(rate, self.eccentricity)
-            times = [
-                time
-                for time in (*(target.time_s for target in self.target), self.latest_s)
-                if time is not None
-            ]
+            given = [*(target.time_s for target in self.target), self.latest_s]
+            times = [time for time in given if time is not None]
             if times:
                 check_angle("the last of time_s and latest_s", max(times), rate)
         elif self.eccentricity > 0.0:

@@ -61,6 +61,7 @@ def solve(
             f"{problem.name}: times.latest_s: is before the last time_s; make it later, or remove "
             "it"
         )
+
     best = _best(problem, options.order == "best", times == "best", begin("orders and times"))
     peak = max_control(best.path.control, best.path.breaks())
     if bound is None or peak <= bound:
@@ -68,14 +69,8 @@ def solve(
 
     bounded, least = _within_bound(problem, best, peak, bound, times == "best")
     imposed = ImposedBound(bound, least, best.path.cost, peak)
-    return MultipointReport(
-        problem,
-        options.order,
-        times,
-        bounded,
-        max_control(bounded.path.control, bounded.path.breaks()),
-        imposed,
-    )
+    bounded_peak = max_control(bounded.path.control, bounded.path.breaks())
+    return MultipointReport(problem, options.order, times, bounded, bounded_peak, imposed)
 
 
 def _within_bound(
@@ -96,10 +91,9 @@ def _within_bound(
         )
     least = needed_bound(path)
     guesses = [] if problem.times_s is None else [np.sort(problem.times_s)]
+    limits = problem.limits() if times_are_free else None
     try:
-        return bound_visits(
-            tour, best, bound, problem.limits() if times_are_free else None, guesses
-        ), least
+        return bound_visits(tour, best, bound, limits, guesses), least
     except BoundTooSmallError:
         where = "at the best times without a bound" if times_are_free else "at these times"
         if bound < least:

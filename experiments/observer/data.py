@@ -20,9 +20,11 @@ from infoset.limits import MAXIMUM
 from infoset.observer.sets import Set, polytope_of
 
 MAX_CSV_BYTES = 10_000_000
+"""Largest size of a file of measurements: 1000 bytes for each of `MAX_STEPS` steps."""
 SEPARATORS = (",", ";", "\t")
+"""Separators of a CSV file, the default first."""
 MAX_STATE = 1e40
-"""Maximum state of which sets are computed."""
+"""Largest state of which sets are computed: products of seven such numbers are finite."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +66,10 @@ def simulate(problem: ObserverProblem, errors: Errors, seed: int) -> Data:
         w = _point(problem.disturbance_set, errors, generator)
         states.append(a @ states[-1] + b @ u + (system.c or 0.0) + w)
         need_size(f"{problem.name}: simulation, step {step}", states[-1])
+
     true = np.array(states)
-    measured = (
-        true @ c.T + _signs(errors, (len(true), len(c)), generator) * problem.noise.half_width
-    )
+    noise = _signs(errors, (len(true), len(c)), generator) * problem.noise.half_width
+    measured = true @ c.T + noise
     measured[[step for step in problem.simulation.missing if step < len(measured)]] = np.nan
     return Data(measured, inputs, true, f"simulated, {errors.value} errors, seed {seed}")
 
@@ -116,9 +118,8 @@ def read_csv(file: Path, problem: ObserverProblem, columns: str) -> Data:
     """
     outputs = len(problem.system.C)
     inputs = problem.system.inputs
-    names = [f"y{number}" for number in range(1, outputs + 1)] + [
-        f"u{number}" for number in range(1, inputs + 1)
-    ]
+    names = [f"y{number}" for number in range(1, outputs + 1)]
+    names += [f"u{number}" for number in range(1, inputs + 1)]
     wanted = _renamed(names, columns)
     content = read_input(file, MAX_CSV_BYTES)
     try:
@@ -132,6 +133,7 @@ def read_csv(file: Path, problem: ObserverProblem, columns: str) -> Data:
         )
     if not 1 <= len(table) <= MAX_STEPS:
         raise InputError(f"--data: {file}: has {len(table)} steps; 1 to {MAX_STEPS} are possible")
+
     places = [header.index(name) for name in wanted]
     rows = []
     for line, cells in enumerate(table, start=2):
@@ -153,6 +155,7 @@ def read_csv(file: Path, problem: ObserverProblem, columns: str) -> Data:
                 f"NaN; found {shown(','.join(cells))}"
             )
         rows.append(row)
+
     values = np.array(rows)
     return Data(values[:, :outputs], values[:, outputs:], None, f"measurements of {file.name}")
 

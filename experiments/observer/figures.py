@@ -26,6 +26,7 @@ from infoset.experiments.common.figure_style import (
 from infoset.experiments.observer.report import ObserverReport, bounds_of, times
 
 _MAX_OUTLINES = 60
+"""Largest number of sets in a figure: more outlines cannot be told apart."""
 
 
 def draw_all(report: ObserverReport) -> Iterator[Figure | None]:
@@ -46,7 +47,8 @@ def draw_bounds(report: ObserverReport) -> Figure:
     names = report.problem.names
     figure, grid = subplots(30.0 + 38.0 * len(names), len(names), 2, sharex=True)
     time, title = times(report)
-    (lower, upper), smoothed = bounds_of(report.estimates).swapaxes(0, 1), report.smoothed
+    lower, upper = bounds_of(report.estimates).swapaxes(0, 1)
+    smoothed = report.smoothed
     dashed: dict[str, Any] = {"color": MEASURED, "linewidth": 0.9, "linestyle": (0, (4, 1.5))}
     missing = np.isnan(report.data.measured).all(axis=1)
     for index, (name, (panel, width)) in enumerate(zip(map(plain, names), grid, strict=True)):

@@ -43,8 +43,11 @@ from infoset.rendezvous.pareto import (
 _VIEWS: tuple[tuple[int, ...], ...] = ((1, 0), (0, 1, 2), (1, 2), (0, 2))
 """Axes of the panels: three planes, and space in the second one."""
 _POINTS = 241
+"""Number of times of a curve: a multiple of three, and one, for marks at thirds of the time."""
 _MARKS = 4
+"""Number of marks on a trajectory: at the ends and at each third of the time."""
 _SET_POINTS = 1200
+"""Number of points of a Pareto set; chosen: they cover the set at the size of the figure."""
 _MARKERS = {"min_group_loss": "*", "min_sum_of_costs": "P", "minimax_excess": "X", "preferred": "h"}
 _MEETING: dict[str, Any] = {
     "label": "meeting",

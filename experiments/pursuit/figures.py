@@ -43,7 +43,12 @@ EVADER: dict[str, Any] = {"color": MEASURED, "linestyle": (0, (5, 1.5)), "label"
 _START: dict[str, Any] = {"marker": "o", "markersize": 4.0, "linestyle": "none", "label": "start"}
 _STAR: dict[str, Any] = {"marker": "*", "markersize": 9.0, "color": IMPULSE, "linestyle": "none"}
 
-_ARROWS, _ARROW_LENGTH, _MIN_HEIGHT = 14, 0.17, 0.15
+_ARROWS = 14
+"""Number of arrows of thrust on a path; chosen: arrows do not overlap."""
+_ARROW_LENGTH = 0.17
+"""Length of an arrow, as a share of the orbit's radius."""
+_MIN_HEIGHT = 0.15
+"""Smallest half height of the box of the orbits, as a share of their size."""
 
 
 def draw_all(report: PursuitReport) -> Iterator[Figure | None]:

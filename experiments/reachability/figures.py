@@ -71,16 +71,14 @@ def _legend(figure: Figure, report: ReachabilityReport) -> None:
         for member in report.members
         if member.name not in drawn
     ]
-    names = (
-        ", ".join(hidden)
-        if len(hidden) <= len(_NAMES)
-        else f"{len(hidden)} of {len(report.members)}"
-    )
-    note = (
-        f"not drawn, as equal to others or beyond the first {len(LINE_LOOKS)}: {names}"
-        if hidden
-        else None
-    )
+    if not hidden:
+        legend_below(figure, 3)
+        return
+
+    names = f"{len(hidden)} of {len(report.members)}"
+    if len(hidden) <= len(_NAMES):
+        names = ", ".join(hidden)
+    note = f"not drawn, as equal to others or beyond the first {len(LINE_LOOKS)}: {names}"
     legend_below(figure, 3, title=note)
 
 
@@ -137,11 +135,11 @@ def _draw_motion(
     unit, per_m = report.length_unit
     factors = np.array([per_m if state < 3 else 1.0 for state in states])
     times = shown_times(report.solution.problem.periods, max_times)
-    for t, colour in zip(
-        times, mpl.colormaps["viridis_r"](np.linspace(*_COLOUR_RANGE, len(times))), strict=True
-    ):
+    colours = mpl.colormaps["viridis_r"](np.linspace(*_COLOUR_RANGE, len(times)))
+    for t, colour in zip(times, colours, strict=True):
         points = report.solution.sets.projection(SetKind.TUBE, t, states, tolerance) * factors
         _draw_set(axes, points, colour, f"tube at t = {t}")
+
     for look, member, path in _shown(report):
         name = _NAMES.get(member.name, member.name)
         axes.plot(
@@ -175,8 +173,7 @@ def _draw_set(axes: Any, points: Floats, colour: Any, label: str) -> None:
     else:
         look: dict[str, Any] = {"facecolors": colour, "alpha": 0.25, "shade": True}
         axes.add_collection3d(Poly3DCollection(points[hull.simplices], **look))
-        # In the legend a mark of its own: that of the collection has the colour of its first,
-        # shaded facet.
+        # The legend needs another mark: the collection's has the colour of its first, shaded facet.
         axes.plot(
             [],
             [],

@@ -14,6 +14,7 @@ from infoset.rendezvous.multipoint.tour import TourTarget, Visits
 from infoset.rendezvous.two_body import coast
 
 MAX_KNOWN = 64
+"""Largest number of paths that a flyer stores; chosen: descents need the last few."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -52,8 +52,9 @@ class NeededBound:
 
 
 _NEEDS_IT = 1e-3
-"""Share of the smallest bound's direction above which a craft is among those that need it: rounding
-is below 1e-6.
+"""Share of a craft in the direction of the smallest bound above which the craft needs the bound.
+
+The rounding of shares is below 1e-6.
 """
 
 
@@ -81,6 +82,7 @@ def bound_encounter(solution: EncounterSolution, max_m_s2: float) -> BoundedEnco
     arcs = [
         _arc(encounter, encounter.craft[index], encounter.craft[index].weight) for index in counted
     ]
+
     optimum = solve_bounded(arcs, max_m_s2)
     energies = np.empty(len(encounter.craft))
     energies[counted] = optimum.energies
@@ -124,7 +126,7 @@ def bound_encounter(solution: EncounterSolution, max_m_s2: float) -> BoundedEnco
 
 
 def _arc(encounter: Encounter, craft: Craft, weight: float) -> Arc:
-    """Return what the control of a craft has to change, as a function of the free values."""
+    """Return the change of the terminal state by a craft's control, linear in the free values."""
     common = encounter.common
     coasted = craft.motion.transition(craft.start_s, encounter.meeting_s) @ craft.state
     missing = (encounter.base - coasted)[:common]

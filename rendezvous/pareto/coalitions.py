@@ -13,10 +13,9 @@ from infoset.rendezvous._arrays import Floats
 from infoset.rendezvous.pareto.solution import EncounterSolution, weighted_point
 
 MAX_CRAFT = 12
-_ROUNDING = 1e-18
-"""Excess that is the rounding of an ideal, relative to the squared cost that the free values
-change.
-"""
+"""Largest number of craft: 4095 coalitions, each a least-squares problem."""
+_EXCESS_ROUNDING = 1e-18
+"""Excess that is the rounding of an ideal, as a share of the squared cost of the free values."""
 
 
 class Core(Enum):
@@ -94,20 +93,22 @@ def analyse_coalitions(solution: EncounterSolution) -> Coalitions:
             worth[members] = _worth(solution, members, weights)
             regret = max(float(common[list(members)].sum()) - worth[members], 0.0)
             coalitions.append(Coalition(members, worth[members], regret))
+
     shapley = np.zeros(count)
     for members, value in worth.items():
         for craft in members:
             others = tuple(member for member in members if member != craft)
             orders = factorial(len(others)) * factorial(count - len(members))
             shapley[craft] += orders / factorial(count) * (value - worth[others])
+
     # Equal ideals are equal up to rounding only.
-    rounding = _ROUNDING * sum(
-        weights * [cost.effort_base @ cost.effort_base for cost in solution.costs]
-    )
+    squares = [cost.effort_base @ cost.effort_base for cost in solution.costs]
+    rounding = _EXCESS_ROUNDING * sum(weights * squares)
     core = Core.EMPTY if worth[tuple(range(count))] > rounding else Core.ZERO
-    return Coalitions(
-        tuple(coalitions), shapley, common - shapley - (common.sum() - shapley.sum()) / count, core
-    )
+
+    # The sums are equal up to rounding, which is spread over all craft.
+    transfers = common - shapley - (common.sum() - shapley.sum()) / count
+    return Coalitions(tuple(coalitions), shapley, transfers, core)
 
 
 def _worth(solution: EncounterSolution, members: tuple[int, ...], weights: Floats) -> float:

@@ -169,11 +169,14 @@ def _bound_craft(
         np.append(np.zeros(free), 1.0),
         rcond=None,
     )[0]
+
+    # Newton's method in the point, the shares of the slopes, and the excess of all.
     best = point
     for _ in range(8):
         values = excess(point)[bound]
         tilts = slopes(point)[bound]
         top = float(values.mean())
+
         residual = np.concatenate([shares @ tilts, values - top, [shares.sum() - 1.0]])
         system = np.zeros((free + count + 1, free + count + 1))
         system[:free, :free] = 2.0 * np.einsum("n,nab->ab", shares, matrices[bound])
@@ -181,7 +184,11 @@ def _bound_craft(
         system[free : free + count, :free] = tilts
         system[free : free + count, -1] = -1.0
         system[-1, free : free + count] = 1.0
+
         step = np.linalg.lstsq(system, -residual, rcond=None)[0]
         point = point + step[:free]
         shares = shares + step[free : free + count]
-    return np.asarray(point if excess(point).max() <= excess(best).max() * (1.0 + 1e-9) else best)
+
+    if excess(point).max() <= excess(best).max() * (1.0 + 1e-9):
+        best = point
+    return np.asarray(best)

@@ -231,7 +231,9 @@ def _craft_cost(craft: Craft, whiten: Floats, missing: Floats, opening: Floats) 
     ideal = -np.linalg.solve(upper, orthogonal.T @ base)
     # Orthogonal to the slope: base + slope p* would cancel if the ideal is far away. If all
     # components that are in common are free there is no rest.
-    rest = base - orthogonal @ (orthogonal.T @ base) if len(base) > slope.shape[1] else np.zeros(0)
+    rest = np.zeros(0)
+    if len(base) > slope.shape[1]:
+        rest = base - orthogonal @ (orthogonal.T @ base)
     to_costate = np.zeros((6, len(base)))
     to_costate[: len(base)] = whiten.T
     if not np.isfinite(ideal).all():

@@ -57,7 +57,7 @@ THREE = {
 # fmt: on
 
 
-def test_flybys_at_given_times_have_the_published_costs(tours: Make) -> None:
+def test_flybys_at_given_times_have_the_known_costs(tours: Make) -> None:
     times = np.array(THREE["ts"])
     path = tours(len(times)).fly(range(len(times)), times)
     for found, key in (
@@ -73,7 +73,7 @@ def test_flybys_at_given_times_have_the_published_costs(tours: Make) -> None:
     assert np.abs(path.jumps[:, 3:]).max() < 1e-12 * np.abs(path.costate_before[:, 3:]).max()
 
 
-def test_rendezvous_at_given_times_have_the_published_costs(tours: Make) -> None:
+def test_rendezvous_at_given_times_have_the_known_costs(tours: Make) -> None:
     times = np.array(THREE["ts"])
     count = 3
     last = tours(count, [Meet.FLYBY] * (count - 1) + [Meet.RENDEZVOUS]).fly(range(count), times)
