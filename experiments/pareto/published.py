@@ -79,9 +79,8 @@ def _fitted(solution: EncounterSolution, numbers: Sequence[PrintedNumber]) -> li
     for (craft, quantity), members in groupby(numbers, lambda number: number.name.split(", ")[:2]):
         basis = np.stack([known[number.name.split(", ")[2]] for number in members], axis=1)
         sampled = Plan.control if quantity.startswith("u") else Plan.state
-        values = to_paper(sampled(solution.plan(_CRAFT.index(craft)), times))[
-            :, _COMPONENTS[quantity]
-        ]
+        vectors = to_paper(sampled(solution.plan(_CRAFT.index(craft)), times))
+        values = vectors[:, _COMPONENTS[quantity]]
         size = np.abs(basis).max(axis=0)
         found += (np.linalg.lstsq(basis / size, values, rcond=None)[0] / size).tolist()
     return found

@@ -36,8 +36,9 @@ from infoset.rendezvous.pareto import (
 from infoset.rendezvous.pareto.coalitions import MAX_CRAFT
 
 SWEEP = (0.5, 2.0, 31)
-"""Smallest and largest duration of the sweep, relative to the duration of the problem, and their
-number.
+"""Smallest and largest duration of the sweep, relative to the problem's, and their number.
+
+Chosen: costs change by some powers of the duration, and 31 points draw a smooth curve.
 """
 
 
@@ -51,8 +52,9 @@ def solve(problem: ParetoProblem, options: Pareto, begin: BeginProgress) -> Pare
         "min_group_loss": solution.point,
         "min_sum_of_costs": min_sum_of_costs(solution),
         "minimax_excess": minimax_excess(solution),
-        **({} if preferred is None else {"preferred": nearest_to(solution, preferred)}),
     }
+    if preferred is not None:
+        selections["preferred"] = nearest_to(solution, preferred)
     progress(0.2)
     imposed = _imposed(problem, solution)
     progress(0.4)

@@ -14,13 +14,14 @@ from infoset.experiments.pursuit.map import NO_GAME, MapReport
 from infoset.rendezvous.pursuit_evasion import CertificateVerdict
 
 _LEVELS = 8
+"""Number of contour lines of the capture time; chosen: their labels do not overlap."""
 _COLOURS = {
     CertificateVerdict.BRANCH_NOT_CERTIFIED.value: "#f4c28f",
     CertificateVerdict.ESCAPES.value: "#dedede",
     CertificateVerdict.PROPELLANT_EXHAUSTED.value: "#a8a8a8",
     NO_GAME: "#ffffff",
 }
-"""Of the points without a capture."""
+"""Colours of the points without a capture, by verdict."""
 _RATIOS = {
     "phase_deg": "lead of the evader, deg",
     "thrust_ratio": "thrust of the evader / thrust of the pursuer",

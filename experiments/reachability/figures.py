@@ -31,12 +31,18 @@ from infoset.experiments.common.hill_axes import AXIS_TITLES, component_titles
 from infoset.experiments.reachability.report import ChosenControl, ReachabilityReport
 from infoset.rendezvous.reachability import SetKind
 
-_TOLERANCE, _TOLERANCE_IN_SPACE = 2e-3, 1e-2
-"""Relative error of the drawn sets."""
-_MAX_TIMES, _MAX_TIMES_IN_SPACE = 6, 4
+_PLANE_TOLERANCE = 2e-3
+"""Relative error of sets in planes: less than the width of a line."""
+_SPACE_TOLERANCE = 1e-2
+"""Relative error of sets in space; chosen: finer sets have facets that are too small to be seen."""
+_MAX_TIMES = 6
+"""Largest number of times at which sets are drawn in planes; chosen: more cover each other."""
+_MAX_TIMES_IN_SPACE = 4
+"""Largest number of times at which sets are drawn in space; chosen: more cover each other."""
 _COLOUR_RANGE = (0.1, 0.95)
-"""Part of the colour map for the times of the sets, from yellow to violet: it differs in hue and in
-brightness.
+"""Part of the colour map for the times of the sets, from yellow to violet.
+
+The colours differ in hue and in brightness.
 """
 _NAMES = {
     "energy": "minimum energy",
@@ -108,9 +114,8 @@ def draw_space(report: ReachabilityReport, first: int) -> Figure:
     """Draw three of the six states in space: positions (0) or velocities (3)."""
     figure = new_figure(145.0)
     axes: Any = figure.add_subplot(projection="3d", computed_zorder=False)
-    _draw_motion(
-        axes, report, list(range(first, first + 3)), _MAX_TIMES_IN_SPACE, _TOLERANCE_IN_SPACE
-    )
+    states = list(range(first, first + 3))
+    _draw_motion(axes, report, states, _MAX_TIMES_IN_SPACE, _SPACE_TOLERANCE)
     axes.view_init(elev=22.0, azim=-58.0)
     axes.set_box_aspect((1.0, 1.0, 0.85), zoom=1.1)
     _legend(figure, report)
@@ -122,7 +127,7 @@ def draw_planes(report: ReachabilityReport) -> Figure:
     """Draw positions and velocities in two planes each."""
     figure, grid = subplots(175.0, 2, 2)
     for axes, plane in zip(grid.flat, _PLANES, strict=True):
-        _draw_motion(axes, report, list(plane), _MAX_TIMES, _TOLERANCE)
+        _draw_motion(axes, report, list(plane), _MAX_TIMES, _PLANE_TOLERANCE)
     letters([*grid.flat])
     _legend(figure, report)
     return figure

@@ -31,14 +31,20 @@ from infoset.rendezvous.relative_motion import EllipticOrbit
 
 PROBLEM = "rendezvous-2021"
 PUBLISHED_RADIUS_M = 90e3
-"""Radius of the orbit of the nonlinear columns: 9000 km, the radius at perigee, with two digits
-lost.
+"""Radius of the orbit of the nonlinear columns.
+
+It is 9000 km, the radius at perigee, with two digits lost.
 """
 _U = slice(0, 12)
+"""Numbers of a table that are controls, 4 rows of 3."""
 _LINEAR = slice(12, 36)
+"""Numbers of a table that are states of the linear model, 4 rows of 6."""
 _NONLINEAR = slice(36, 60)
+"""Numbers of a table that are states of the nonlinear model, 4 rows of 6."""
 _CONTROL_ROUNDING = 0.5e-4
+"""Half a unit of the last printed digit of a control."""
 _STATE_ROUNDING = np.array([0.05, 0.05, 0.05, 0.005, 0.005, 0.005])
+"""Half a unit of the last printed digit of each component of a state."""
 
 
 class PrintedTable(NamedTuple):

@@ -30,11 +30,11 @@ SINGLE = {
     "chebyshev": chebyshev_centre,
     "analytic": analytic_centre,
 }
-"""Selections of one control each: minimum sum of squares, of absolute values, of Euclidean norms,
-and so on.
-"""
+"""Selections of one control each: minimum sum of squares, of absolute values, of norms, etc."""
 VERTICES, SAMPLES = "vertices", "samples"
+"""Selections of several controls."""
 MAX_SAMPLES = 1000
+"""Largest number of samples; chosen: each is simulated and listed."""
 
 
 def selection(text: str) -> tuple[list[str], int]:
