@@ -18,9 +18,7 @@ from infoset.experiments.multipoint.file import MultipointProblem
 from infoset.rendezvous.multipoint import BestOrder, Grid, Path, Tour
 
 _POINTS = 1601
-"""Number of equally spaced times of a path; chosen for smooth curves and files of 100 kB a
-craft.
-"""
+"""Number of equally spaced times of a path; chosen for smooth curves."""
 _ENOUGH_A_REVOLUTION = 20.0
 """Times of a grid in a revolution below which a note says that it is coarse.
 
