@@ -29,12 +29,12 @@ FEWEST_CHUNKS = 256
 process loses less than 1 % of the runs.
 """
 MAX_CHUNK = 4096
-"""Maximum number of engagements per chunk, about 0.5 MB as a file: a campaign of a million runs has
-some 250 files, and a chunk takes seconds to a minute. Chosen; results do not depend on it.
+"""Maximum number of engagements per chunk. Chosen; results do not depend on it: a campaign of a
+million runs has some 250 files.
 """
 FEWEST_A_CELL = 50
-"""Minimum number of engagements per chunk of a sweep. Chosen; for fewer, writing a file takes a
-part of the time of its runs that cannot be neglected.
+"""Minimum number of engagements per chunk of a sweep, so that files are few. Chosen; results do not
+depend on it.
 """
 
 

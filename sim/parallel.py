@@ -36,8 +36,7 @@ from infoset.sim.simulate import simulate_runs
 from infoset.sim.versions import need_versions, versions
 
 _PARENT_CHECK_S = 0.5
-"""Time between two checks of the parent process, s. Chosen: a worker ends soon after its parent,
-and two checks a second take no measurable time.
+"""Time between two checks of the parent process, s. Chosen: a worker ends soon after its parent.
 """
 
 

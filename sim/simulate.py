@@ -28,7 +28,7 @@ STEPS_AT_ONCE = 500_000
 """Maximum number of engagements of a batch times their steps; each takes about 600 bytes."""
 FLIGHT_SHARE = 0.75
 """Share of the steps in the time of a batch; afterwards margins and bounds are computed from the
-whole history. It is measured, and affects the progress bar only.
+whole history. Chosen; it affects the progress bar only.
 """
 
 
