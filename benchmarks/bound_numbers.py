@@ -4,11 +4,11 @@ Built-in scenarios: the bound, its processor time, and the pairs of the command 
 strategies: the minimum of miss by bound, which is at least 1, and the maximum error in units of its
 bound, which is at most 1.
 
-Gravity, for docs/guarantee.md: 2 km/s with the Sun at 60 million km across the approach, an image
-each 200 s with 5 urad and 5 m, a start within 10 km of the x axis, and impulses of at most 2 m/s
-until 2000 s before the arrival. 2 G T^2 is the change of the closing speed by gravity, as a share.
-Far start: the approach of 1997 from z = 8 to 10 km with known range and speed and impulses of at
-most 0.5 m/s.
+Gravity, for docs/guarantee-bound.md: 2 km/s with the Sun at 60 million km across the approach, an
+image each 200 s with 5 urad and 5 m, a start within 10 km of the x axis, and impulses of at most 2
+m/s until 2000 s before the arrival. 2 G T^2 is the change of the closing speed by gravity, as a
+share. Far start: the approach of 1997 from z = 8 to 10 km with known range and speed and impulses
+of at most 0.5 m/s.
 """
 
 from __future__ import annotations

@@ -7,8 +7,8 @@ the same labels.
 The search is that of `infoset adversary`, with Phi in place of the miss. For the flights with the
 maximum Phi, the section of 200 labels among those that leave in each step is computed at that step,
 and the impulses of the flight act on it until its range is zero. The maximum miss of these states,
-(10) in docs/guarantee.md for 200 labels a step, is less than the supremum over all labels, which
-Phi bounds.
+(10) in docs/guarantee-miss.md for 200 labels a step, is less than the supremum over all labels,
+which Phi bounds.
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""Numbers of the 1997 interception in space, with standard errors: the table of docs/measured/index.md.
+"""Numbers of the 1997 interception in space, with standard errors: the table of
+docs/measured/index.md.
 
     python -m benchmarks.space_numbers --runs 9000 --game-runs 3000
     python -m benchmarks.space_numbers --cost

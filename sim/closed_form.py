@@ -54,7 +54,8 @@ def possible_miss_m(
 
     Notes
     -----
-    The bound of the last image is b0 = p e t_c + c. The miss is, by Lemma 17 of docs/guarantee.md,
+    The bound of the last image is b0 = p e t_c + c. The miss is, by Lemma 17 of
+    docs/guarantee-space.md,
 
         2 p e t_c + c + 2 t_c sqrt(nu b0) + nu t_c^2 / 2   if 2 sqrt(b0 / nu) <= t_f - t_c,
         b0 + (2 b0 / u + p e + nu u / 2) t_c + nu t_c^2 / 2   with u = t_f - t_c otherwise.

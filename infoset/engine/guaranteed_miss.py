@@ -1,10 +1,10 @@
 """The guaranteed miss Phi: an upper bound of the true miss over all labels, computed on board.
 
 Labels leave the set step by step as their range passes below the threshold. Phi is the maximum of
-(10) in docs/guarantee.md over all of them: a search by branch and bound. The labels that leave in
-one step are divided into pieces, and `piece_bounds` bounds each piece. The piece with the maximum
-bound is divided further until an exact section reaches nearly as much; the other pieces need no
-more than their first bounds.
+(10) in docs/guarantee-miss.md over all of them: a search by branch and bound. The labels that leave
+in one step are divided into pieces, and `piece_bounds` bounds each piece. The piece with the
+maximum bound is divided further until an exact section reaches nearly as much; the other pieces
+need no more than their first bounds.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ is then known to 0.1 %, far less than the error of a bound from one image more o
 """
 MAX_DIVIDED = 400
 """Maximum number of pieces that are divided. If more are needed, Phi is a greater bound:
-docs/guarantee.md has medians of Phi for 100 and 400 pieces. A piece takes 0.1 to 0.4 ms.
+docs/guarantee-miss.md has medians of Phi for 100 and 400 pieces. A piece takes 0.1 to 0.4 ms.
 """
 GROUPS = 3000
 """Labels that leave within this part of a flight are bounded together, if they need several steps:

@@ -3,7 +3,7 @@
 If the set is convex in (z, V, label), the feasible labels form one interval. This holds for the
 guaranteed model without rates. With rates the search finds one interval and does not narrow the
 limits of the labels to it; before it reports that no label is feasible, it searches windows of
-labels with bands that are convex there. See docs/guarantee.md for the other cases.
+labels with bands that are convex there. See docs/guarantee-miss.md for the other cases.
 """
 
 from __future__ import annotations

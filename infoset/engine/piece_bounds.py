@@ -1,8 +1,8 @@
 """Bound of the miss over a piece of the labels that leave in one step.
 
-A piece is replayed at a few labels, and Lemma 7 of docs/guarantee.md bounds the supports of the
-sections between them. With rates a piece is a window of labels, and the bands are convex on it. The
-numbers of equations are those of docs/guarantee.md.
+A piece is replayed at a few labels, and Lemma 7 of docs/guarantee-miss.md bounds the supports of
+the sections between them. With rates a piece is a window of labels, and the bands are convex on it.
+The numbers of equations are those of docs/guarantee-miss.md.
 """
 
 from __future__ import annotations

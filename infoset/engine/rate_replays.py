@@ -3,7 +3,7 @@
 With rates, the section of a label is computed with the bands of a window of labels, and a replay of
 a window leaves out the measurements that have not cut the section of any label so far: the events
 between two cuts form a stretch, which is applied at once. See "With a rate sensor" in
-docs/guarantee.md.
+docs/guarantee-miss.md.
 """
 
 from __future__ import annotations

@@ -3,8 +3,8 @@ convex on the window.
 
 The exact band of a measured rate is not convex in (z, V, label). In (Pi, V), with the predicted
 miss Pi, its direction is the same for all labels, and the bands of angles can be replaced by convex
-ones that are little wider. See "With a rate sensor" in docs/guarantee.md. The window of one label
-is the label itself, with its exact bands.
+ones that are little wider. See "With a rate sensor" in docs/guarantee-miss.md. The window of one
+label is the label itself, with its exact bands.
 """
 
 from __future__ import annotations

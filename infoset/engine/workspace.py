@@ -15,7 +15,7 @@ from infoset.engine.section_law import Laws
 
 MAX_HALVED_WINDOWS = 1000
 """Maximum number of windows of labels that a search halves. If more are needed, the set counts as
-empty. Chosen as a limit of time; Phi does not depend on this search (docs/guarantee.md).
+empty. Chosen as a limit of time; Phi does not depend on this search (docs/guarantee-miss.md).
 """
 
 LAST_REPLAY, LOWER, UPPER = constants(3)

@@ -175,7 +175,7 @@ class Sensor(ABC):
         it is at most 1.
 
         The lower bound of the miss is a theorem only if no difference of two motions within `apart`
-        is greater: see Lemma 20 of docs/guarantee.md.
+        is greater: see Lemma 20 of docs/guarantee-bound.md.
         """
 
     def measures_at(self, before_arrival_s: float) -> bool:

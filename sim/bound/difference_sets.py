@@ -2,7 +2,7 @@
 
 The difference of two motions with the same impulses, pulled back to t = 0, is a vector s of offset
 and velocity. To first order, the differences with equal measurements are (Theorem 5a of
-docs/guarantee.md)
+docs/guarantee-bound.md)
 
     S_0 = box,    S_(k+1) = (S_k cut by the strips of step k) + [-1, 1] g_k.
 

@@ -1,6 +1,6 @@
 """Difference of the lower bound from the value of the game, where Theorem 7 holds.
 
-Theorem 7 and Lemma 22 are in docs/guarantee.md.
+Theorem 7 and Lemma 22 are in docs/guarantee-bound.md.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def value_reserve(scenario: Scenario, lower: LowerBound) -> ValueReserve | str:
 
     Notes
     -----
-    docs/guarantee.md, Lemma 22, has the proof. Cost: one information set.
+    docs/guarantee-bound.md, Lemma 22, has the proof. Cost: one information set.
     """
     course = _course(scenario)
     minimum_m_s = scenario.thruster.min_impulse_m_s

@@ -21,7 +21,7 @@ rounding of a quotient of times, and one impulse more only makes the reserve gre
 
 @dataclass(frozen=True)
 class GravityReserve:
-    """Bounds of Lemma 21 of docs/guarantee.md, for any strategy; zero in free space.
+    """Bounds of Lemma 21 of docs/guarantee-bound.md, for any strategy; zero in free space.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ class _HalfDifference(NamedTuple):
 
 
 class _Domain(NamedTuple):
-    """Time and space in which Lemma 21 holds, with the symbols of docs/guarantee.md.
+    """Time and space in which Lemma 21 holds, with the symbols of docs/guarantee-bound.md.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def gravity_reserve(
 
     Notes
     -----
-    docs/guarantee.md, Lemma 21 and its corollary, has the symbols and the proof.
+    docs/guarantee-bound.md, Lemma 21 and its corollary, has the symbols and the proof.
     """
     if sun is None:
         return _reserve_in_free_space(motion, reach_m, thruster, step_s)

@@ -92,11 +92,11 @@ def lower_bound(
     distance between measurements. Therefore the search covers whole periods of labels in some parts
     of the range interval, for both ends of the interval of V_x and for the nominal closing speed,
     and refines the best labels. For each label, one pass over the steps gives the farthest motions
-    for every last common step (Theorem 5a of docs/guarantee.md).
+    for every last common step (Theorem 5a of docs/guarantee-bound.md).
 
     Equal measurements up to step s give equal impulses up to step s. Later impulses change the
     distance of the two across x at x = 0 by at most their common limit, and one of the two has at
-    least half of the rest; for one motion alone all impulses count. docs/guarantee.md has the
+    least half of the rest; for one motion alone all impulses count. docs/guarantee-bound.md has the
     proof, with the reserves for gravity and for the slope of the line of sight.
 
     In space, each axis has its own sets of differences, and the impulses limit the modulus. The two

@@ -547,7 +547,7 @@ class PairApproach:
     def _beyond_first_order(
         self, sighting: _Sighting, difference: Floats, reserve: GravityReserve
     ) -> Floats:
-        """Return the terms of equation (26) of docs/guarantee.md after the first one, m."""
+        """Return the terms of equation (26) of docs/guarantee-bound.md after the first one, m."""
         closing = reserve.closing_m_s
         to_go = sighting.to_go_s
         rates = np.abs(difference[self.motion.axes :, sighting.due]) + reserve.speed_m_s
