@@ -36,7 +36,7 @@ from infoset.engine.workspace import Past, Records, past_of, select
 
 TIGHT = 1.001
 """A piece is divided if its bound exceeds the maximum miss of an exact section by this factor: Phi
-is then known to 0.1 %, far less than the error of a bound from one image more or less. Chosen.
+is then at most 0.1 % greater than the exact maximum. Chosen.
 """
 MAX_DIVIDED = 400
 """Maximum number of pieces that are divided. If more are needed, Phi is a greater bound:
