@@ -1,6 +1,4 @@
-"""Guidance: strategies that turn an information set into impulses, the thruster, and measurement
-noise.
-"""
+"""Guidance: strategies, which turn an information set into impulses, thruster and noises."""
 
 from infoset.guidance.estimate import MissEstimate
 from infoset.guidance.game_noise import GameNoise

@@ -1,4 +1,4 @@
-"""What the impulses after a decision can still correct."""
+"""The miss that impulses after a decision can still correct."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from infoset.guidance.thruster import Thruster
 
 
 def correctable_later_m(situation: Situation, range_m: Floats) -> Floats:
-    """Return the miss (m) that impulses after this step can still correct, if the object is now at
-    `range_m`.
+    """Return the miss (m) that impulses after this step can still correct.
 
     It is the sum of mu2 x_j/e over the later impulses with x_j > 0, as many as the budget allows.
 
     Parameters
     ----------
     range_m : ndarray, shape (..., B, S)
-        Ranges of hypotheses.
+        Present ranges of hypotheses.
     """
     thruster = situation.thruster
     e = situation.closing_speed_m_s
     step_s = situation.step_s
     budget = situation.budget_left_m_s[:, None]
     if situation.later_times_s is not None:
-        return correctable_m(
-            situation.later_times_s - situation.time_s, thruster, budget, range_m / e
-        )
+        times_s = situation.later_times_s - situation.time_s
+        return correctable_m(times_s, thruster, budget, range_m / e)
+
+    # Impulses in each of the next steps, the first ones at their maximum.
     to_go_s = range_at_impulse(range_m, e, situation.lead_s) / e
     steps = np.ceil(to_go_s / step_s) - 1.0
     full = np.clip(np.floor(budget / thruster.max_impulse_m_s), 0.0, np.maximum(steps, 0.0))
@@ -40,8 +40,9 @@ def correctable_later_m(situation: Situation, range_m: Floats) -> Floats:
 def correctable_m(
     times_s: Floats, thruster: Thruster, budget: Floats, to_go_s: Floats, first: Integers | int = 0
 ) -> Floats:
-    """Return the miss (m) that impulses can correct: as many as the budget allows, the last one
-    with its rest.
+    """Return the miss (m) that impulses can correct, as many as the budget allows.
+
+    The last impulse has the rest of the budget.
 
     Parameters
     ----------
@@ -56,6 +57,8 @@ def correctable_m(
     full = np.minimum(budget // thruster.max_impulse_m_s, number).astype(np.int64)
     rest = np.minimum(budget - full * thruster.max_impulse_m_s, thruster.max_impulse_m_s)
     rest = np.where((full < number) & (rest >= thruster.min_impulse_m_s), rest, 0.0)
+
+    # The sum of the times to go of the impulses from `first` to `end`, by sums of all times.
     end = first + full
     times_s = times_s[: end.max(initial=0) + 1]
     sums_s = np.append(0.0, np.cumsum(times_s))
@@ -73,14 +76,11 @@ def max_correctable_m(
     first: Integers | int = 0,
     budget: Floats | float | None = None,
 ) -> Floats:
-    """Return `correctable_m` with the errors of execution in favour of the engine: it never
-    corrects more.
+    """Return the maximum of `correctable_m` for all errors of execution, m.
 
     The default budget is no limit.
     """
-    limit = np.asarray(
-        thruster.max_impulse_m_s * (len(times_s) + 1.0) if budget is None else budget
-    )
-    return (1.0 + thruster.execution_error_relative) * correctable_m(
-        times_s, thruster, limit, to_go_s, first
-    )
+    if budget is None:
+        budget = thruster.max_impulse_m_s * (len(times_s) + 1.0)
+    commanded_m = correctable_m(times_s, thruster, np.asarray(budget), to_go_s, first)
+    return (1.0 + thruster.execution_error_relative) * commanded_m

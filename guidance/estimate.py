@@ -31,10 +31,10 @@ class MissEstimate:
     to_go_s: Floats
 
     def correction_m_s(self, dead_zone_m: Floats | float = 0.0) -> Floats:
-        """Return the impulse that corrects the part of the miss outside a dead zone, m/s; zero at
-        the closest approach.
+        """Return the impulse that corrects the part of the miss outside a dead zone, m/s.
 
-        `dead_zone_m` is the half-width of the zone, a number or shape (C, B).
+        `dead_zone_m` is the half-width of the zone, a number or shape (C, B). The impulse is zero
+        at the closest approach.
         """
         outside_m = self.miss_m - np.clip(self.miss_m, -dead_zone_m, dead_zone_m)
         return np.divide(

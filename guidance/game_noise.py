@@ -13,12 +13,14 @@ from infoset.information_set import InformationSetView
 from infoset.sensors import BearingSensor, Measurements, RangeSensor
 
 TIE_TOLERANCE = 1e-6
+"""Difference of the moduli of two equally bad extremes, as a share of the interval: more than the
+rounding of an impulse of U_s, after which they are equal, and less than a measurement changes them.
+"""
 
 
 @dataclass(frozen=True)
 class GameNoise:
-    """Measurements that keep the point of maximum predicted miss in the set, and as much of the set
-    as possible.
+    """Measurements that keep the point of maximum predicted miss, and much of the set, in the set.
 
     Parameters
     ----------
@@ -51,8 +53,8 @@ class GameNoise:
     Each axis has its own extremes and its own worse one; the measured angles are chosen for each
     axis. In space, the range has the rule of the plane, for the corner (worse extreme of y, worse
     extreme of z) of the rectangle of predicted misses of each section: the point to keep is in the
-    section where this corner has the maximum modulus, the other extreme in that of the opposite
-    corner.
+    section where this corner has the maximum modulus, the other extreme in the section where the
+    opposite corner has it.
 
     References
     ----------
@@ -75,35 +77,37 @@ class GameNoise:
         angles = predicted.min_and_max_alpha()
         miss = predicted.predicted_miss(sight.pending)
         upper_is_worse = self._upper_is_worse(miss, sight.step)
+
         measured = {}
         for name, sensor in sight.sensors.items():
-            true = sensor.true_value(sight)
             if isinstance(sensor, BearingSensor):
-                chosen = self._shifted(
-                    sensor, sight, _angle(sensor, sight, angles, miss, upper_is_worse)
-                )
+                angle = _angle(sensor, sight, angles, miss, upper_is_worse)
+                chosen = self._shifted(sensor, sight, angle)
             elif isinstance(sensor, RangeSensor):
                 chosen = _range(sensor, sight, predicted, miss, upper_is_worse)
             else:
                 upper = sensor.true_value(miss.upper_point)
                 lower = sensor.true_value(miss.lower_point)
                 chosen = sensor.nearest(sight, np.where(upper_is_worse, upper, lower))
-            measured[name] = np.where(miss.exists, chosen, true)
+            measured[name] = np.where(miss.exists, chosen, sensor.true_value(sight))
         return measured
 
     @property
     def truth_side(self) -> Floats:
-        """Side to which the shift moves the true state, shape () or (C, B): 1 or -1, 0 for no
-        shift.
+        """Side to which the shift moves the true state: 1 or -1, 0 for no shift.
+
+        The shape is () or (C, B).
         """
-        sides = {} if self.shift_m is None else {TieRule.UPPER: -1.0, TieRule.LOWER: 1.0}
-        side = np.array(sides.get(self.tie, 0.0))
-        return side if self.target_side is None else np.where(side == 0.0, 0.0, self.target_side)
+        if self.shift_m is None or self.tie not in (TieRule.UPPER, TieRule.LOWER):
+            side = 0.0
+        else:
+            side = -1.0 if self.tie is TieRule.UPPER else 1.0
+        if self.target_side is None:
+            return np.array(side)
+        return np.where(side == 0.0, 0.0, self.target_side)
 
     def _shifted(self, sensor: BearingSensor, sight: LineOfSight, chosen: Floats) -> Floats:
-        """Return the measured angles with the shift of this step where there is one, and the chosen
-        ones elsewhere.
-        """
+        """Return the shifted true angles of this step, and `chosen` where nothing is shifted."""
         if self.shift_m is None:
             return chosen
         side = self.truth_side
@@ -114,20 +118,20 @@ class GameNoise:
     def _upper_is_worse(self, miss: PredictedMiss, step: int) -> Flags:
         upper = np.abs(miss.upper_m)
         lower = np.abs(miss.lower_m)
-        tie = np.abs(upper - lower) <= TIE_TOLERANCE * (miss.upper_m - miss.lower_m)
-        at_tie: Flags | bool = self.tie is TieRule.UPPER or (
-            self.tie is TieRule.ALTERNATE and step % 2 == 0
-        )
+        is_tie = np.abs(upper - lower) <= TIE_TOLERANCE * (miss.upper_m - miss.lower_m)
+        at_tie: Flags | bool
         if self.tie is TieRule.RANDOM:
-            at_tie = draws_of_step("tie_draws", self.tie_draws, step, tie.shape) >= 0.0
-        return np.where(tie, at_tie, upper > lower)
+            at_tie = draws_of_step("tie_draws", self.tie_draws, step, is_tie.shape) >= 0.0
+        elif self.tie is TieRule.ALTERNATE:
+            at_tie = step % 2 == 0
+        else:
+            at_tie = self.tie is TieRule.UPPER
+        return np.where(is_tie, at_tie, upper > lower)
 
 
 @dataclass(frozen=True)
 class SwitchingNoise(GameNoise):
-    """Game noise that keeps the extreme prescribed for each step: the upper one where `tie_draws`
-    is not negative.
-    """
+    """Game noise that keeps a prescribed extreme: the upper one if `tie_draws` is not negative."""
 
     def _upper_is_worse(self, miss: PredictedMiss, step: int) -> Flags:
         return draws_of_step("tie_draws", self.tie_draws, step, miss.upper_m.shape) >= 0.0
@@ -190,23 +194,24 @@ def _ranges_of_corners(
 ) -> tuple[Floats, Floats]:
     """Return the ranges of the sections of the worst corner and of the opposite one, m, each (B,).
 
-    Corners on the other side of zero count as negative, so that the rule is that of the plane if an
-    axis is exactly zero.
+    Corners on the other side of zero count as negative: with a miss of zero along one axis, the
+    rule is then the rule of the plane.
     """
     lower, upper = predicted.predicted_miss_by_section_m()
     is_upper = upper_is_worse[..., None]
+    side = np.where(is_upper, 1.0, -1.0)
+
+    def signed_modulus(corner: Floats) -> Floats:
+        return np.asarray(np.copysign(np.hypot(*corner), (side * corner).sum(axis=0)))
+
+    worst = signed_modulus(np.where(is_upper, upper, lower))
+    other = signed_modulus(np.where(is_upper, lower, upper))
     ranges = predicted.ranges_m
     feasible = predicted.feasible & (ranges != 0.0)
     rows = np.arange(len(ranges))
-    side = np.where(is_upper, 1.0, -1.0)
-    worst, other = (
-        np.copysign(np.hypot(*corner), (side * corner).sum(axis=0))
-        for corner in (np.where(is_upper, upper, lower), np.where(is_upper, lower, upper))
-    )
-    return (
-        ranges[rows, np.where(feasible, worst, -np.inf).argmax(axis=1)],
-        ranges[rows, np.where(feasible, other, np.inf).argmin(axis=1)],
-    )
+    worst_section = np.where(feasible, worst, -np.inf).argmax(axis=1)
+    other_section = np.where(feasible, other, np.inf).argmin(axis=1)
+    return ranges[rows, worst_section], ranges[rows, other_section]
 
 
 def keep_point(
@@ -218,8 +223,7 @@ def keep_point(
     lower: Floats,
     upper: Floats,
 ) -> Floats:
-    """Return the measured values in [lower, upper] that keep a point, and otherwise as much of the
-    set as possible.
+    """Return the measured values in [lower, upper] that keep a point, and then most of the set.
 
     A measured value agrees with an interval of values; "top" and "bottom" are the ends of that
     interval. All arrays have the shape (..., B).
@@ -238,12 +242,14 @@ def keep_point(
 
     References
     ----------
-    Kumkov and Patsko (1997), section 7: the rule for ranges, and 'the same way' the one for angles.
+    Kumkov and Patsko (1997), section 7: the rule for ranges, and 'the same way' for angles.
     """
     nearest = np.minimum(np.maximum(point_at_top, lower), upper)
     wider = np.minimum(min_at_bottom, upper)
     for_larger = np.where((nearest >= min_at_bottom) | (nearest == upper), nearest, wider)
+
     nearest = np.minimum(np.maximum(point_at_bottom, lower), upper)
     wider = np.maximum(max_at_top, lower)
     for_smaller = np.where((nearest <= max_at_top) | (nearest == lower), nearest, wider)
+
     return np.where(is_larger, for_larger, for_smaller)

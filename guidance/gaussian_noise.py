@@ -17,9 +17,7 @@ Gaussian is finite.
 
 
 def share_cut(sigma: float) -> float:
-    """Return the share of a Gaussian of standard deviation `sigma`, in units of the bound, that
-    lies outside it.
-    """
+    """Return the share of a Gaussian outside the bound; `sigma` is in units of the bound."""
     return float(2.0 * ndtr(-1.0 / sigma))
 
 
@@ -30,10 +28,10 @@ def truncated_gaussian(uniform: Floats, sigma: float) -> Floats:
     negative quantile.
     """
     size = np.abs(uniform)
-    tail = 0.5 * (1.0 - size) + size * ndtr(
-        -1.0 / sigma
-    )  # the probability of a larger error of this sign
-    return np.asarray(np.copysign(np.minimum(-sigma * ndtri(tail), 1.0), uniform))
+    # The probability of a larger error of this sign.
+    tail = 0.5 * (1.0 - size) + size * ndtr(-1.0 / sigma)
+    error = np.minimum(-sigma * ndtri(tail), 1.0)
+    return np.asarray(np.copysign(error, uniform))
 
 
 def correlated_uniform(uniform: Floats, correlation: float) -> Floats:
@@ -48,7 +46,7 @@ def correlated_uniform(uniform: Floats, correlation: float) -> Floats:
 
     Notes
     -----
-    The underlying process is that of Gauss and Markov: x_0 = w_0 and x_k = c x_(k-1) + sqrt(1 -
+    The underlying process is a Gauss-Markov process: x_0 = w_0 and x_k = c x_(k-1) + sqrt(1 -
     c^2) w_k for the correlation c and independent standard Gaussian w_k. It is stationary, and its
     autocorrelation after k steps is c^k.
     """
@@ -81,10 +79,10 @@ def gaussian_noise(
     correlation : float
         As in `correlated_uniform`, for errors that are correlated in time; 0 is independent errors.
     """
-    errors = {
-        name: truncated_gaussian(
-            correlated_uniform(each, correlation) if correlation else each, sigma
-        )
-        for name, each in uniform.items()
-    }
-    return RandomNoise(errors, None if bias is None else truncated_gaussian(bias, sigma))
+    errors = {}
+    for name, independent in uniform.items():
+        numbers = correlated_uniform(independent, correlation) if correlation else independent
+        errors[name] = truncated_gaussian(numbers, sigma)
+    if bias is None:
+        return RandomNoise(errors)
+    return RandomNoise(errors, truncated_gaussian(bias, sigma))

@@ -19,8 +19,12 @@ Z, VZ, X, SPEED, ACCELERATION = range(5)
 acceleration.
 """
 MEMBERS = 9
-"""Number M of filters."""
-ROUNDING = 64.0 * 2.0**-52
+"""Number M of filters. Chosen: one linearisation must be good for an interval of the range."""
+MIN_RANGE_STEPS = 0.1
+"""Minimum estimated range in measurements, in steps at the closing speed: an estimate can be past
+the arrival, where an angle has no meaning. Chosen: less than the next step.
+"""
+VARIANCE_ROUNDING = 64.0 * 2.0**-52
 """Rounding error of the variance of a component, relative to it: since the last measurement each
 element has gone through three products of matrices of up to 5 x 5, some 50 roundings."""
 PRECISE = 2.0**-36
@@ -29,8 +33,9 @@ precise measurement leaves at least 16 of the 52 bits of the covariance."""
 
 
 class KalmanBank:
-    """A bank of M = 9 extended Kalman filters for each engagement and lateral axis, one for each
-    interval of the range.
+    """A bank of M = 9 extended Kalman filters for each engagement and lateral axis.
+
+    Each filter has an interval of the range.
 
     Parameters
     ----------
@@ -50,8 +55,8 @@ class KalmanBank:
     Notes
     -----
     The state is (z, V_z, x, closing speed) with z' = V_z, x' = -closing speed, and the impulses as
-    given. The variance of a measurement is b^2/3, that of an error uniform within +-b, with b at
-    the estimated range. The prior is uniform within the initial bounds of the set. Angles alone
+    given. The variance of a measurement is b^2/3, for an error uniform within +-b, with b at the
+    estimated range. The prior is uniform within the initial bounds of the set. Angles alone
     show the range only through the impulses, and one linearisation is poor for a wide prior of the
     range. Therefore each filter of the bank has an interval of the range, and its weight is the
     likelihood of its measurements (a range-parameterised filter). The estimated miss is the one
@@ -65,8 +70,8 @@ class KalmanBank:
     starts at a random time within the flight has this spectral density (Zarchan).
 
     A camera with a constant centroid error has two parts of errors. The pixel part is the noise of
-    the measurements; the variance c^2/3 of the centroid part is added to that of the miss. Errors
-    of the engine add the variance (delta k)^2/3 to that of V_z after an impulse k.
+    the measurements; the variance c^2/3 of the centroid part is added to the variance of the miss.
+    Errors of the engine add (delta k)^2/3 to the variance of V_z after an impulse k.
 
     A measurement is *precise* if its variance R is nearly below the rounding of the variance of the
     expected value; R is negligible for an angle that is measured without error. It is used as a
@@ -95,54 +100,89 @@ class KalmanBank:
             self._set_prior(situation)
         else:
             self._predict(situation)
-        nearest = situation.closing_speed_m_s * situation.step_s * 0.1
-        z = self.mean[..., Z]
-        x = np.maximum(self.mean[..., X], nearest)
         meter = situation.sensors.get("range")
         if "range" in situation.new and isinstance(meter, RangeSensor):
-            gradient = np.zeros_like(self.mean)
-            gradient[..., X] = 1.0
-            variance = (meter.relative_error * x) ** 2 / 3.0
-            self._measure(situation, "range", self.mean[..., X], gradient, variance)
-            z = self.mean[..., Z]
-            x = np.maximum(self.mean[..., X], nearest)
+            self._measure_range(situation, meter)
         if "angle" in situation.new:
-            gradient = np.zeros_like(self.mean)
-            square = z * z + x * x
-            gradient[..., Z], gradient[..., X] = x / square, -z / square
-            expected = np.arctan2(z, x)
-            variance = _independent_error_rad(situation.information.model, x) ** 2 / 3.0
-            precise = self._is_precise(gradient, variance)
-            if precise.any():
-                alpha = np.where(situation.is_new("angle"), situation.measured["angle"], 0.0)[
-                    ..., None
-                ]
-                # The equation z = x tan(alpha), times cos^2(alpha) / x, for an innovation in
-                # radians.
-                cosine = np.cos(alpha)
-                sine = np.sin(alpha)
-                expected = np.where(precise, alpha - cosine * (sine - z / x * cosine), expected)
-                gradient[..., Z] = np.where(precise, cosine * cosine / x, gradient[..., Z])
-                gradient[..., X] = np.where(precise, -sine * cosine / x, gradient[..., X])
-            self._measure(situation, "angle", expected, gradient, variance)
+            self._measure_angle(situation)
+
+    def _positive_ranges_m(self, situation: Situation) -> Floats:
+        """Return the estimated ranges, at least a share of a step."""
+        nearest = situation.closing_speed_m_s * situation.step_s * MIN_RANGE_STEPS
+        return np.maximum(self.mean[..., X], nearest)
+
+    def _measure_range(self, situation: Situation, meter: RangeSensor) -> None:
+        gradient = np.zeros_like(self.mean)
+        gradient[..., X] = 1.0
+        variance = (meter.relative_error * self._positive_ranges_m(situation)) ** 2 / 3.0
+        self._measure(situation, "range", self.mean[..., X], gradient, variance)
+
+    def _measure_angle(self, situation: Situation) -> None:
+        z = self.mean[..., Z]
+        x = self._positive_ranges_m(situation)
+        square = z * z + x * x
+        gradient = np.zeros_like(self.mean)
+        gradient[..., Z] = x / square
+        gradient[..., X] = -z / square
+        expected = np.arctan2(z, x)
+        variance = _independent_error_rad(situation.information.model, x) ** 2 / 3.0
+
+        precise = self._is_precise(gradient, variance)
+        if precise.any():
+            measured = np.where(situation.is_new("angle"), situation.measured["angle"], 0.0)
+            alpha = measured[..., None]
+            # The equation z = x tan(alpha), times cos^2(alpha) / x, for an innovation in radians.
+            cosine = np.cos(alpha)
+            sine = np.sin(alpha)
+            expected = np.where(precise, alpha - cosine * (sine - z / x * cosine), expected)
+            gradient[..., Z] = np.where(precise, cosine * cosine / x, gradient[..., Z])
+            gradient[..., X] = np.where(precise, -sine * cosine / x, gradient[..., X])
+        self._measure(situation, "angle", expected, gradient, variance)
 
     def estimate(self, situation: Situation) -> MissEstimate:
         """Return the estimated miss over the bank."""
-        ahead = self.mean[..., X] > 0.0
-        weight = np.where(
-            ahead, np.exp(self.log_weight - self.log_weight.max(axis=-1, keepdims=True)), 0.0
+        weight = self._weights()
+        to_go = np.maximum(self.mean[..., X], 0.0) / self.mean[..., SPEED]
+        miss, variance = self._misses(to_go)
+        for time_s, impulse in situation.pending:
+            miss = miss - impulse[..., None] * np.maximum(to_go - time_s, 0.0)
+
+        mean = (weight * miss).sum(axis=-1)
+        # Rounding may leave a small variance just below zero.
+        spread = (weight * (np.maximum(variance, 0.0) + (miss - mean[..., None]) ** 2)).sum(axis=-1)
+        constant_m = _constant_error_m(situation.information.model.angle_sensor)
+        deviation = np.sqrt(spread + constant_m**2 / 3.0)
+
+        lever = np.maximum(to_go - situation.lead_s, 0.0)
+        square = (weight * lever**2).sum(axis=-1)
+        best = np.divide(
+            (weight * miss * lever).sum(axis=-1),
+            square,
+            out=np.zeros_like(mean),
+            where=square > 0.0,
         )
+        mean_lever = (weight * lever).sum(axis=-1)
+        return MissEstimate(best * mean_lever, deviation, mean_lever)
+
+    def _weights(self) -> Floats:
+        """Return the probabilities of the filters, shape (C, B, M): zero past the arrival."""
+        ahead = self.mean[..., X] > 0.0
+        ratio = np.exp(self.log_weight - self.log_weight.max(axis=-1, keepdims=True))
+        weight = np.where(ahead, ratio, 0.0)
         total = weight.sum(axis=-1, keepdims=True)
-        weight = np.divide(weight, total, out=np.zeros_like(weight), where=total > 0.0)
+        return np.divide(weight, total, out=np.zeros_like(weight), where=total > 0.0)
+
+    def _misses(self, to_go: Floats) -> tuple[Floats, Floats]:
+        """Return the misses of the filters without pending impulses, and their variances."""
         speed = self.mean[..., SPEED]
         velocity = self.mean[..., VZ]
-        to_go = np.maximum(self.mean[..., X], 0.0) / speed
         miss = self.mean[..., Z] + velocity * to_go
         final_velocity = velocity
         if self._is_augmented:
             acceleration = self.mean[..., ACCELERATION]
             miss = miss + 0.5 * acceleration * to_go**2
             final_velocity = velocity + acceleration * to_go
+
         gradient = [
             np.ones_like(miss),
             to_go,
@@ -152,25 +192,7 @@ class KalmanBank:
         if self._is_augmented:
             gradient.append(0.5 * to_go**2)
         by_state = np.stack(gradient, axis=-1)
-        variance = np.einsum("...i,...ij,...j->...", by_state, self.covariance, by_state)
-        for time_s, impulse in situation.pending:
-            miss = miss - impulse[..., None] * np.maximum(to_go - time_s, 0.0)
-        mean = (weight * miss).sum(axis=-1)
-        # Rounding may leave a small variance just below zero.
-        spread = (weight * (np.maximum(variance, 0.0) + (miss - mean[..., None]) ** 2)).sum(axis=-1)
-        deviation = np.sqrt(
-            spread + _constant_error_m(situation.information.model.angle_sensor) ** 2 / 3.0
-        )
-        lever = np.maximum(to_go - situation.lead_s, 0.0)
-        square = (weight * lever**2).sum(axis=-1)
-        best = np.divide(
-            (weight * miss * lever).sum(axis=-1),
-            square,
-            out=np.zeros_like(mean),
-            where=square > 0.0,
-        )
-        lever = (weight * lever).sum(axis=-1)
-        return MissEstimate(best * lever, deviation, lever)
+        return miss, np.einsum("...i,...ij,...j->...", by_state, self.covariance, by_state)
 
     @property
     def _is_augmented(self) -> bool:
@@ -186,10 +208,8 @@ class KalmanBank:
         for axis, plane in enumerate(map(model.axis, model.axes)):
             z_m = plane.bounds.z_m
             vz_m_s = plane.bounds.vz_m_s
-            self.mean[axis, ..., Z], self.mean[axis, ..., VZ] = (
-                0.5 * (z_m[0] + z_m[1]),
-                0.5 * (vz_m_s[0] + vz_m_s[1]),
-            )
+            self.mean[axis, ..., Z] = 0.5 * (z_m[0] + z_m[1])
+            self.mean[axis, ..., VZ] = 0.5 * (vz_m_s[0] + vz_m_s[1])
             widths = [
                 np.ptp(z_m),
                 np.ptp(vz_m_s),
@@ -197,25 +217,30 @@ class KalmanBank:
                 np.ptp(bounds.vx_m_s),
                 2.0 * plane.acceleration_m_s2,
             ]
+            # The variance of a uniform distribution is its width squared by 12.
             self.covariance[axis] = np.diag(np.square(widths[: self.mean.shape[-1]]) / 12.0)
 
     def _predict(self, situation: Situation) -> None:
         step_s = situation.step_s
         model = situation.information.model
-        size = self.mean.shape[-1]
         self.mean[..., VZ] -= situation.last_impulse_m_s[..., None]
-        motion = np.eye(size)
-        motion[Z, VZ], motion[X, SPEED] = step_s, -step_s
+        motion = np.eye(self.mean.shape[-1])
+        motion[Z, VZ] = step_s
+        motion[X, SPEED] = -step_s
+
+        # Noise of the process: one acceleration for a step, or the change of the estimated one.
         push = np.array([0.5 * step_s**2, step_s, 0.0, 0.0])
         accelerations = np.array([model.axis(name).acceleration_m_s2 for name in model.axes])
         variance = accelerations**2 / 3.0
         if self._is_augmented:
-            motion[Z, ACCELERATION], motion[VZ, ACCELERATION] = push[:2]
+            motion[Z, ACCELERATION] = push[0]
+            motion[VZ, ACCELERATION] = push[1]
             push = np.array([*push, 1.0])
             variance *= step_s * situation.closing_speed_m_s / model.bounds.x_m[1]
         if situation.thruster.execution_error_relative > 0.0:
             error = situation.thruster.execution_error_relative * situation.last_impulse_m_s
             self.covariance[..., VZ, VZ] += error[..., None] ** 2 / 3.0
+
         self.mean = self.mean @ motion.T
         self.covariance = motion @ self.covariance @ motion.T
         self.covariance += variance[:, None, None, None, None] * np.outer(push, push)
@@ -237,6 +262,7 @@ class KalmanBank:
             self._measure_precisely(new & precise, innovation, expected, gradient, variance)
             new = new & ~precise
             variance = np.where(precise, 1.0, variance)
+
         spread = np.einsum("...ij,...j->...i", self.covariance, gradient)
         # Rounding may leave a negative value where angles have reduced a variance by twenty
         # decades.
@@ -252,18 +278,15 @@ class KalmanBank:
     def _measure_precisely(
         self, where: Flags, innovation: Floats, expected: Floats, gradient: Floats, variance: Floats
     ) -> None:
-        """Update the filters of `where` with one scalar measurement, in Potter's form, and their
-        weights.
-        """
+        """Update the filters of `where` and their weights by one measurement, in Potter's form."""
         row = gradient[where]
         residual = innovation[where]
         root = _square_root(self.covariance[where])
         across = np.einsum("nij,ni->nj", root, row)
         square = (across * across).sum(axis=-1) + variance[where]
 
-        rounding = (
-            ROUNDING * self._largest_variance(gradient)[where] + (ROUNDING * expected[where]) ** 2
-        )
+        of_variance = VARIANCE_ROUNDING * self._largest_variance(gradient)[where]
+        rounding = of_variance + (VARIANCE_ROUNDING * expected[where]) ** 2
         total = np.maximum(square, rounding)
         across = np.where((square > rounding)[:, None], across, 0.0)
         gain = np.einsum("nij,nj->ni", root, across) / total[:, None]
@@ -279,44 +302,42 @@ class KalmanBank:
         return np.asarray(variance < PRECISE * self._largest_variance(gradient))
 
     def _largest_variance(self, gradient: Floats) -> Floats:
-        """Return the maximum variance h'Ph of an expected value, (sum |h_i| s_i)^2 with the
-        deviations s_i of P.
+        """Return the maximum variance h'Ph of an expected value with the deviations s_i of P.
+
+        It is (sum abs(h_i) s_i)^2.
         """
         deviations = np.sqrt(np.maximum(np.einsum("...ii->...i", self.covariance), 0.0))
         return np.asarray((np.abs(gradient) * deviations).sum(axis=-1) ** 2)
 
 
 def _square_root(covariance: Floats) -> Floats:
-    """Return a matrix S with S S' = P for each covariance P, shape (n, size, size); rounding may
-    leave P indefinite.
+    """Return a matrix S with S S' = P for each covariance P, shape (n, size, size).
+
+    Rounding may leave P indefinite; its negative eigenvalues count as zero.
     """
     deviations = np.sqrt(np.maximum(np.einsum("nii->ni", covariance), 0.0))
     scale = np.where(deviations > 0.0, deviations, 1.0)
     # The components have different units, and the rounding errors of their correlations have none.
     correlations = np.clip(covariance / scale[:, :, None] / scale[:, None, :], -1.0, 1.0)
     values, vectors = np.linalg.eigh(correlations)
-    return np.asarray(
-        deviations[:, :, None] * vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
-    )
+    roots = np.sqrt(np.maximum(values, 0.0))
+    return np.asarray(deviations[:, :, None] * vectors * roots[:, None, :])
 
 
 def _independent_error_rad(model: SetModel, range_m: Floats) -> Floats:
-    """Return the bound of the part of an angle error that is independent between measurements, rad,
-    shape (C, B, M).
+    """Return the bound of the independent part of an angle error, rad, shape (C, B, M).
 
-    A line that falls with the range is positive up to the maximum possible distance, and an
-    estimate can be beyond it. The bound is therefore at least half of that at the maximum distance.
+    A bound that falls linearly with the range is positive up to the maximum possible distance, and
+    an estimate can be beyond it. At least half of the bound at the maximum distance is returned.
     """
     bound = np.empty_like(range_m)
     for axis, plane in enumerate(map(model.axis, model.axes)):
         sensor = plane.angle_sensor
-        bound[axis] = (
-            sensor.constant_error_rad
-            if sensor.has_constant_bias
-            else np.maximum(
-                sensor.error_bound(range_m[axis]), 0.5 * sensor.error_bound(plane.bounds.farthest_m)
-            )
-        )
+        if sensor.has_constant_bias:
+            bound[axis] = sensor.constant_error_rad
+        else:
+            minimum = 0.5 * sensor.error_bound(plane.bounds.farthest_m)
+            bound[axis] = np.maximum(sensor.error_bound(range_m[axis]), minimum)
     return bound
 
 
@@ -331,8 +352,7 @@ def _constant_error_m(sensor: BearingSensor) -> float:
 
 @dataclass(frozen=True)
 class Kalman(Checked):
-    """Estimate as if errors were Gaussian, and correct the part of the expected miss outside a dead
-    zone.
+    """Estimate as if errors were Gaussian, and correct the expected miss outside a dead zone.
 
     Parameters
     ----------
@@ -347,8 +367,8 @@ class Kalman(Checked):
     `KalmanBank` describes the filters. The last decision before the arrival that the engine allows
     has no dead zone.
 
-    Limits: the filter guarantees nothing. Its deviations are those of independent errors; an error
-    that keeps its sign, or changes it on purpose, is within the bound but outside the theory. A
+    Limits: the filter guarantees nothing. Its deviations assume independent errors; an error that
+    keeps its sign, or changes it on purpose, is within the bound but outside the theory. A
     uniform error has sharp ends, which contain more information than its variance; an estimator of
     second moments cannot use it. The rate sensor is not used.
     """
@@ -368,9 +388,7 @@ class Kalman(Checked):
         if not situation.may_fire:
             return np.zeros_like(situation.last_impulse_m_s)
         estimate = state.estimate(situation)
-        is_last = (situation.last_s - situation.lead_s <= self.last_s) | (
-            estimate.to_go_s <= self.last_s
-        )
-        return estimate.correction_m_s(
-            np.where(is_last, 0.0, self.dead_zone * estimate.deviation_m)
-        )
+        ends_soon = situation.last_s - situation.lead_s <= self.last_s
+        is_last = ends_soon | (estimate.to_go_s <= self.last_s)
+        dead_zone_m = np.where(is_last, 0.0, self.dead_zone * estimate.deviation_m)
+        return estimate.correction_m_s(dead_zone_m)

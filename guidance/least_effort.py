@@ -15,9 +15,17 @@ from infoset.guidance.symmetric_impulse import range_at_impulse
 PARTS = 4
 """Parts of the labels between two sections: the deciding time to go is often between sections."""
 MIN_AUTHORITY_M = 1e-9
+"""Minimum divisor of an effort: after the last impulse the authority is zero. Chosen: far below all
+misses, so that the effort is then far above 1.
+"""
 NO_DEMAND_M = 1e200
-"""An excluded label has the interval from this to minus this: it never decides."""
+"""An excluded label has the interval from this to minus this: it never decides. Its product with a
+share, at most 1e9, is finite.
+"""
 TRIALS = 60
+"""Maximum number of trials of an impulse. Bisections alone need 43 for `IMPULSE_TOLERANCE`."""
+IMPULSE_TOLERANCE = 1e-13
+"""Change of a trial, in units of the maximum impulse, at which the search ends: some roundings."""
 
 
 class LeastEffort:
@@ -34,7 +42,7 @@ class LeastEffort:
 
         rho(u) = (max(h - u tau, u tau - l) - ref) / A .
 
-    The impulse minimises the maximum rho of all hypotheses. If that is more than 1, it minimises
+    The impulse minimises the maximum rho of all hypotheses. If this is more than 1, it minimises
     the maximum excess max(h - u tau, u tau - l) - A instead. After the last impulse A is zero, and
     the excess is the miss. An impulse that keeps all excesses below a bound that later impulses can
     keep too guarantees this bound, and effort costs no more impulses than this asks.
@@ -59,15 +67,16 @@ class LeastEffort:
         view = situation.information
         e = situation.closing_speed_m_s
         most = situation.thruster.max_impulse_m_s
-        ranges = view.ranges_m
-        pending = situation.pending_m(ranges / e)
+        pending = situation.pending_m(view.ranges_m / e)
         minimum, maximum = view.predicted_miss_by_section_m()
         lower = _between(np.where(view.feasible, minimum - pending, NO_DEMAND_M))
         upper = _between(np.where(view.feasible, maximum - pending, -NO_DEMAND_M))
-        ranges = _between(ranges)
+
+        ranges = _between(view.ranges_m)
         fastest = max(e, *(-vx for vx in view.model.bounds.vx_m_s)) / e
         authority = correctable_later_m(situation, ranges) / fastest
         to_go_s = range_at_impulse(ranges, e, situation.lead_s) / e
+
         share = 1.0 / np.maximum(authority, MIN_AUTHORITY_M)
         reference = unavoidable_m(situation)[:, None, None]
         impulse, effort = balanced(
@@ -80,10 +89,9 @@ class LeastEffort:
 
 
 def unavoidable_m(situation: Situation) -> Floats:
-    """Return the reference of `LeastEffort`, m, shape (C,): a miss that errors of the angles can
-    force.
+    """Return the reference of `LeastEffort`: a miss that errors of the angles can force, m.
 
-    It is zero with a schedule.
+    The shape is (C,). It is zero with a schedule.
 
     Two motions that differ by the sum of the error bounds at the first image, at the range x0, and
     at the range e tau look alike until then. They arrive 2 e tau (h(e tau) + h(x0))/(1 - e tau/x0)
@@ -91,11 +99,12 @@ def unavoidable_m(situation: Situation) -> Floats:
     the impulses after tau can correct, is a miss of one of the two.
     """
     whole = situation.information.model
-    thruster = situation.thruster
-    e = situation.closing_speed_m_s
     reference_m = np.zeros(len(whole.axes))
     if situation.later_times_s is not None:
         return reference_m
+
+    thruster = situation.thruster
+    e = situation.closing_speed_m_s
     x0 = whole.bounds.x_m[0]
     to_go_s: Floats = whole.step_s * np.arange(1.0, math.ceil(x0 / (e * whole.step_s)))
     correctable_m = thruster.max_impulse_m_s * (np.cumsum(to_go_s) - to_go_s)
@@ -109,8 +118,9 @@ def unavoidable_m(situation: Situation) -> Floats:
 
 
 def _between(values: Floats) -> Floats:
-    """Return values of sections, shape (..., B, S), with `PARTS` - 1 interpolated ones between
-    neighbours.
+    """Return values of sections with `PARTS` - 1 interpolated ones between neighbours.
+
+    The shape of the sections is (..., B, S).
     """
     share = np.arange(PARTS) / PARTS
     inner = values[..., :-1, None] * (1.0 - share) + values[..., 1:, None] * share
@@ -118,10 +128,10 @@ def _between(values: Floats) -> Floats:
 
 
 def balanced(falling: Floats, rising: Floats, slopes: Floats, most: float) -> tuple[Floats, Floats]:
-    """Return the u, |u| <= most, where the maximum of falling - slopes u and rising + slopes u is
-    smallest, and it.
+    """Return the u, abs(u) <= most, with the minimax of two families of lines, and this value.
 
-    `falling` and `rising` have the shape (C, B, S), `slopes` (B, S), and the results (C, B).
+    The families are falling - slopes u and rising + slopes u. `falling` and `rising` have the shape
+    (C, B, S), `slopes` (B, S), and the results (C, B).
     """
     at, value = np.zeros((2, *falling.shape[:2]))
     for axis in range(len(at)):
@@ -135,18 +145,19 @@ def balance_all(
 ) -> None:
     """Write the results of `balanced` for one axis.
 
-    At the minimum the maximum falling and rising lines are equal, or it is an end.
-
-    The next trial is where the two lines that are largest now intersect, or the middle of the
-    interval that is left.
+    At the minimum the maximum falling and rising lines are equal, or it is an end. The next trial
+    is the intersection of the two lines that are largest now, or the middle of the interval that is
+    left.
     """
     for b in range(len(at)):
         low = -most
         high = most
         u = 0.0
         for _ in range(TRIALS):
-            fall = rise = -math.inf
-            fall_slope = rise_slope = 0.0
+            fall = -math.inf
+            rise = -math.inf
+            fall_slope = 0.0
+            rise_slope = 0.0
             for s in range(falling.shape[1]):
                 slope = slopes[b, s]
                 if falling[b, s] - slope * u > fall:
@@ -155,9 +166,11 @@ def balance_all(
                 if rising[b, s] + slope * u > rise:
                     rise = rising[b, s] + slope * u
                     rise_slope = slope
-            at[b], value[b] = u, max(fall, rise)
+            at[b] = u
+            value[b] = max(fall, rise)
             if fall == rise or low == high:
                 break
+
             if fall > rise:
                 low = u
             else:
@@ -166,5 +179,5 @@ def balance_all(
             u = u + (fall - rise) / slope if slope > 0.0 else low
             if not low < u < high:
                 u = 0.5 * (low + high)
-            if abs(u - at[b]) <= 1e-13 * most:
+            if abs(u - at[b]) <= IMPULSE_TOLERANCE * most:
                 break

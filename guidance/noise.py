@@ -70,7 +70,7 @@ def checked_measurements(
     ------
     TypeError, ValueError
         If the noise returned no mapping, measured with a sensor that does not measure in this step,
-        or returned an array of another shape than that of the measurements.
+        or returned an array whose shape is not the shape of the measurements.
     """
     where = f"noise {type(noise).__name__} at step {sight.step}"
     if not isinstance(measured, Mapping):
@@ -78,6 +78,7 @@ def checked_measurements(
             f"{where} must return a mapping from sensor names to measured values, for example "
             f'{{"angle": sight.alpha_rad}}: got {type(measured).__name__}'
         )
+
     checked = {}
     for name, values in measured.items():
         if name not in sight.sensors:
@@ -95,8 +96,9 @@ def checked_measurements(
 
 
 def need_draws(name: str, draws: Floats) -> None:
-    """Raise ValueError if errors, in units of their bounds, are not in [-1, 1], or not of shape
-    ([C,] B, steps).
+    """Raise ValueError unless errors, in units of their bounds, are in [-1, 1].
+
+    Their shape must be (C, B, steps) or (B, steps).
     """
     if not isinstance(draws, np.ndarray) or draws.ndim not in (2, 3):
         raise ValueError(
@@ -108,8 +110,9 @@ def need_draws(name: str, draws: Floats) -> None:
 
 
 def draws_of_step(name: str, draws: Floats, step: int, shape: tuple[int, ...]) -> Floats:
-    """Return the draws of one step; raise ValueError if there are none, or their shape is not that
-    of measurements.
+    """Return the draws of one step.
+
+    ValueError is raised if there are none, or the measurements have another shape.
     """
     steps = draws.shape[-1]
     if draws.shape[:-1] != shape:

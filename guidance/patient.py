@@ -14,12 +14,14 @@ from infoset.guidance.symmetric_impulse import range_at_impulse, symmetric_impul
 from infoset.limits import Checked, Limits
 
 LAST_SECONDS_S = 3.0
+"""Time before the arrival or the last impulse in which the strategy acts as U_s. Chosen for the
+scenario of 1997, where it is six steps.
+"""
 
 
 @dataclass(frozen=True)
 class Patient(Checked):
-    """Correct only what is certain, and what could not be corrected later; at the last impulses,
-    act as U_s.
+    """Correct only certain misses, and misses that could not be corrected later; at last as U_s.
 
     Parameters
     ----------
@@ -69,19 +71,23 @@ class Patient(Checked):
         symmetric = symmetric_impulse(miss, e, lead_s)
         if situation.last_s <= lead_s + LAST_SECONDS_S:
             return symmetric
-        later_m = correctable_later_m(
-            situation, np.stack([miss.lower_point.range_m, miss.upper_point.range_m], axis=-1)
-        )
+
+        ends_m = np.stack([miss.lower_point.range_m, miss.upper_point.range_m], axis=-1)
+        later_m = correctable_later_m(situation, ends_m)
         above = np.maximum(miss.upper_m - self.share * later_m[..., 1], 0.0)
         below = np.minimum(miss.lower_m + self.share * later_m[..., 0], 0.0)
         upper_range = range_at_impulse(miss.upper_point.range_m, e, lead_s)
         lower_range = range_at_impulse(miss.lower_point.range_m, e, lead_s)
-        certain = _impulse(np.maximum(miss.lower_m, 0.0), lower_range, e) + _impulse(
-            np.minimum(miss.upper_m, 0.0), upper_range, e
-        )
+
+        # At most one of the two ends is certain.
+        certain_above = _impulse(np.maximum(miss.lower_m, 0.0), lower_range, e)
+        certain_below = _impulse(np.minimum(miss.upper_m, 0.0), upper_range, e)
+        certain = certain_above + certain_below
         both = (above > 0.0) & (below < 0.0)
         alone = _impulse(above, upper_range, e) + _impulse(below, lower_range, e)
-        urgent = np.where(both, _impulse(above + below, upper_range + lower_range, e), alone)
+        balanced = _impulse(above + below, upper_range + lower_range, e)
+        urgent = np.where(both, balanced, alone)
+
         wanted = np.where(np.abs(urgent) > np.abs(certain), urgent, certain)
         last = np.minimum(upper_range, lower_range) <= LAST_SECONDS_S * e
         return np.where(last, symmetric, wanted)

@@ -71,11 +71,13 @@ class Predictive(Checked):
         state.estimator.update(situation)
         if not situation.may_fire:
             return np.zeros_like(state.due_s)
+
         estimate = state.estimator.estimate(situation)
         whole = estimate.correction_m_s()
         next_s = situation.next_s
         if situation.thruster.is_scheduled or next_s is None:
             return whole
+
         state.due_s = np.where(np.isinf(state.due_s), estimate.to_go_s / self.spacing, state.due_s)
         is_due = (estimate.to_go_s <= state.due_s) | (estimate.to_go_s <= next_s)
         is_done = is_due & (np.abs(whole) <= situation.thruster.max_impulse_m_s)

@@ -15,9 +15,7 @@ from infoset.limits import Checked, Limits, NotNegative
 
 @dataclass
 class PulseState:
-    """State of proportional navigation: the estimator, and the commands that were too small for an
-    impulse so far.
-    """
+    """State of proportional navigation: the estimator, and the sum of commands without impulse."""
 
     estimator: KalmanBank
     accumulated_m_s: Floats
@@ -25,8 +23,7 @@ class PulseState:
 
 @dataclass(frozen=True)
 class ProportionalNavigation(Checked):
-    """Command an acceleration proportional to the rate of the line of sight, in pulses with a dead
-    band.
+    """Command an acceleration proportional to the rate of the line of sight, in pulses.
 
     Parameters
     ----------
@@ -80,17 +77,19 @@ class ProportionalNavigation(Checked):
         state.estimator.update(situation)
         if not situation.may_fire:
             return np.zeros_like(state.accumulated_m_s)
+
         estimate = state.estimator.estimate(situation)
-        next_s = situation.next_s
         whole = estimate.correction_m_s()
-        left_s = (
-            np.zeros_like(whole) if next_s is None else np.maximum(estimate.to_go_s - next_s, 0.0)
-        )
+        # Time to go at the next decision: zero after the last one, which corrects all.
+        left_s = np.zeros_like(whole)
+        if situation.next_s is not None:
+            left_s = np.maximum(estimate.to_go_s - situation.next_s, 0.0)
         part = np.divide(
             left_s, estimate.to_go_s, out=np.zeros_like(whole), where=estimate.to_go_s > 0.0
         )
         command = state.accumulated_m_s + whole * (1.0 - part**self.ratio)
         command = np.clip(command, -np.abs(whole), np.abs(whole))
+
         dead_band_m_s = self.dead_band_m_s
         if dead_band_m_s is None:
             dead_band_m_s = situation.thruster.min_impulse_m_s

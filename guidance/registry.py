@@ -26,7 +26,7 @@ _STRATEGIES: Mapping[str, Callable[[], Strategy]] = MappingProxyType(
 
 
 def strategy_names() -> list[str]:
-    """Return the names of the registered strategies: those on the set, then the baselines."""
+    """Return the names of the registered strategies: first on the set, then the baselines."""
     return list(_STRATEGIES)
 
 

@@ -47,9 +47,7 @@ class ScriptedNoise:
             )
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurements:
-        """Return the measurements of a step; `errors_of_step` describes the errors that it
-        raises.
-        """
+        """Return the measurements of a step; `errors_of_step` describes its exceptions."""
         return measure_with_errors(sight, self.errors_of_step(sight))
 
     def errors_of_step(self, sight: LineOfSight) -> dict[str, Floats]:
@@ -78,8 +76,8 @@ class RandomNoise(ScriptedNoise):
     errors : mapping of str to ndarray, shape (C, B, steps), for ranges (B, steps)
         Draws by sensor, uniform in [-1, 1]; the error is the draw times the bound.
     bias : ndarray, shape (C, B), or None
-        Constant errors of the centroid part of a camera's bound, in units of that part; `errors`
-        are then those of the pixel part. None draws errors of the whole bound.
+        Constant errors of the centroid part of a camera's bound, in units of this part; `errors`
+        are then errors of the pixel part. None means errors of the whole bound.
 
     Raises
     ------
@@ -112,9 +110,7 @@ class RandomNoise(ScriptedNoise):
 
 
 def measure_with_errors(sight: LineOfSight, errors: Mapping[str, Floats]) -> dict[str, Floats]:
-    """Return the measurements of a step from errors in units of the bounds; a missing error is
-    zero.
-    """
+    """Return the measurements of a step from errors in units of the bounds, by default zero."""
     return {
         name: sensor.measured(sight, errors[name]) if name in errors else sensor.true_value(sight)
         for name, sensor in sight.sensors.items()
@@ -122,10 +118,12 @@ def measure_with_errors(sight: LineOfSight, errors: Mapping[str, Floats]) -> dic
 
 
 def errors_made(sight: LineOfSight, measured: Measurements) -> dict[str, Floats]:
-    """Return the errors of measurements in units of the bounds: the inverse of
-    `measure_with_errors`, to rounding.
+    """Return the errors of measurements in units of the bounds.
+
+    It is the inverse of `measure_with_errors`, to rounding.
     """
-    return {
-        name: sight.sensors[name].limited(sight.sensors[name].error(sight, values))
-        for name, values in measured.items()
-    }
+    errors = {}
+    for name, values in measured.items():
+        sensor = sight.sensors[name]
+        errors[name] = sensor.limited(sensor.error(sight, values))
+    return errors

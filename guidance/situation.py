@@ -30,7 +30,7 @@ class Situation:
     budget_left_m_s : ndarray, shape (B,)
         Impulse budget left, m/s.
     thruster : Thruster
-        Limits of the engine; they are applied to what the strategy returns.
+        Limits of the engine; they are applied to the impulses of the strategy.
     closing_speed_m_s : float
         The nominal closing speed e, m/s.
     measured : mapping of str to ndarray
@@ -48,7 +48,8 @@ class Situation:
     sensors : mapping of str to Sensor
         All sensors on board by name, with their error bounds.
     may_fire : bool
-        Whether an impulse can be decided in this step; what a strategy returns is ignored if not.
+        Whether an impulse can be decided in this step; otherwise the impulses of a strategy are
+        ignored.
     lead_s : float
         Time from a decision to its impulse, s.
     later_times_s : ndarray, shape (n,), or None
@@ -87,26 +88,21 @@ class Situation:
         """Time from now to the next decision after this step, s; None without one."""
         if self.later_times_s is None:
             return self.step_s
-        return (
-            float(self.later_times_s[0]) - self.lead_s - self.time_s
-            if self.later_times_s.size
-            else None
-        )
+        if not self.later_times_s.size:
+            return None
+        return float(self.later_times_s[0]) - self.lead_s - self.time_s
 
     @property
     def last_s(self) -> float:
-        """Time from now to the last impulse that can be given, s; infinite if there is no last
-        one.
-        """
+        """Time from now to the last impulse that can be given, s; infinite without a last one."""
         if self.later_times_s is None:
             return math.inf
-        return (
-            float(self.later_times_s[-1]) - self.time_s if self.later_times_s.size else self.lead_s
-        )
+        if not self.later_times_s.size:
+            return self.lead_s
+        return float(self.later_times_s[-1]) - self.time_s
 
     def pending_m(self, time_to_go_s: Floats) -> Floats:
-        """Return the changes of predicted misses by the pending impulses, m, which are to be
-        subtracted from them.
+        """Return the changes of predicted misses by the pending impulses, m, to be subtracted.
 
         Parameters
         ----------

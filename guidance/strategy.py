@@ -14,15 +14,14 @@ from infoset.limits import shown
 def checked_impulses(
     wanted: object, situation: Situation, tracking: Flags, strategy: object
 ) -> Floats:
-    """Return the impulses of a strategy as an array; raise ValueError for numbers that are not real
-    or not finite.
+    """Return the impulses of a strategy as an array; raise ValueError unless real and finite.
 
     The impulses of engagements that are not `tracking`, shape (B,), need not be finite.
     """
     values = np.asarray(wanted)
     shape = situation.last_impulse_m_s.shape
-    real = values.dtype.kind in "fiu" and not isinstance(wanted, np.ma.MaskedArray)
-    if real and values.shape == shape:
+    is_real = values.dtype.kind in "fiu" and not isinstance(wanted, np.ma.MaskedArray)
+    if is_real and values.shape == shape:
         finite = np.isfinite(values)
         if finite.all() or (finite | ~tracking).all():
             return values.astype(np.float64, copy=False)

@@ -8,8 +8,7 @@ from infoset.guidance.symmetric_impulse import symmetric_impulse
 
 
 class SymmetricMiss:
-    """Keep the predicted-miss interval symmetric about zero, which minimises the maximum possible
-    miss.
+    """Keep the predicted-miss interval symmetric about zero: the maximum possible miss is minimal.
 
     It reacts to noise: every measurement moves the middle of the interval, and every move is
     corrected.

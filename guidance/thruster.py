@@ -18,6 +18,7 @@ MAX_IMPULSES = 100_000
 """Maximum number of impulses that a period gives: a flight has no more steps."""
 _DELAY = Limits(minimum=0, maximum=MAX_IMPULSES, whole=True)
 MIN_FLOAT = float(np.finfo(np.float64).smallest_subnormal)
+"""Minimum divisor of an impulse: the modulus of an impulse that is not zero is not less."""
 
 
 @dataclass(frozen=True)
@@ -118,8 +119,7 @@ class Thruster:
         return bool(self.impulses_s) or self.impulse_period_s is not None
 
     def impulse_steps(self, arrival_s: float, step_s: float) -> Sequence[int] | None:
-        """Return the steps in which impulses can be given, increasing; None is every step from
-        `delay_steps`.
+        """Return the steps in which impulses can be given; None is every step from `delay_steps`.
 
         Parameters
         ----------
@@ -135,6 +135,7 @@ class Thruster:
         """
         if self.last_impulse_s is None and self.first_impulse_s is None and not self.impulses_s:
             return None
+
         last = steps_between(arrival_s, self.last_impulse_s or 0.0, step_s)
         if self.impulses_s:
             steps: Sequence[int] = [
@@ -152,7 +153,7 @@ class Thruster:
         return steps
 
     def _listed_steps(self, arrival_s: float, step_s: float) -> list[int]:
-        """Return the steps of `impulses_s`, those after the cut-off included."""
+        """Return the steps of `impulses_s`, also after the cut-off."""
         steps = [steps_between(arrival_s, time_s, step_s) for time_s in self.impulses_s]
         for i, step in enumerate(steps):
             if step < self.delay_steps:
@@ -173,11 +174,11 @@ class Thruster:
             raise ValueError(
                 f"thruster.impulse_period_s must be at least a step, {step_s:g} s: got {period_s!r}"
             )
-        self._first_step(
-            arrival_s, step_s
-        )  # raises ValueError if it is before the first possible step
+        # Raises ValueError if first_impulse_s is before the first possible step.
+        self._first_step(arrival_s, step_s)
         first_s = arrival_s if self.first_impulse_s is None else self.first_impulse_s
         last_s = self.last_impulse_s or 0.0
+
         # The first impulse is the one nearest to first_impulse_s.
         number = 1 - steps_between(last_s, first_s, period_s)
         if number > MAX_IMPULSES:
@@ -185,15 +186,14 @@ class Thruster:
                 f"thruster.impulse_period_s gives {number} impulses, more than {MAX_IMPULSES}; "
                 f"write a longer period or a later first_impulse_s: got {period_s!r}"
             )
+
         times_s = (last_s + place * period_s for place in reversed(range(number)))
         steps = (steps_between(arrival_s, time_s, step_s) for time_s in times_s)
         # A period of one step may round two times to one step.
         return [*dict.fromkeys(step for step in steps if step >= self.delay_steps)]
 
     def _first_step(self, arrival_s: float, step_s: float) -> int:
-        """Return the step of `first_impulse_s`, or the first step in which an impulse can be
-        given.
-        """
+        """Return the step of `first_impulse_s`, or the first step that can have an impulse."""
         if self.first_impulse_s is None:
             return self.delay_steps
         step = steps_between(arrival_s, self.first_impulse_s, step_s)
@@ -205,7 +205,7 @@ class Thruster:
         return step
 
     def _first_text(self, arrival_s: float, step_s: float) -> str:
-        """Return when the first impulse can be given, for messages."""
+        """Return the time of the first possible impulse as a clause of messages."""
         return (
             f"the first impulse can be given {arrival_s - self.delay_steps * step_s:g} s before "
             "the nominal arrival"
@@ -227,12 +227,14 @@ class Thruster:
         size = modulus(wanted_m_s)
         limit = np.minimum(self.max_impulse_m_s, budget_left_m_s)
         given = wanted_m_s
-        over = size > limit
-        if some(over):
-            given = np.where(over, wanted_m_s / np.maximum(size, MIN_FLOAT) * limit, wanted_m_s)
+        is_over = size > limit
+        if some(is_over):
+            limited = wanted_m_s / np.maximum(size, MIN_FLOAT) * limit
+            given = np.where(is_over, limited, wanted_m_s)
             # Rounding must not make the modulus greater than the limit.
-            while some(above := modulus(given) > limit):
-                given = np.where(above, np.nextafter(given, 0.0), given)
+            while some(is_above := modulus(given) > limit):
+                given = np.where(is_above, np.nextafter(given, 0.0), given)
+
         idle = (size < self.min_impulse_m_s) | (budget_left_m_s < self.min_impulse_m_s)
         return np.where(idle, 0.0, given)
 
@@ -252,12 +254,14 @@ class Thruster:
         if size is not None:
             impulse_m_s = impulse_m_s * (1.0 + self.execution_error_relative * size)
         if direction is not None:
-            sine, cosine = (turn(self.pointing_error_rad * direction) for turn in (np.sin, np.cos))
+            angle_rad = self.pointing_error_rad * direction
+            sine = np.sin(angle_rad)
+            cosine = np.cos(angle_rad)
             y, z = impulse_m_s  # only impulses in space have an error of the direction
             impulse_m_s = np.stack([cosine * y - sine * z, cosine * z + sine * y])
         return impulse_m_s
 
 
 def modulus(lateral: Floats) -> Floats:
-    """Return the moduli, shape (B,), of lateral values of shape (C, B)."""
+    """Return the moduli of lateral values of the shape (C, B), shape (B,)."""
     return reduce(np.hypot, np.abs(lateral))

@@ -39,15 +39,17 @@ class ZeroEffortMiss:
         """Return the impulse that makes the miss of the middle zero, m/s."""
         lower, upper = situation.information.predicted_miss_by_section_m()
         feasible = situation.information.feasible
-        e = situation.closing_speed_m_s
-        ranges = situation.information.ranges_m
         # The addition keeps the weights positive if every section is a single point.
         width = upper - lower + np.finfo(np.float64).tiny
         weight = np.where(feasible, width, 0.0)
         weight = weight / np.maximum(weight.max(axis=-1, keepdims=True), np.finfo(np.float64).tiny)
+
+        e = situation.closing_speed_m_s
+        ranges = situation.information.ranges_m
         middle = 0.5 * (lower + upper)
         if situation.pending:
             middle = middle - situation.pending_m(ranges / e)
+
         ranges = range_at_impulse(ranges, e, situation.lead_s)
         wanted = (weight * middle * ranges).sum(axis=-1) * e
         square = (weight * ranges**2).sum(axis=-1)

@@ -1,5 +1,4 @@
-"""Search for the start, the measurement errors and the target's accelerations with the maximum miss
-of a strategy.
+"""Search for start, measurement errors and target accelerations with the maximum miss.
 
 A simulated miss is a lower bound of what the strategy can guarantee. It does not prove that no
 greater one exists.
@@ -35,15 +34,19 @@ from infoset.sim.target import constant_side
 WORST_FOUND = "worst-found"
 """Name of the noise with the errors that a search found, in records."""
 CHUNK = 250
-"""Maximum number of engagements in a batch; the cost of a step without any engagement is that of 30
-to 40 of them.
+"""Maximum number of engagements in a batch. The overhead of a step equals the cost of 30 to 40
+engagements (measured): with 250 it is small, and some batches remain for threads.
 """
 GENERATION = 100
-"""Engagements between two selections."""
+"""Engagements between two selections. Chosen: a few times `ELITE`."""
 ELITE = 24
-"""Number of plans with the maximum values so far that are changed further."""
+"""Number of plans with the maximum values so far that are changed further. Chosen, as the shares
+below: they change how fast a search finds a miss, and not whether it is possible.
+"""
 LINEAGE_SHARE = 6
-"""Maximum number of the elite that comes from one first plan in the first part of the search."""
+"""Maximum number of the elite that comes from one first plan in the first part of the search: a
+quarter, so that at least four first plans compete.
+"""
 YOUNG_SHARE = 0.5
 """Share of the budget that is the first part of the search."""
 FIRST_SHARE = 0.25
@@ -54,8 +57,7 @@ class Objective(Enum):
     """What a search maximises: the value of an engagement."""
 
     ANY_STATE = "any-state"
-    """The maximum miss of a state that the set contained when control ended for its label
-    (`infoset.sim.label_ends`).
+    """The maximum miss of a state of the set when control ended for its label (`label_ends.py`).
 
     All these states agree with what was measured until then, so that the truth can be chosen among
     them afterwards. The sections contain at least all states that agree with the measurements.
@@ -86,10 +88,10 @@ class WorstEngagement:
     noise : ScriptedNoise
         Measurement errors, which repeat the engagement bit for bit.
     accelerations_m_s2 : ndarray, shape (C, 1, steps), or None
-        Accelerations of the target, m/s^2. None if the target is that of the scenario.
+        Accelerations of the target, m/s^2; None for the target of the scenario.
     max_acceleration_m_s2 : mapping of str to float
-        Maximum acceleration of the searched targets by lateral axis, m/s^2; empty if the target is
-        that of the scenario.
+        Maximum acceleration of the searched targets by lateral axis, m/s^2; empty for the target of
+        the scenario.
     construction : str
         Kind of the first plan from which the engagement was derived.
     sets_emptied : int
@@ -121,16 +123,16 @@ class WorstEngagement:
 
     @property
     def value_m(self) -> float:
-        """What the search maximised, m."""
+        """Miss that the search maximised, m."""
         return self.any_state_miss_m if self.objective is Objective.ANY_STATE else self.miss_m
 
     def start(self) -> dict[str, float]:
-        """Return the start by the names of `StateBox`: z_m, x_m, vz_m_s, vx_m_s; in space also y_m,
-        vy_m_s.
+        """Return the start by the names of `StateBox`.
+
+        They are z_m, x_m, vz_m_s and vx_m_s, in space also y_m and vy_m_s.
         """
-        return start_of(
-            self.scenario, np.concatenate([self.result.position_m[0], self.result.velocity_m_s[0]])
-        )
+        start = np.concatenate([self.result.position_m[0], self.result.velocity_m_s[0]])
+        return start_of(self.scenario, start)
 
     def record(self, strategy: Strategy | None = None) -> Record:
         """Simulate the engagement again and return its record.
@@ -138,8 +140,7 @@ class WorstEngagement:
         Parameters
         ----------
         strategy : Strategy or None
-            None is the scenario's. A strategy different from that of the search has a different
-            miss.
+            None is the scenario's. Another strategy than in the search has a different miss.
         """
         target = self.accelerations_m_s2
         record = fly_one(
@@ -159,8 +160,7 @@ def find_worst(
     threads: int = 1,
     progress: Callable[[float], None] | None = None,
 ) -> WorstEngagement:
-    """Search possible starts, errors within their bounds, and accelerations of the target, for the
-    maximum miss.
+    """Search possible starts, errors and accelerations of the target for the maximum miss.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def find_worst(
     strategy : Strategy, str or None
         A strategy of your own, the name of a registered one, or None for the scenario's.
     objective : Objective
-        Which miss is maximised: that of any state of the set, or that of the simulated truth.
+        Which miss is maximised: of any state of the set, or of the simulated truth.
     budget : int
         Number of engagements to simulate; the plans of a quarter of them are in memory at a time.
     seed : int
@@ -191,17 +191,17 @@ def find_worst(
     -----
     A quarter of the budget is for first plans: game noise with its four tie rules and, before a
     cut-off or scheduled impulses, its shift; and noise that keeps the upper or the lower extreme in
-    a random or blockwise order. The errors become those of the plan. The plans with the maximum
-    misses are then changed, by blocks of errors, switching times or coordinates of the start, and
-    compete with their changes. In the first part of the search, the number of plans from one first
-    plan is limited. In space, both axes have errors of their own, and a change of the angle errors
-    is along one axis or both.
+    a random or blockwise order. The plan stores these errors. The plans with the maximum misses are
+    then changed, by blocks of errors, switching times or coordinates of the start, and compete with
+    their changes. In the first part of the search, the number of plans from one first plan is
+    limited. In space, each axis has its own errors, and a change of the angle errors is along one
+    axis or both.
 
     In the guaranteed model the targets accelerate at the bound of the model,
     `set_model.disturbance_m_s2`, with signs that belong to the plan, constant or in blocks. They
     replace the target of the scenario; if its acceleration is greater than the bound, they
-    accelerate as much. In the model `paper` the bound is fictitious, and the target is that of the
-    scenario.
+    accelerate as much. In the model `paper` the bound is fictitious, and the target accelerates as
+    in the scenario.
 
     References
     ----------
@@ -236,7 +236,8 @@ class _AdversarySearch:
         keep_set: bool,
     ) -> None:
         self.scenario = replace(scenario, dispersion=scenario.set_model.bounds, covariance=None)
-        self.evaluations = self.sets_emptied = 0
+        self.evaluations = 0
+        self.sets_emptied = 0
         self.history: list[tuple[int, float]] = []
         self.elite: Plans | None = None
         self._objective = objective
@@ -245,8 +246,7 @@ class _AdversarySearch:
         self._strategy = strategy or make_strategy(scenario.strategy)
         self._strategy_name = scenario.strategy if strategy is None else type(strategy).__name__
         self._shift_m = worst_shift_m(scenario)
-        # All other random numbers are those of run 0, so that the worst engagement can be repeated
-        # alone.
+        # All other random numbers are those of run 0: the worst engagement can be repeated alone.
         self._draws = functools.cache(lambda size: draw(self.scenario, [0] * size, seed))
         self._planner = Planner(self.scenario, self._draws(1).steps, seed)
 
@@ -261,9 +261,12 @@ class _AdversarySearch:
                 self._select(plans, young=self.evaluations < YOUNG_SHARE * budget)
                 if progress is not None:
                     progress(self.evaluations / budget)
+
             size = min(GENERATION, budget - self.evaluations)
             assert self.elite is not None
-            flights = _in_chunks(self._planner.children(self.elite, size), None) if size > 0 else []
+            flights = []
+            if size > 0:
+                flights = _in_chunks(self._planner.children(self.elite, size), None)
 
     def worst(self) -> WorstEngagement:
         if self.elite is None or not np.isfinite(self.elite.value[0]):
@@ -276,12 +279,16 @@ class _AdversarySearch:
         while flight.flying:
             flight.advance()
         result = flight.results(np.arange(1))
+
         start = start_of(self.scenario, best.start[0])
+        dispersion = StateBox(**{name: (value, value) for name, value in start.items()})
         maximum = planner.acceleration_m_s2
+        max_acceleration: dict[str, float] = {}
+        if maximum.any():
+            axes = self.scenario.set_model.axes
+            max_acceleration = dict(zip(axes, maximum.tolist(), strict=True))
         return WorstEngagement(
-            scenario=replace(
-                self.scenario, dispersion=StateBox(**{name: (x, x) for name, x in start.items()})
-            ),
+            scenario=replace(self.scenario, dispersion=dispersion),
             seed=self._seed,
             strategy=self._strategy_name,
             objective=self._objective,
@@ -289,11 +296,7 @@ class _AdversarySearch:
             result=result,
             noise=self._scripted(best),
             accelerations_m_s2=self._target_m_s2(best),
-            max_acceleration_m_s2=(
-                dict(zip(self.scenario.set_model.axes, maximum.tolist(), strict=True))
-                if maximum.any()
-                else {}
-            ),
+            max_acceleration_m_s2=max_acceleration,
             construction=planner.constructions[int(best.lineage[0])],
             changes=int(best.changes[0]),
             evaluations=self.evaluations,
@@ -302,26 +305,25 @@ class _AdversarySearch:
         )
 
     def engagements(self, plans: Plans, constructions: Constructions | None = None) -> Engagements:
-        """Return plans in flight; the errors that game noise chooses become those of the plans."""
+        """Return plans in flight; the plans store the errors that game noise chooses."""
         position_m, velocity_m_s = (part.copy() for part in np.split(plans.start, 2, axis=1))
         draws = replace(self._draws(len(plans)), position_m=position_m, velocity_m_s=velocity_m_s)
-        noise: MeasurementNoise = self._scripted(plans)
         target_m_s2 = self._target_m_s2(plans)
-        side = constant_side(self.scenario.target, draws.target)
+
+        noise: MeasurementNoise = self._scripted(plans)
         if constructions is not None:
-            side = side if target_m_s2 is None else by_axis(plans.sides[:, :, 0])
-            noise = _Recorded(
-                constructions.noise(self._shift_m, side), plans, self._planner.sensors
-            )
-        strategy = self._strategy
-        guarantee = self.guarantee
+            side = constant_side(self.scenario.target, draws.target)
+            if target_m_s2 is not None:
+                side = by_axis(plans.sides[:, :, 0])
+            game = constructions.noise(self._shift_m, side)
+            noise = _Recorded(game, plans, self._planner.sensors)
         return Engagements(
             self.scenario,
             draws,
-            strategy,
+            self._strategy,
             noise=noise,
             target_m_s2=target_m_s2,
-            guarantee=guarantee,
+            guarantee=self.guarantee,
         )
 
     def _scripted(self, plans: Plans) -> ScriptedNoise:
@@ -335,12 +337,10 @@ class _AdversarySearch:
         return by_axis(maximum[:, None] * plans.sides) if maximum.any() else None
 
     def value_m(self, flight: Engagements, results: Results) -> Floats:
-        """Return what the search maximises, m, shape (B,)."""
-        return (
-            flight.any_state_miss_m(results)
-            if self._objective is Objective.ANY_STATE
-            else results.miss_m
-        )
+        """Return the misses that the search maximises, m, shape (B,)."""
+        if self._objective is Objective.ANY_STATE:
+            return flight.any_state_miss_m(results)
+        return results.miss_m
 
     def _evaluate(self, plans: Plans, constructions: Constructions | None) -> tuple[Plans, int]:
         """Return plans with their values, and the number of engagements whose set became empty."""
@@ -350,9 +350,8 @@ class _AdversarySearch:
         results = flight.results(np.arange(len(plans)))
         value = self.value_m(flight, results)
         counts = np.isfinite(value) & ~(self._keep_set & results.set_emptied)
-        return replace(plans, value=np.where(counts, value, -np.inf)), int(
-            results.set_emptied.sum()
-        )
+        valued = replace(plans, value=np.where(counts, value, -np.inf))
+        return valued, int(results.set_emptied.sum())
 
     def _select(self, plans: Plans, young: bool) -> None:
         """Update the elite and the history with new flights."""
@@ -361,12 +360,15 @@ class _AdversarySearch:
         of_lineage: Counter[int] = Counter()
         for index in np.argsort(-rivals.value, kind="stable").tolist():
             lineage = int(rivals.lineage[index])
-            same = bool(kept) and rivals.value[index] == rivals.value[kept[-1]]
-            if not same and not (young and of_lineage[lineage] >= LINEAGE_SHARE):
+            # Plans with equal values are most often equal flights.
+            is_repeated = bool(kept) and rivals.value[index] == rivals.value[kept[-1]]
+            is_full = young and of_lineage[lineage] >= LINEAGE_SHARE
+            if not is_repeated and not is_full:
                 kept.append(index)
                 of_lineage[lineage] += 1
             if len(kept) == ELITE:
                 break
+
         self.elite = rivals.take(np.array(kept))
         maximum = float(self.elite.value[0])
         if np.isfinite(maximum) and (not self.history or maximum > self.history[-1][1]):
@@ -375,9 +377,7 @@ class _AdversarySearch:
 
 @dataclass(frozen=True)
 class _Recorded:
-    """Game noise whose errors are written into plans: `ScriptedNoise` with them repeats the
-    measurements.
-    """
+    """Game noise that writes its errors into plans: `ScriptedNoise` repeats the measurements."""
 
     game: GameNoise
     plans: Plans

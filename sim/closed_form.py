@@ -1,6 +1,4 @@
-"""Misses that images of a camera leave possible: closed forms for a known range and closing
-speed.
-"""
+"""Misses that images of a camera leave possible, in closed form, for a known range and speed."""
 
 from __future__ import annotations
 
@@ -29,10 +27,10 @@ def possible_miss_m(
     disturbance_m_s2: float = 0.0,
     constant_bias: bool = False,
 ) -> FloatOrFloats:
-    """Return half the maximum width of the interval of misses along one axis that images leave
-    possible, m.
+    """Return half the maximum width of the interval of misses that images leave possible, m.
 
-    It is also the maximum miss after an impulse that centres this interval exactly.
+    The misses are along one axis. The result is also the maximum miss after an impulse that centres
+    this interval exactly.
 
     Parameters
     ----------
@@ -44,8 +42,8 @@ def possible_miss_m(
     disturbance_m_s2 : float
         Bound nu of the acceleration of the target along the axis, m/s^2.
     constant_bias : bool
-        Whether the centroid error is one constant of the flight. Then the result is that of a set
-        that knows this, which the information set does not know.
+        Whether the centroid error is one constant of the flight. The result is then for a set that
+        uses this; the information set does not.
 
     Raises
     ------
@@ -69,6 +67,7 @@ def possible_miss_m(
             f"the first image, {first_image_s:g} s before the arrival, must be before the last "
             "image"
         )
+
     of_pixel_m_s = pixel_error_rad * closing_speed_m_s
     bound_m = of_pixel_m_s * last_image_s + (0.0 if constant_bias else centroid_error_m)
     slope_m_s: Any = 2.0 * of_pixel_m_s + np.where(
@@ -77,26 +76,22 @@ def possible_miss_m(
         4.0 * bound_m / arc_s + disturbance_m_s2 * arc_s,
     )
     constant_m = centroid_error_m if constant_bias else 0.0
-    miss_m: FloatOrFloats = _at_arrival_m(
-        constant_m + bound_m, slope_m_s, last_image_s, disturbance_m_s2
-    )
+    difference_m = constant_m + bound_m
+    miss_m: FloatOrFloats = _at_arrival_m(difference_m, slope_m_s, last_image_s, disturbance_m_s2)
     return miss_m
 
 
 def _at_arrival_m(bound_m: Any, speed_m_s: Any, last_s: Any, disturbance_m_s2: float) -> Any:
-    """Return M of equation (22), m, from b0 and s at the last image, `last_s` before the
-    arrival.
-    """
+    """Return M of equation (22), m, from b0 and s at the last image, at `last_s`."""
     return bound_m + 0.5 * last_s * (speed_m_s + disturbance_m_s2 * last_s)
 
 
 @dataclass(frozen=True)
 class PossibleMiss:
-    """Half the maximum width of the interval of misses that is left at the last decision, m, by
-    what is known.
+    """Half the maximum width of the interval of misses at the last decision, m.
 
-    Both are for errors of images at their bounds, no lost image, and a known range and closing
-    speed; in space they are those of both axes at once.
+    Both values are for errors of images at their bounds, no lost image, and a known range and
+    closing speed; in space they are for both axes at once.
 
     Parameters
     ----------
@@ -113,12 +108,14 @@ class PossibleMiss:
 
 
 def possible_miss(scenario: Scenario) -> PossibleMiss | None:
-    """Return the misses that are possible at the last decision; None with fewer than two images
-    before it.
+    """Return the misses that are possible at the last decision.
+
+    None means fewer than two images before it.
     """
     before_s = np.array(image_times_s(scenario))
     if before_s.size < 2:
         return None
+
     camera = scenario.bearing_sensor
     has_closed_form = isinstance(camera, Camera) and camera.miss_probability == 0.0
     images_m = possible_miss_of(scenario) if has_closed_form else None
@@ -126,8 +123,9 @@ def possible_miss(scenario: Scenario) -> PossibleMiss | None:
 
 
 def _images_and_speeds_m(scenario: Scenario, before_s: Floats) -> float:
-    """Return the distance of the two motions of `worst_shift_m` at the arrival, m, in space that of
-    both axes.
+    """Return the distance of the two motions of `worst_shift_m` at the arrival, m.
+
+    In space it is the distance across both axes.
     """
     model = scenario.set_model
     misses_m = []
@@ -138,8 +136,7 @@ def _images_and_speeds_m(scenario: Scenario, before_s: Floats) -> float:
 
 
 def worst_shift_m(scenario: Scenario) -> Floats | None:
-    """Return how far game noise shifts the measured position across x in each step, m, shape (C,
-    steps).
+    """Return the shift of the measured position across x by game noise, m, shape (C, steps).
 
     None without a cut-off or times of impulses, or with fewer than two images before the last
     decision.
@@ -159,6 +156,7 @@ def worst_shift_m(scenario: Scenario) -> Floats | None:
     before_s = np.array(image_times_s(scenario))
     if before_s.size < 2:
         return None
+
     shifts_m = [
         _worst_shift_along_m(model.axis(name), before_s, scenario.nominal_arrival_s)
         for name in model.axes
@@ -171,45 +169,41 @@ def _worst_difference(model: SetModel, before_s: Floats, arrival_s: float) -> tu
     range_m = before_s * model.closing_speed_m_s
     bound_m = model.angle_sensor.error_bound(range_m) * range_m
     last_s = before_s[-1]
-    earlier_s, disturbance, (minimum, maximum) = (
-        before_s[:-1] - last_s,
-        model.disturbance_m_s2,
-        model.bounds.vz_m_s,
-    )
-    speed_m_s = min(
-        np.min(2.0 * (bound_m[-1] + bound_m[:-1]) / earlier_s + disturbance * earlier_s),
-        maximum - minimum + 2.0 * disturbance * (arrival_s - last_s),
-    )
-    return bound_m[-1], speed_m_s
+    earlier_s = before_s[:-1] - last_s
+    disturbance = model.disturbance_m_s2
+    minimum, maximum = model.bounds.vz_m_s
+    by_images_m_s = np.min(2.0 * (bound_m[-1] + bound_m[:-1]) / earlier_s + disturbance * earlier_s)
+    by_start_m_s = maximum - minimum + 2.0 * disturbance * (arrival_s - last_s)
+    return bound_m[-1], min(by_images_m_s, by_start_m_s)
 
 
 def _worst_shift_along_m(model: SetModel, before_s: Floats, arrival_s: float) -> Floats:
-    """Return `worst_shift_m` in the planar model of one axis, for images at these times before the
-    arrival, s.
+    """Return `worst_shift_m` in the planar model of one axis, shape (steps,).
+
+    `before_s` are the times of images before the arrival, s.
     """
     bound_m, speed_m_s = _worst_difference(model, before_s, arrival_s)
     disturbance = model.disturbance_m_s2
     last_s = before_s[-1]
-    times_s = (
-        arrival_s
-        - last_s
-        - model.step_s * np.arange(math.ceil((arrival_s - last_s) / model.step_s) + 1)
-    )
-    times_s = np.clip(times_s, 0.0, 0.5 * speed_m_s / disturbance if disturbance else None)
+
+    # Times before the last image, up to the minimum of the difference.
+    steps = np.arange(math.ceil((arrival_s - last_s) / model.step_s) + 1)
+    times_s = arrival_s - last_s - model.step_s * steps
+    of_minimum_s = 0.5 * speed_m_s / disturbance if disturbance else None
+    times_s = np.clip(times_s, 0.0, of_minimum_s)
     return np.asarray(
         bound_m - 0.5 * speed_m_s * times_s + 0.5 * disturbance * times_s**2, dtype=np.float64
     )
 
 
 def possible_miss_of(scenario: Scenario, *, constant_bias: bool = False) -> float:
-    """Return `possible_miss_m` of the camera and the last impulse of a scenario, m: in space that
-    of both axes at once.
+    """Return `possible_miss_m` of the camera and the last impulse of a scenario, m.
 
-    It contains what the images show, and nothing about the start: the set on board knows more if
-    the speeds across are known well from the start (`PossibleMiss.images_and_speeds_m`, which
-    ``infoset scenarios check`` prints too).
+    In space it is the miss across both axes. It uses the images, and nothing about the start: the
+    set on board is smaller if the speeds across are known well from the start
+    (`PossibleMiss.images_and_speeds_m`, which ``infoset scenarios check`` prints too).
 
-    The disturbance is `set_model.disturbance_m_s2` of each axis, and `constant_bias` that of
+    The disturbance is `set_model.disturbance_m_s2` of each axis; `constant_bias` is an argument of
     `possible_miss_m`.
 
     Raises

@@ -1,6 +1,4 @@
-"""Bounds of all motions that a set model allows for, with their distance from the attracting
-body.
-"""
+"""Bounds of all motions that a set model allows for, and the distance from the attracting body."""
 
 from __future__ import annotations
 
@@ -15,14 +13,23 @@ from infoset.sim.kepler import KeplerMotion, X
 from infoset.sim.scenario import Sun
 
 INSTANTS = 500
-"""Number of times at which a flight is bounded."""
+"""Number of times at which a flight is bounded. Chosen: between two of them a bound is greater by
+the motion in half a step, 0.1 % of the flight.
+"""
 STRETCHES = (1.001, 1.02, 1.2, 4.0)
-"""Lengths of the flight that are tried, in units of the longest one without gravity."""
+"""Lengths of the flight that are tried, in units of the longest one without gravity: a weak
+attraction needs the first only, and a short flight has narrow bounds.
+"""
 NEAREST_SHARE = 0.1
-"""Minimum share of the nominal distance from the attracting body that the deviations must leave."""
+"""Minimum share of the nominal distance from the attracting body that the deviations must leave: at
+a tenth, the gradient is a thousand times the nominal one, and a bound would be of no use.
+"""
 INFLATION = 1.001
-"""Factor between a trial and the deviations that follow from the one before."""
+"""Factor between a trial and the deviations that follow from the one before: a bound is greater
+than necessary by at most this.
+"""
 TRIALS = 100
+"""Maximum number of trials. Chosen: deviations that still grow are refused, which is safe."""
 MODULUS = 0
 """Row of a deviation."""
 TOO_NEAR = "the motions may come too near the attracting body"
@@ -31,8 +38,7 @@ TOO_SLOW = "gravity may take away the closing speed"
 
 @dataclass(frozen=True)
 class FlightBounds:
-    """Bounds of all motions that a model allows for, at N equal steps of time until the last of
-    them has x = 0.
+    """Bounds of all motions that a model allows for, at N equal steps until the last one has x = 0.
 
     Parameters
     ----------
@@ -73,8 +79,8 @@ def no_bound(cause: str, range_m: float) -> ValueError:
 class _Motion:
     """Positions and velocities of spacecraft and object, in this order, shape (2, axes, N).
 
-    Those of deviations have the shape (2, 1 + axes, N), with the modulus first: the impulses along
-    two axes have a common bound.
+    Deviations have the shape (2, 1 + axes, N), with the modulus first: the impulses along two axes
+    have a common bound.
     """
 
     place_m: Floats
@@ -118,18 +124,21 @@ def flight_bounds(
         names the range.
     """
     boxes = [bounds.axis(name) for name in bounds.axes]
+    # Rows: position and velocity; columns: lateral axes and x.
     start = np.array(
         [[*(box.z_m for box in boxes), bounds.x_m], [*(box.vz_m_s for box in boxes), bounds.vx_m_s]]
     )
     middle = start.mean(axis=2)
     half = 0.5 * np.ptp(start, axis=2)
     half = np.concatenate([np.linalg.norm(half, axis=1, keepdims=True), half], axis=1)
-    # All impulses at once, along each axis: the deviations are largest then.
+
+    # Deviations at t = 0 and accelerations of spacecraft and object. All impulses are given at
+    # once, along each axis: the deviations are largest then.
     impulses = np.array([impulses_m_s, *(impulses_m_s for _ in boxes), 0.0])
-    first = np.array([[np.zeros_like(half[0]), half[0]], [impulses, half[1]]])
-    disturbance = np.array(
-        [np.zeros_like(half[0]), [np.linalg.norm(disturbances_m_s2), *disturbances_m_s2, 0.0]]
-    )
+    nothing = np.zeros_like(half[0])
+    first = np.array([[nothing, half[0]], [impulses, half[1]]])
+    disturbance = np.array([nothing, [np.linalg.norm(disturbances_m_s2), *disturbances_m_s2, 0.0]])
+
     for stretch in STRETCHES:
         times_s = np.linspace(0.0, stretch * bounds.x_m[1] / -bounds.vx_m_s[1], INSTANTS)
         nominal = _nominal(middle, sun, times_s)
@@ -141,9 +150,7 @@ def flight_bounds(
 
 
 def _nominal(middle: Floats, sun: Sun, times_s: Floats) -> _Motion:
-    """Return the motion from a relative position and velocity, shape (2, axes), around the
-    attracting body.
-    """
+    """Return the motion from a relative position and velocity, shape (2, axes)."""
     motion = KeplerMotion(middle[None, 0], middle[None, 1], sun)
     states = [motion.bodies()]
     for _ in times_s[1:]:
@@ -158,11 +165,11 @@ def _deviation(
 ) -> _Motion:
     """Return bounds of all deviations from the nominal motion.
 
-    A deviation d satisfies |d_i''| <= (K/R^3) (1.5 |d| + 0.5 |d_i|) + disturbance along axis i,
-    with the minimum distance R from the attracting body that the deviation allows for, and its
-    modulus the same with |d| in place of
-    |d_i|. The right side increases with both. A function that is not less than the double integral of the right side
-    for it is therefore a bound of all deviations.
+    A deviation d satisfies abs(d_i'') <= (K/R^3) (1.5 abs(d) + 0.5 abs(d_i)) + disturbance along
+    axis i, with the minimum distance R from the attracting body that the deviation allows for. Its
+    modulus satisfies the same with abs(d) in place of abs(d_i). The right side increases with both.
+    A function that is not less than the double integral of its right side is therefore a bound of
+    all deviations.
     """
     step_s = times_s[1]
     far_m = np.linalg.norm(nominal.place_m, axis=1)
@@ -176,6 +183,7 @@ def _deviation(
         too_near = (nearest_m < NEAREST_SHARE * far_m).any(axis=0)
         if too_near.any():
             raise no_bound(TOO_NEAR, nominal.range_m[too_near.argmax()])
+
         gradient = (sun.gravitational_parameter_m3_s2 / nearest_m**3)[:, None]
         growth = gradient * (1.5 * size_m[:, None] + 0.5 * place) + disturbance_m_s2[..., None]
         new_speed = first[1, ..., None] + step_s * _sums(greater_of_neighbours(growth))
@@ -183,6 +191,7 @@ def _deviation(
         grows = ((new_place > place) | (new_speed > speed)).any(axis=(0, 1))
         if not grows.any():
             return _Motion(new_place, new_speed)
+
         place = INFLATION * new_place
         speed = INFLATION * new_speed
     raise no_bound(TOO_NEAR, nominal.range_m[grows.argmax()])
@@ -194,8 +203,9 @@ def _sums(values: Floats) -> Floats:
 
 
 def greater_of_neighbours(values: Floats) -> Floats:
-    """Return the greater value of each two neighbours along the last axis: a bound between them, if
-    monotonic.
+    """Return the greater value of each two neighbours along the last axis.
+
+    It is a bound between them if the values are monotonic.
     """
     return np.asarray(np.maximum(values[..., 1:], values[..., :-1]))
 
@@ -210,16 +220,17 @@ def _bounds(nominal: _Motion, deviation: _Motion, times_s: Floats, instants: int
     offset[X] = np.maximum(place[X] + place_error[X], 0.0)
     across = np.linalg.norm(place[:X], axis=0) + place_error[MODULUS]
     distance = np.minimum(nominal.range_m + place_error[MODULUS], np.hypot(offset[X], across))
-    fastest_m_s = (np.linalg.norm(nominal.speed_m_s, axis=1) + deviation.speed_m_s[:, MODULUS]).max(
-        axis=0
-    )
+
+    # Between two instants the segment moves by at most its speed in half a step.
+    speeds = np.linalg.norm(nominal.speed_m_s, axis=1) + deviation.speed_m_s[:, MODULUS]
+    fastest_m_s = speeds.max(axis=0)
     closest_m, nearest_m = _distances_of_segment(nominal, deviation)
     nearest_m -= 0.5 * times_s[1] * fastest_m_s
+
     closing_m_s = -speed[X] - speed_error[X]
-    for cause, is_bad in (
-        (TOO_NEAR, nearest_m < NEAREST_SHARE * closest_m),
-        (TOO_SLOW, closing_m_s <= 0.0),
-    ):
+    is_too_near = nearest_m < NEAREST_SHARE * closest_m
+    is_too_slow = closing_m_s <= 0.0
+    for cause, is_bad in ((TOO_NEAR, is_too_near), (TOO_SLOW, is_too_slow)):
         if is_bad[:instants].any():
             raise no_bound(cause, nominal.range_m[is_bad.argmax()])
     return FlightBounds(
@@ -235,23 +246,25 @@ def _bounds(nominal: _Motion, deviation: _Motion, times_s: Floats, instants: int
 
 
 def _distances_of_segment(nominal: _Motion, deviation: _Motion) -> tuple[Floats, Floats]:
-    """Return the minimum distance of the segment from the attracting body: nominal, and of all
-    possible motions.
+    """Return the minimum distance of the segment from the attracting body, m.
 
-    At the length u of the nominal segment it is (height^2 + (u - foot)^2)^(1/2). The deviation is
-    at most linear in u.
+    The first value is nominal, the second one is for all possible motions. At the length u of the
+    nominal segment the distance is (height^2 + (u - foot)^2)^(1/2). The deviation is at most linear
+    in u.
     """
-    own, (relative, _) = nominal.place_m[0], nominal.relative
+    own = nominal.place_m[0]
+    relative, _ = nominal.relative
     length = np.maximum(np.linalg.norm(relative, axis=0), np.finfo(float).tiny)
     foot = -(own * relative / length).sum(axis=0)
     height = np.sqrt(np.maximum((own * own).sum(axis=0) - foot**2, 0.0))
 
     def minimum(of_craft: Floats, of_object: Floats) -> Floats:
+        """Return the minimum over the segment, with deviations at its two ends."""
+        # With a slope of one the minimum is at an end, as it is with almost one.
         slope = np.clip((of_object - of_craft) / length, -1.0 + 1e-12, 1.0 - 1e-12)
         at = np.clip(foot + height * slope / np.sqrt(1.0 - slope**2), 0.0, length)
-        return np.asarray(
-            np.hypot(height, at - foot) - of_craft - (of_object - of_craft) * (at / length)
-        )
+        deviation_m = (of_object - of_craft) * (at / length)
+        return np.asarray(np.hypot(height, at - foot) - of_craft - deviation_m)
 
     sizes = deviation.place_m[:, MODULUS]
     return minimum(*np.zeros_like(sizes)), minimum(*sizes)

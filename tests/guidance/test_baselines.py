@@ -197,7 +197,7 @@ def test_proportional_navigation_makes_the_miss_zero_along_its_closed_form(
 
 
 @pytest.mark.parametrize("ratio", [3.0, 4.0, 5.0])
-def test_the_impulse_of_proportional_navigation_is_that_of_the_textbook(ratio: float) -> None:
+def test_impulse_of_proportional_navigation_equals_the_textbook_formula(ratio: float) -> None:
     """Acceleration N V/T (tau/T)^(N - 2) for a velocity V across the line of sight: N/(N - 1) V in
     all.
     """
@@ -212,7 +212,9 @@ def test_the_impulse_of_proportional_navigation_is_that_of_the_textbook(ratio: f
 
 
 @pytest.mark.parametrize("ratio", [3.0, 4.0, 5.0])
-def test_a_constant_acceleration_of_the_target_with_and_without_augmentation(ratio: float) -> None:
+def test_proportional_navigation_against_a_constant_acceleration_has_the_known_cost(
+    ratio: float,
+) -> None:
     """a N/2 (tau/T)^(N - 2) with augmentation, a N/(N - 2) (1 - (tau/T)^(N - 2)) without (Zarchan,
     chapter 8).
     """
@@ -344,7 +346,7 @@ def deviation_m(
 
 @pytest.mark.parametrize("centroid_m", [0.0, 30.0])
 @pytest.mark.parametrize("bias", list(Bias))
-def test_deviations_with_a_camera_are_those_of_a_line_through_the_positions(
+def test_deviations_with_a_camera_equal_a_line_through_the_positions(
     centroid_m: float, bias: Bias
 ) -> None:
     """Range and speed are known; a constant centroid error adds c^2/3 to the variance of the

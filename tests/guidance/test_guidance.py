@@ -33,7 +33,7 @@ def array(*values: float | list[float]) -> np.ndarray:
         (0.0, 1000.0, 0.0),
     ],
 )
-def test_the_thruster_follows_the_papers_rules(
+def test_thruster_follows_the_rules_of_the_paper(
     wanted: float, left: float, given_impulse: float
 ) -> None:
     assert THRUSTER.give(array([wanted]), array(left)).item() == given_impulse

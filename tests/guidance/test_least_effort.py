@@ -113,7 +113,7 @@ def test_each_decision_is_the_best_of_all_impulses(guaranteed: Scenario) -> None
 
 
 @pytest.mark.thorough
-def test_the_reference_is_a_miss_that_no_strategy_prevents(guaranteed: Scenario) -> None:
+def test_reference_is_at_most_the_lower_bound(guaranteed: Scenario) -> None:
     """It is the bound of one pair of measurements; the linear program of all of them finds little
     more.
     """

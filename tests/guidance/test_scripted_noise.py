@@ -52,7 +52,7 @@ def same(found: Any, wanted: Any) -> bool:
 
 
 @given(st.floats(-0.01, 0.01), st.floats(1e3, 7e6), errors, errors, errors)
-def test_what_is_measured_stays_within_the_bounds_to_rounding(
+def test_measurements_stay_within_the_bounds_to_rounding(
     alpha: float, distance: float, angle: float, far: float, fast: float
 ) -> None:
     seen = sight(alpha, distance)
@@ -69,7 +69,7 @@ def test_what_is_measured_stays_within_the_bounds_to_rounding(
 
 
 @given(st.floats(-0.01, 0.01), st.floats(1e3, 7e6), errors, errors, errors)
-def test_errors_are_found_again_from_what_was_measured(
+def test_errors_are_recovered_from_measurements(
     alpha: float, distance: float, angle: float, far: float, fast: float
 ) -> None:
     seen = sight(alpha, distance)
@@ -84,7 +84,7 @@ def test_errors_are_found_again_from_what_was_measured(
     np.testing.assert_allclose(found["rate"], fast, atol=ROUNDING * (1.0 + abs(alpha) / 1e-6))
 
 
-def test_extremal_errors_are_the_ends_of_what_the_truth_allows() -> None:
+def test_extremal_errors_give_the_ends_of_the_possible_measurements() -> None:
     seen = sight([0.001, -0.002], 3e6)
     for end in (-1.0, 1.0):
         script = np.full((2, 1), end)
@@ -104,7 +104,7 @@ def test_each_step_and_engagement_has_its_own_error() -> None:
         assert same(found["rate"], seen.omega_rad_s)
 
 
-def test_a_script_that_ends_before_the_flight_is_refused() -> None:
+def test_script_that_ends_before_the_flight_is_refused() -> None:
     with pytest.raises(ValueError, match=r"errors\['angle'\] has 3 steps, none for step 3"):
         ScriptedNoise({"angle": np.zeros((1, 1, 3))}).measure(sight(0.0, 3e6, step=3), looked_at())
 

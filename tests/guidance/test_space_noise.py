@@ -97,7 +97,7 @@ def all_sensors(angle: AngleSensor) -> dict[str, Sensor]:
 
 @pytest.mark.parametrize("tie", list(TieRule))
 @pytest.mark.parametrize("at_tie", [True, False])
-def test_the_game_of_each_axis_is_that_of_the_plane(tie: TieRule, at_tie: bool) -> None:
+def test_game_noise_of_each_axis_equals_game_noise_in_its_plane(tie: TieRule, at_tie: bool) -> None:
     view = InformationSet(MODEL, BATCH).view() if at_tie else moved()
     for step in range(2):
         seen = sight({"angle": SENSOR, "rate": RATE}, step=step)
@@ -142,7 +142,7 @@ def test_bounds_by_axis_are_used_by_the_game() -> None:
 
 
 @pytest.mark.parametrize("make", [GameNoise, SwitchingNoise])
-def test_the_game_is_possible(make: type[GameNoise]) -> None:
+def test_measurements_of_game_noise_are_possible(make: type[GameNoise]) -> None:
     for seed in range(10):
         seen = sight(all_sensors(SENSOR), seed)
         view = moved(seed=seed)
@@ -199,7 +199,7 @@ def ranged(noise: GameNoise, misses: Any, distance: float) -> float:
 
 
 @pytest.mark.parametrize(("opposite", "share"), [(0, 0.95), (1, 0.95), (2, 1.05)])
-def test_the_range_keeps_the_section_of_the_worst_corner(opposite: int, share: float) -> None:
+def test_measured_range_keeps_the_section_of_the_worst_corner(opposite: int, share: float) -> None:
     """The section of the worst corner is the second one; measured ranges end there, on the side of
     the opposite one.
     """
@@ -218,7 +218,7 @@ def test_the_range_keeps_the_section_of_the_worst_corner(opposite: int, share: f
     assert ranged(one, turned, 5.8e6) == 5.8e6 * share
 
 
-def test_scripted_errors_are_those_of_the_measurements() -> None:
+def test_scripted_noise_measures_with_its_errors() -> None:
     scripts = {"angle": draws(), "rate": draws(6), "range": draws(7)[0]}
     view = SimpleNamespace()
     for step in range(2):

@@ -85,9 +85,7 @@ def wanted(now: Situation, share: float = 0.5) -> float:
 
 @pytest.mark.parametrize("budget", [0.0, 7.0, 100.0, 1000.0])
 @pytest.mark.parametrize("to_go_s", [0.2, 0.5, 0.7, 3.0, 50.1, 100.0])
-def test_what_can_be_corrected_later_is_the_sum_over_the_steps(
-    to_go_s: float, budget: float
-) -> None:
+def test_later_correction_is_the_sum_over_the_steps(to_go_s: float, budget: float) -> None:
     """Step by step: mu2 x_j/e as long as the object is ahead and the budget pays."""
     expected = 0.0
     left = budget
@@ -111,11 +109,11 @@ def test_what_can_be_corrected_later_is_the_sum_over_the_steps(
         (0.0, 200.0, 0.0),
     ],
 )
-def test_patient_corrects_only_what_is_certain(lower: float, upper: float, expected: float) -> None:
+def test_patient_corrects_certain_misses_only(lower: float, upper: float, expected: float) -> None:
     assert wanted(situation(lower, upper)) == pytest.approx(expected)
 
 
-def test_patient_corrects_what_could_not_be_corrected_later() -> None:
+def test_patient_corrects_misses_beyond_later_impulses() -> None:
     # With 10 s to go the 19 impulses to come can correct 7.5 (9.5 + ... + 0.5) = 712.5 m.
     assert correctable_later_m(situation(0.0, 0.0), np.array([[10.0 * E]])).item() == pytest.approx(
         712.5
@@ -254,7 +252,7 @@ def test_patient_spends_little_for_the_same_miss(meter: bool) -> None:
 
 
 @pytest.mark.thorough
-def test_the_filters_are_good_ones() -> None:
+def test_filters_have_small_misses_with_random_noise() -> None:
     """A filter of two states with plain zero-effort guidance: 3.3 m for 379 m/s, in an independent
     implementation.
     """

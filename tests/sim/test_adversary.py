@@ -76,7 +76,7 @@ def assert_possible(found: WorstEngagement, scenario: Scenario) -> None:
         assert (np.abs(found.accelerations_m_s2) == np.array(maximum)[:, None, None]).all()
 
 
-def test_what_is_found_is_possible_and_flies_again(
+def test_worst_engagement_is_possible_and_repeatable(
     worst: WorstEngagement, coarse: Scenario
 ) -> None:
     assert_possible(worst, coarse)
@@ -100,7 +100,7 @@ def test_measurements_of_the_worst_lie_within_the_bounds_of_the_truth(
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", ["ranging", "comet"])
-def test_with_all_sensors_in_the_guaranteed_model(
+def test_worst_engagement_with_all_sensors_is_possible(
     name: str, request: pytest.FixtureRequest
 ) -> None:
     given = guaranteed(request.getfixturevalue(name))
@@ -119,7 +119,7 @@ def test_with_all_sensors_in_the_guaranteed_model(
     assert found.result.truth_kept[0]
 
 
-def test_the_search_keeps_its_account(worst: WorstEngagement) -> None:
+def test_search_reports_its_evaluations_and_history(worst: WorstEngagement) -> None:
     assert worst.evaluations == BUDGET
     evaluations, misses = np.array(worst.history).T
     assert (np.diff(evaluations) > 0).all()
@@ -131,7 +131,7 @@ def test_the_search_keeps_its_account(worst: WorstEngagement) -> None:
 
 
 @pytest.mark.thorough
-def test_the_same_seed_finds_the_same_whatever_the_threads(
+def test_search_with_the_same_seed_is_the_same_for_any_threads(
     worst: WorstEngagement, coarse: Scenario
 ) -> None:
     again = find_worst(coarse, budget=BUDGET, seed=1, threads=2)
@@ -154,7 +154,7 @@ def test_engagements_that_lose_their_set_can_be_left_out(coarse: Scenario) -> No
         find_worst(wrong, budget=10, keep_set=True)
 
 
-def test_a_strategy_of_ones_own(coarse: Scenario) -> None:
+def test_search_accepts_a_strategy_object(coarse: Scenario) -> None:
     class Idle:
         def start(self, shape: tuple[int, int]) -> None:
             return None

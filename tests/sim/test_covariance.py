@@ -37,7 +37,7 @@ def normal(sigmas: float, step_s: float = 7200.0) -> Scenario:
     return replace(dart, dispersion=box, covariance=GIVEN)
 
 
-def test_all_forms_are_one_covariance() -> None:
+def test_all_forms_give_one_covariance() -> None:
     full = np.tril(np.array([[*row, *[0.0] * (6 - len(row))] for row in ROWS]))
     full += np.tril(full, -1).T
     matrix = np.outer(SIGMA, SIGMA) * full
@@ -96,12 +96,12 @@ def test_an_exact_component_and_one_that_follows_from_another_are_kept() -> None
         ),
     ],
 )
-def test_what_is_no_covariance_is_refused(values: dict[str, object], problem: str) -> None:
+def test_invalid_covariance_is_refused(values: dict[str, object], problem: str) -> None:
     with pytest.raises(ValueError, match=problem):
         Covariance(**values)  # type: ignore[arg-type]
 
 
-def test_starts_have_the_covariance_and_are_those_of_each_run_alone() -> None:
+def test_starts_have_the_covariance_and_equal_the_starts_of_single_runs() -> None:
     wide = normal(5.0)
     runs = 4000
     drawn = draw(wide, range(runs), seed=4)
@@ -118,7 +118,7 @@ def test_starts_have_the_covariance_and_are_those_of_each_run_alone() -> None:
     )
 
 
-def test_the_redrawn_share_is_that_of_the_distribution_beyond_the_box() -> None:
+def test_redrawn_share_is_the_probability_outside_the_box() -> None:
     narrow = normal(1.5)
     runs = 3000
     drawn = draw(narrow, range(runs), seed=0)
