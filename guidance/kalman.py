@@ -170,7 +170,7 @@ class KalmanBank:
         ratio = np.exp(self.log_weight - self.log_weight.max(axis=-1, keepdims=True))
         weight = np.where(ahead, ratio, 0.0)
         total = weight.sum(axis=-1, keepdims=True)
-        return np.divide(weight, total, out=np.zeros_like(weight), where=total > 0.0)
+        return np.asarray(np.divide(weight, total, out=np.zeros_like(weight), where=total > 0.0))
 
     def _misses(self, to_go: Floats) -> tuple[Floats, Floats]:
         """Return the misses of the filters without pending impulses, and their variances."""
