@@ -138,6 +138,7 @@ class Arc:
         scale[:3] = self.end_s - self.start_s
         gramian = self.motion.gramian(self.start_s, self.end_s)[:count, :count]
         gramian = gramian / np.outer(scale, scale)
+
         try:
             lower = np.linalg.cholesky(gramian)
         except np.linalg.LinAlgError:
@@ -191,10 +192,12 @@ class BoundedFlight:
         grid = np.union1d(self.edges_s, times)
         nodes, weights = _rule(grid)
         last = np.repeat(grid[1:], len(_NODES))
+
         effects = self.motion.transition(nodes, last)[:, :, 3:]
         changes = np.einsum("kab,kb->ka", effects, weights[:, None] * self.control(nodes))
         changes = changes.reshape(len(grid) - 1, len(_NODES), 6).sum(axis=1)
         transitions = self.motion.transition(grid[:-1], grid[1:])
+
         states = np.empty((len(grid), 6))
         states[0] = self.start_state
         for index in range(len(grid) - 1):
@@ -306,6 +309,7 @@ def least_bound(arcs: Sequence[Arc]) -> LeastBound:
         for arc, white in zip(arcs, whiteners, strict=True)
     ]
     slopes = [white @ arc.slope for arc, white in zip(arcs, whiteners, strict=True)]
+
     efforts = _longest_goal(sampled, [goal / size for goal in goals], slopes)
 
     # Rounding leaves the efforts slightly outside the space in which they are bounds.
@@ -384,6 +388,7 @@ class _Dual:
         """Return the point of the smallest value, by Newton's method with halved steps (Armijo)."""
         value, slope, curvature = self._expand(sampled, point)
         settled = _SETTLED * float(np.linalg.norm(self.basis.T @ self._weighted_goal()))
+
         for _ in range(_MAX_NEWTON_STEPS):
             if np.linalg.norm(slope) <= settled:
                 break
@@ -606,6 +611,7 @@ def _switches(wanted: Callable[[Floats], Floats], nodes_s: Floats, max_m_s2: flo
     changes = np.flatnonzero(beyond[1:] != beyond[:-1])
     low = nodes_s[changes]
     high = nodes_s[changes + 1]
+
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
         is_low = (np.linalg.norm(wanted(middle), axis=1) > max_m_s2) == beyond[changes]

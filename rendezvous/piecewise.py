@@ -55,11 +55,15 @@ def chebyshev_halves(count: int) -> list[Floats]:
 
 _POINTS = chebyshev_points(NODES)
 _FIT = chebyshev_fit(NODES)
+"""Nodes of a panel on [-1, 1], and the matrix of coefficients from the values at them."""
 _DEGREE = 2 * (NODES - 1)
 """Degree of the square of a control on a panel."""
 _SAMPLES = 4 * _DEGREE
 """Number M of samples that bound the square: the factor is then 1.08."""
 _FACTOR = 1.0 / np.cos(0.5 * np.pi * _DEGREE / _SAMPLES)
+"""Maximum of a polynomial divided by the maximum of its samples (Ehlich and Zeller, 1964)."""
+# Matrices: the control at the nodes of its square, the coefficients of the square from them, these
+# coefficients on both halves of the panel, and the square at the samples.
 _AT_SQUARES = chebyshev.chebvander(chebyshev_points(_DEGREE + 1), NODES - 1)
 _FIT_SQUARES = chebyshev_fit(_DEGREE + 1)
 _HALVES = chebyshev_halves(_DEGREE + 1)
@@ -76,6 +80,7 @@ _MAX_SIZE_HALVINGS = 45
 _RULE_POINTS, _RULE_WEIGHTS = (
     rule.astype(np.float64) for rule in np.polynomial.legendre.leggauss(NODES)
 )
+# Matrices: a function at the nodes of the rule, and its coefficients on both halves of an interval.
 _AT_RULE = chebyshev.chebvander(_RULE_POINTS, NODES - 1)
 _RULE_HALVES = chebyshev_halves(NODES)
 
@@ -104,6 +109,7 @@ def resolve(function: Callable[[Floats], Floats], breaks_s: Floats) -> tuple[Flo
     scale = 0.0
     half_s = []
     resolved_coefficients = []
+
     while len(starts):
         coefficients = _fitted(function, starts, ends)
         sizes = np.abs(coefficients)
@@ -133,6 +139,7 @@ def _fitted(function: Callable[[Floats], Floats], starts: Floats, ends: Floats) 
         low = starts[first : first + _AT_ONCE]
         high = ends[first : first + _AT_ONCE]
         times = 0.5 * (low + high)[:, None] + 0.5 * (high - low)[:, None] * _POINTS
+
         values = function(times.ravel())
         if not np.isfinite(values).all():
             raise ValueError("a value is not finite; check the units")
@@ -159,6 +166,7 @@ def max_control(control: Callable[[Floats], Floats], breaks_s: Floats) -> float:
     _, coefficients = resolve(control, breaks_s)
     at_nodes = ((_AT_SQUARES @ coefficients) ** 2).sum(axis=2)
     squares = (_FIT_SQUARES @ at_nodes[..., None])[..., 0]
+
     maximum = 0.0
     for _ in range(_MAX_HALVINGS):
         values = squares @ _AT_SAMPLES.T
@@ -166,6 +174,7 @@ def max_control(control: Callable[[Floats], Floats], breaks_s: Floats) -> float:
         bottom = values.min(axis=1)
         bounds = 0.5 * (top + bottom) + 0.5 * _FACTOR * (top - bottom)
         maximum = max(maximum, float(top.max()))
+
         may_be_larger = bounds > maximum * (1.0 + 2.0 * PEAK_TOLERANCE)
         if not may_be_larger.any():
             break

@@ -62,6 +62,7 @@ class OrbitalElements:
                 f"{self.semi_major_axis_m:g} m and {self.eccentricity:g}; give a parabola by "
                 "position and velocity"
             )
+
         if not 1.0 + self.eccentricity * math.cos(self.true_anomaly_rad) > 0.0:
             raise ValueError(
                 f"a hyperbola of eccentricity {self.eccentricity:g} has true anomalies up to "
@@ -115,6 +116,7 @@ def perigee_m(
     along = float(position_m @ velocity_m_s)
     squares = float((position_m @ position_m) * (velocity_m_s @ velocity_m_s))
     momentum_squared = squares - along * along
+
     latus_rectum = max(0.0, momentum_squared) / gravitational_parameter_m3_s2
     axis = semi_major_axis_m(position_m, velocity_m_s, gravitational_parameter_m3_s2)
     return latus_rectum / (1.0 + math.sqrt(max(0.0, 1.0 - latus_rectum / axis)))
@@ -134,6 +136,7 @@ def orbit_fault(
         return (
             "the orbit is a parabola or a hyperbola: the velocity is not below the escape velocity"
         )
+
     perigee = perigee_m(position_m, velocity_m_s, mu_m3_s2)
     if perigee <= _RADIAL * axis:
         return "the orbit is a fall along a line through the planet's centre"

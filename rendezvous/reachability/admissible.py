@@ -113,6 +113,7 @@ def lift(block: StateBlock) -> Lifted:
     free = np.zeros((periods + 1, n))
     response = np.zeros((periods + 1, n, width))
     free[0] = block.initial
+
     for t in range(periods):
         free[t + 1] = block.transition[t] @ free[t]
         response[t + 1] = block.transition[t] @ response[t]
@@ -136,6 +137,7 @@ def lift_with_states(block: StateBlock) -> Lifted:
     m = len(block.controls)
     width = periods * m
     total = width + periods * n
+
     free = np.zeros((periods + 1, n))
     response = np.zeros((periods + 1, n, total))
     free[0] = block.initial
@@ -229,6 +231,7 @@ def joined(parts: Sequence[Lifted], controls: Sequence[Places], periods: int, to
     control_response = np.zeros((periods * total, sum(part.size for part in parts)))
     control_free[order] = np.concatenate([part.control_free for part in parts])
     control_response[order] = block_diag(*[part.control_response for part in parts])
+
     return Lifted(
         free=np.hstack([part.free for part in parts]),
         response=np.array(
@@ -288,6 +291,7 @@ def with_thrust(program: ConeProgram, lifted: Lifted, *, deep: bool = False) -> 
         # A thrust that does not depend on v is within its bound already.
         if np.linalg.norm(turned) <= _STILL:
             continue
+
         thrust = _in_own_axes(fixed, turned)
         if deep:
             top = np.zeros(len(program.cost))
@@ -323,6 +327,7 @@ def min_relaxation(lifted: Lifted) -> tuple[float, Floats]:
     misfit = -np.ones((len(lifted.equal), 1))
     cost = np.zeros(lifted.size + 1)
     cost[-1] = 1.0
+
     rows = np.vstack(
         [
             np.column_stack([lifted.rows, -soft.astype(float)]),
@@ -333,6 +338,7 @@ def min_relaxation(lifted: Lifted) -> tuple[float, Floats]:
     )
     max_margin = 0.0 if len(lifted.equal) else 1.0
     limits = np.concatenate([lifted.limits, lifted.levels, -lifted.levels, [max_margin]])
+
     point = _solution(ConeProgram(cost).keep(rows, limits), lifted)
     return float(point[-1]), point[:-1]
 
@@ -371,6 +377,7 @@ def min_peak(lifted: Lifted, scale: Floats, group: int) -> tuple[float, Floats]:
     else:
         program.keep(*_absolute(lifted, scale, np.ones((len(scale), 1))))
         point = program.vertex()
+
     return float(point[-1]), point[:-1]
 
 
@@ -378,6 +385,7 @@ def min_l1(lifted: Lifted, scale: Floats) -> Floats:
     """Minimise the sum of the absolute values of all controls, whose units are `scale`."""
     rows, limits = _absolute(lifted, scale, np.eye(len(scale)))
     cost = np.concatenate([np.zeros(lifted.size), np.ones(len(scale))])
+
     wide = np.hstack([lifted.rows, np.zeros((len(lifted.rows), len(scale)))])
     program = ConeProgram(cost).keep(
         np.vstack([wide, rows]), np.concatenate([lifted.limits, limits])
@@ -399,6 +407,7 @@ def deep_point(lifted: Lifted) -> tuple[Floats, float]:
     program = ConeProgram(cost).keep(
         np.vstack([rows, -cost]), np.concatenate([lifted.limits, [1.0]])
     )
+
     optimum = with_thrust(program, lifted, deep=True).solve()
     return optimum.point[:-1], float(optimum.point[-1])
 
@@ -425,6 +434,7 @@ def _with_norms_below(
 ) -> ConeProgram:
     """Add |u(t)| <= tops[t] . v, in the units of the controls."""
     group = len(scale) // len(tops)
+
     for t, top in enumerate(tops):
         mine = slice(t * group, (t + 1) * group)
         fixed = scale[mine] * lifted.control_free[mine]
@@ -466,10 +476,12 @@ class Maximiser:
         optimum = self._solved(cost)
         if not lifted.size or lifted.ball:
             return optimum.point
+
         active = optimum.multipliers > lifted.limits - lifted.rows @ optimum.point
         held = np.vstack([lifted.equal, lifted.rows[active]])
         missing = np.concatenate([lifted.levels, lifted.limits[active]]) - held @ optimum.point
         moved = optimum.point + np.linalg.lstsq(held, missing, rcond=_SHARP_RANK)[0]
+
         violation = -float((lifted.limits - lifted.rows @ moved).min(initial=0.0))
         return moved if violation < _MAX_SHARP_VIOLATION else optimum.point
 
@@ -487,6 +499,7 @@ class Maximiser:
         if size == 0.0:
             size = 1.0
         down = -cost / size
+
         self._solver.update(q=down)
         solution = self._solver.solve()
         try:

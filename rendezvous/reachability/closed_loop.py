@@ -80,6 +80,7 @@ def replan(
         controls.append(control)
         misses.append(optimal.miss)
         relaxations.append(relaxation)
+
     return ClosedLoopFlight(
         np.vstack(states), np.array(controls), np.array(misses), np.array(relaxations)
     )
@@ -112,6 +113,7 @@ def _plan(
             fraction = max(2.0 * fraction, needed * _MORE, _MIN_RELAXATION)
         except EmptyTubeError as error:
             fraction = (fraction + error.relaxation * (1.0 + fraction)) * _MORE + _MIN_RELAXATION
+
         if fraction > _MAX_RELAXATION:
             raise ArithmeticError(
                 f"no plan from period {start}: the state is far outside the constraints"

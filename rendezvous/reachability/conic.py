@@ -147,6 +147,7 @@ class ConeProgram:
         sizes[sizes == 0.0] = 1.0
         rows = rows / sizes[:, None]
         limits = limits / sizes
+
         optimum = linprog(
             self.cost,
             A_ub=rows,
@@ -159,6 +160,7 @@ class ConeProgram:
         )
         if optimum.status != 0:
             raise NoSolutionError(f"a linear program was not solved: {optimum.message}")
+
         scaled = ConeProgram(self.cost).meet(equal, levels).keep(rows, limits)
         multipliers = -np.concatenate([optimum.eqlin.marginals, optimum.ineqlin.marginals])
         return scaled.checked(np.asarray(optimum.x), multipliers).point
@@ -180,6 +182,7 @@ class ConeProgram:
         if self._has_cones:
             max_violation = CONE_TOLERANCE
             max_gap = max(CONE_TOLERANCE, max_gap)
+
         violation, gap = self.violation_and_gap(point, multipliers, cost)
         if violation <= max_violation and gap > max_gap:
             balanced = self._balanced(point, multipliers, cost)
@@ -189,6 +192,7 @@ class ConeProgram:
                 f"a convex program was not solved to {max_gap:g}: relative gap {gap:.2g}, "
                 f"constraints violated by {max(violation, 0.0):.2g}"
             )
+
         parts = [part for kind, part in self.parts(multipliers) if kind == "rows"]
         return Optimum(point, np.maximum(np.concatenate([np.zeros(0), *parts]), 0.0))
 
@@ -206,6 +210,7 @@ class ConeProgram:
         settings.static_regularization_constant = chosen.regularisation
         settings.equilibrate_enable = chosen.rescales_cones or not self._has_cones
         settings.max_threads = 1
+
         upper = csc_matrix(np.triu(self._matrix.toarray())) if self._matrix.nnz else self._matrix
         rows, ends = self._all()
         cones = [each.cone for each in self._added]
@@ -224,6 +229,7 @@ class ConeProgram:
         """
         linear = self.cost if cost is None else cost
         rows, ends = self._all()
+
         dual = [np.zeros(0)]
         violation = 0.0
         for (kind, slack), (_, multiplier) in zip(

@@ -42,6 +42,7 @@ thorough tests compare with forty digits at this precision."""
 _ROUNDINGS = 8.0
 """Roundings of the sum of absolute terms that the error of a lower bound may have."""
 _ULP = float(np.finfo(float).eps)
+"""Relative rounding of a double."""
 _RANK = 1e-13
 """Relative singular value below which equations count as dependent. Chosen: optimal controls do not
 change from 1e-14 to 1e-11 in published and random problems."""
@@ -49,8 +50,8 @@ _ROUNDS = (*ATTEMPTS, *ATTEMPTS[:2])
 """Settings of the solver in the rounds of the search; most searches end after the first."""
 _REACH = 1e4
 """Maximum change of a control in a round, in units of the norm found. Constraints that are farther
-away are left out of the program. Chosen: from 1e3 to
-1e5 results change by 1e-7 at most, the tolerance of the programs."""
+away are left out of the program. Chosen: from 1e3 to 1e5 results change by 1e-7 at most, the
+tolerance of the programs."""
 _MAX_NAMES = 4
 """Maximum number of conflicting constraints that a message names."""
 
@@ -253,6 +254,7 @@ class _OptimumSearch:
         self._soft = lifted.moments >= 0
         self._lengths = np.abs(lifted.rows).sum(axis=1)
         self._reach = float(np.linalg.norm(np.abs(self._free) + np.abs(self._response).sum(axis=1)))
+
         self._point = np.zeros(lifted.size)
         self.value = self._merit = np.inf
         self.violation = 0.0
@@ -322,6 +324,7 @@ class _OptimumSearch:
         inner, dual = program.answer(settings)
         if not (np.isfinite(inner).all() and np.isfinite(dual).all()):
             return
+
         parts = list(program.parts(dual))
         multipliers = np.zeros(len(self._multipliers))
         multipliers[kept] = parts[0][1] if len(kept) else ()
@@ -354,6 +357,7 @@ class _OptimumSearch:
         size = lifted.size
         slack = (lifted.limits - lifted.rows @ start) / scale
         kept = np.flatnonzero(slack < _REACH * self._lengths)
+
         cost = np.zeros(size + 1)
         cost[-1] = 1.0
         program = ConeProgram(cost).keep(lifted.rows[kept], slack[kept])
@@ -395,6 +399,7 @@ class _OptimumSearch:
         length = float(np.linalg.norm(direction))
         if length == 0.0:
             return
+
         direction = direction / length
         multipliers = np.where(self._soft, np.maximum(multipliers, 0.0), 0.0) / length
         pressed = self._norms(self._residual(direction, multipliers))
@@ -419,6 +424,7 @@ class _OptimumSearch:
         outside = float((self._lifted.rows @ point - self._lifted.limits).max(initial=0.0))
         if self._lifted.ball:
             outside = max(outside, float(self._norms(point).max()) - 1.0)
+
         value = float(np.linalg.norm(self._free + self._response @ point))
         merit = value + outside * self._reach
         if merit < self._merit:

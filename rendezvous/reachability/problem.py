@@ -105,6 +105,7 @@ class ReachabilityProblem:
             for matrix in self.transition:
                 moved = matrix @ moved
             growth = float(np.abs(moved / self.state_bounds[:, None]).max())
+
         if not growth <= _MAX_GROWTH:
             raise ValueError(
                 f"the linear model multiplies deviations by over {_MAX_GROWTH:g}, so rounding "
@@ -115,12 +116,14 @@ class ReachabilityProblem:
     def _check_start(self) -> None:
         over = np.abs(self.initial) - self.state_bounds
         broken = [(self.state_name(i), float(over[i])) for i in np.flatnonzero(over > 0.0).tolist()]
+
         normals, offsets = self.further
         excess = normals @ self.initial - offsets[0]
         slack = _START_ROUNDING * np.abs(normals) @ self.state_bounds
         broken += [
             (self.name_of(k), float(excess[k])) for k in np.flatnonzero(excess > slack).tolist()
         ]
+
         if broken:
             raise InadmissibleStartError(tuple(broken))
 

@@ -140,6 +140,7 @@ def _always_tight(rows: Floats, limits: Floats, tolerance: float) -> Integers:
         slack = np.zeros((len(rows), len(left)))
         slack[left, np.arange(len(left))] = 1.0
         cost = np.concatenate([np.zeros(size), -np.ones(len(left))])
+
         bounds = [(None, None)] * size + [(0.0, 1.0)] * len(left)
         optimum = linprog(
             cost,
@@ -151,6 +152,7 @@ def _always_tight(rows: Floats, limits: Floats, tolerance: float) -> Integers:
         )
         if optimum.status != 0:
             raise SolverError("the affine hull was not found")
+
         new = left[optimum.x[size:] > _LOOSE * tolerance]
         if not len(new):
             return left

@@ -16,10 +16,13 @@ from infoset.rendezvous.reachability.conic import ConeProgram, NoSolutionError
 from infoset.rendezvous.reachability.problem import ReachabilityProblem, ThrustShape
 
 MAX_PERIODS_WITH_FEEDBACK = 24
-"""Maximum number of periods: the variables of the linear program grow with its square. Chosen."""
-_GAIN_COST = 1e-7
-"""Cost of the size of a gain, in units of the cost of a terminal state: of equally good plans, one
-with small gains is taken. Chosen: small beside 1.
+"""Maximum number of periods of a plan with feedback: the linear program of 24 periods with three
+disturbances takes about a minute, and of 16 periods 14 s."""
+_MAGNITUDE_COST = 1e-7
+"""Cost of the magnitudes of gains and effects, relative to the cost of the terminal states.
+
+It selects a plan with small gains among equally good plans. Chosen: the plans of the tests do not
+change from 1e-8 to 1e-4; with a cost of 0 gains are up to five times as large.
 """
 
 
@@ -64,6 +67,7 @@ def accumulated(problem: ReachabilityProblem, disturbance: Floats) -> Floats:
     """
     if problem.between is not None:
         raise ValueError("disturbances need constraints at whole periods only")
+
     periods = problem.periods
     effect = np.zeros((periods + 1, periods, *disturbance.shape[1:]))
     for t in range(periods):
@@ -120,6 +124,222 @@ def feedback_plan(problem: ReachabilityProblem, disturbance: Floats) -> Feedback
             f"periods, found {problem.periods}"
         )
     program = _program(problem, accumulated(problem, disturbance))
+    nominal, gains = _controls_of(problem, _solution(program), disturbance.shape[2])
+
+    centre = problem.run(nominal)
+    spread = _spread_of_states(problem, disturbance, gains)
+    return FeedbackPlan(problem, disturbance, nominal, gains, centre - spread, centre + spread)
+
+
+def _spread_of_states(problem: ReachabilityProblem, disturbance: Floats, gains: Floats) -> Floats:
+    """Maximum deviation of each state from the nominal one, shape (T + 1, n), in its units."""
+    effect = np.zeros((problem.periods + 1, problem.periods, *disturbance.shape[1:]))
+    for t in range(problem.periods):
+        through_controls = problem.control[t] @ gains[t]
+        effect[t + 1] = problem.transition[t] @ effect[t] + through_controls
+        effect[t + 1, t] += disturbance[t]
+    return np.asarray(np.abs(effect).sum(axis=(1, 3)))
+
+
+class _Constraints(NamedTuple):
+    """normals x(t) <= offsets(t) with their names, of shapes (k, n), (T + 1, k) and (k,).
+
+    The upper bounds on the n states come first, then the n lower bounds.
+    """
+
+    normals: Floats
+    offsets: Floats
+    names: tuple[str, ...]
+
+
+def _all_constraints(problem: ReachabilityProblem) -> _Constraints:
+    """Return the bounds on the states and the further constraints."""
+    unit = np.eye(problem.states)
+    normals, offsets = problem.further
+
+    names = [f"the bound on {problem.state_name(i)}" for i in range(problem.states)] * 2
+    names += [problem.name_of(k) for k in range(len(normals))]
+    bounds = np.tile(np.concatenate([problem.state_bounds] * 2), (problem.periods + 1, 1))
+    return _Constraints(
+        np.vstack([unit, -unit, normals]), np.hstack([bounds, offsets]), tuple(names)
+    )
+
+
+class _GainPairs(NamedTuple):
+    """Times t of a control and s < t of a disturbance, of each of the P gain matrices."""
+
+    control_times: Places
+    disturbance_times: Places
+
+
+def _gain_pairs(periods: int) -> _GainPairs:
+    return _GainPairs(*np.tril_indices(periods, -1))
+
+
+class _Responses(NamedTuple):
+    """Effects of the variables on the states, for controls divided by their bounds.
+
+    `nominal`, shape (T + 1, n, T m), is the effect of the nominal controls on x(t). `gains`, shape
+    (T + 1, T, n, P m), is the effect of w(s) on x(t) through the gains of one component of w.
+    """
+
+    nominal: Floats
+    gains: Floats
+
+
+def _responses(problem: ReachabilityProblem) -> _Responses:
+    periods, n, m = problem.control.shape
+    pairs = _gain_pairs(periods)
+    nominal = np.zeros((periods + 1, n, periods * m))
+    gains = np.zeros((periods + 1, periods, n, len(pairs.control_times) * m))
+    for t in range(periods):
+        push = problem.control[t] * problem.control_bounds
+        nominal[t + 1] = problem.transition[t] @ nominal[t]
+        nominal[t + 1, :, t * m : (t + 1) * m] += push
+
+        gains[t + 1] = problem.transition[t] @ gains[t]
+        for pair in np.flatnonzero(pairs.control_times == t):
+            s = pairs.disturbance_times[pair]
+            gains[t + 1, s, :, pair * m : (pair + 1) * m] += push
+    return _Responses(nominal, gains)
+
+
+class _Spreads(NamedTuple):
+    """Effects of single disturbances on single constraints, which the constraints must allow for.
+
+    The effect of component j of w(s) on constraint k at time t is `direct`[:, j] + `by_gains` @
+    (gains of component j), of shapes (e, q) and (e, P m). `times` and `kinds`, shape (e,), are t
+    and the row k of the constraint among the lower bounds on states and the further constraints:
+    the effects on the two bounds of a state have the same absolute values.
+    """
+
+    times: Places
+    kinds: Places
+    by_gains: Floats
+    direct: Floats
+
+
+def _spreads(rows: Floats, finite: Flags, responses: _Responses, effect: Floats) -> _Spreads:
+    """Return the effects that are not zero, on the constraints `rows` that are `finite`.
+
+    `rows`, shape (k, n), and `finite`, shape (T + 1, k), are without the upper bounds on states.
+    """
+    by_gains = np.einsum("kn,tsn...->tks...", rows, responses.gains)
+    direct = np.einsum("kn,tsn...->tks...", rows, effect)
+    kept = (by_gains.any(axis=-1) | direct.any(axis=-1)) & finite[..., None]
+    times, kinds, _ = np.nonzero(kept)
+    return _Spreads(times, kinds, by_gains[kept], direct[kept])
+
+
+class _NominalRows(NamedTuple):
+    """Constraints on the nominal states: coasting + by_controls v <= ends.
+
+    v are the nominal controls, divided by their bounds; the shapes are (c,), (c, T m) and (c,).
+    `times` and `kinds`, shape (c,), are the time and the row of each constraint.
+    """
+
+    times: Places
+    kinds: Places
+    by_controls: Floats
+    coasting: Floats
+    ends: Floats
+
+
+def _nominal_rows(
+    problem: ReachabilityProblem, rows: Floats, ends: Floats, responses: _Responses
+) -> _NominalRows:
+    """Return the finite constraints at all times but the start, where they have been checked."""
+    after_start = np.arange(problem.periods + 1) > 0
+    times, kinds = np.nonzero(np.isfinite(ends) & after_start[:, None])
+    by_controls = np.einsum("cn,cnu->cu", rows[kinds], responses.nominal[times])
+    coasting_states = problem.run(np.zeros((problem.periods, problem.controls)))
+    coasting = np.einsum("cn,cn->c", rows[kinds], coasting_states[times])
+    return _NominalRows(times, kinds, by_controls, coasting, ends[times, kinds])
+
+
+def _sums_of_magnitudes(
+    problem: ReachabilityProblem, nominal: _NominalRows, spreads: _Spreads, components: int
+) -> tuple[Floats, Floats]:
+    """Return the sums that tighten each constraint on a state, and each bound on a control.
+
+    They are matrices of zeros and ones, one column per magnitude, by component of w.
+    """
+    n = problem.states
+    kinds = np.where(nominal.kinds < n, nominal.kinds, nominal.kinds - n)
+    acts_on = (spreads.times == nominal.times[:, None]) & (spreads.kinds == kinds[:, None])
+
+    control_times = _gain_pairs(problem.periods).control_times
+    is_at_time = control_times == np.arange(problem.periods)[:, None]
+    gains_of = np.kron(is_at_time, np.eye(problem.controls))
+
+    sums = np.kron(np.ones(components), block_diag(acts_on, gains_of))
+    return sums[: len(acts_on)], sums[len(acts_on) :]
+
+
+class _LinearProgram(NamedTuple):
+    """Minimise cost . v over matrix v <= limits."""
+
+    cost: Floats
+    matrix: csr_array
+    limits: Floats
+
+
+def _program(problem: ReachabilityProblem, effect: Floats) -> _LinearProgram:
+    """Return the linear program of a plan, for the `effect` of disturbances without feedback.
+
+    Its variables are
+
+    - the nominal controls;
+    - the gains of all pairs (t, s), by component of w;
+    - magnitudes, by component of w: upper bounds of the absolute values of each effect of
+      `_Spreads`, then of each gain;
+    - the maximum terminal states.
+
+    Controls are divided by their bounds, and constraints by their sizes. A constraint on the
+    nominal state or control is tightened by the sum of the magnitudes of all disturbances.
+    """
+    periods, n, m = problem.control.shape
+    components = effect.shape[3]
+    gains = len(_gain_pairs(periods).control_times) * m
+
+    constraints = _all_constraints(problem)
+    sizes = np.abs(constraints.normals) @ problem.state_bounds
+    rows = constraints.normals / sizes[:, None]
+    ends = constraints.offsets / sizes
+    responses = _responses(problem)
+    nominal = _nominal_rows(problem, rows, ends, responses)
+    spreads = _spreads(rows[n:], np.isfinite(ends[:, n:]), responses, effect)
+    sums_of_states, sums_of_controls = _sums_of_magnitudes(problem, nominal, spreads, components)
+
+    # The signed values below the magnitudes are the effects by_gains g + direct, and the gains g.
+    signed = kron(np.eye(components), csr_array(np.vstack([spreads.by_gains, np.eye(gains)])))
+    constant = np.vstack([spreads.direct, np.zeros((gains, components))]).T.ravel()
+    magnitudes = eye_array(len(constant))
+
+    is_last = (nominal.times == periods) & (nominal.kinds < 2 * n)
+    maxima = np.tile(np.eye(n), (2, 1))
+    unit = np.eye(periods * m)
+    ones = np.ones(periods * m)
+    matrix = block_array(
+        [
+            [nominal.by_controls, None, sums_of_states, None],
+            [unit, None, sums_of_controls, None],
+            [-unit, None, sums_of_controls, None],
+            [nominal.by_controls[is_last], None, sums_of_states[is_last], -maxima],
+            [None, signed, -magnitudes, None],
+            [None, -signed, -magnitudes, None],
+        ],
+        format="csr",
+    )
+    room = nominal.ends - nominal.coasting
+    limits = np.concatenate([room, ones, ones, -nominal.coasting[is_last], -constant, constant])
+    costs = [0.0, _MAGNITUDE_COST, 1.0]
+    cost = np.repeat(costs, [periods * m + components * gains, len(constant), n])
+    return _LinearProgram(cost, matrix, limits)
+
+
+def _solution(program: _LinearProgram) -> Floats:
+    """Return the variables of a solution, whose feasibility and duality gap are checked."""
     optimum = linprog(
         program.cost,
         A_ub=program.matrix,
@@ -128,6 +348,7 @@ def feedback_plan(problem: ReachabilityProblem, disturbance: Floats) -> Feedback
         method="highs-ipm",
         options=HIGHS,
     )
+
     if optimum.status == 2:
         raise NoRobustPlanError(
             "no plan with affine feedback keeps the constraints under every disturbance; reduce "
@@ -135,194 +356,21 @@ def feedback_plan(problem: ReachabilityProblem, disturbance: Floats) -> Feedback
         )
     if optimum.status != 0:
         raise NoSolutionError(f"HiGHS: {optimum.message}")
-    cone_program = ConeProgram(program.cost).keep(program.matrix, program.limits)
-    cone_program.checked(optimum.x, -optimum.ineqlin.marginals)
-    return _plan(problem, disturbance, optimum.x)
+
+    checked = ConeProgram(program.cost).keep(program.matrix, program.limits)
+    return checked.checked(optimum.x, -optimum.ineqlin.marginals).point
 
 
-def _plan(problem: ReachabilityProblem, disturbance: Floats, solution: Floats) -> FeedbackPlan:
-    """Return the plan of a solution of the linear program, with its robust tube."""
-    periods, n, m = problem.control.shape
-    q = disturbance.shape[2]
-    at, earlier = _pairs(problem)
-    nominal, own, _ = np.split(solution, np.cumsum([periods * m, q * len(at) * m]))
-    nominal = nominal.reshape(periods, m) * problem.control_bounds
-    own = np.moveaxis(own.reshape(q, len(at), m), 0, -1)
-    gains = np.zeros((periods, periods, m, q))
-    gains[at, earlier] = own * problem.control_bounds[:, None]
+def _controls_of(
+    problem: ReachabilityProblem, variables: Floats, components: int
+) -> tuple[Floats, Floats]:
+    """Return the nominal controls and the gains of a solution, in units of the problem."""
+    periods, _, m = problem.control.shape
+    pairs = _gain_pairs(periods)
+    count = len(pairs.control_times)
+    nominal, of_pairs, _ = np.split(variables, np.cumsum([periods * m, components * count * m]))
 
-    # The effect of w(s) at t, directly and through the controls.
-    total = np.zeros((periods + 1, periods, n, q))
-    for t in range(periods):
-        total[t + 1] = problem.transition[t] @ total[t] + problem.control[t] @ gains[t]
-        total[t + 1, t] += disturbance[t]
-
-    centre = problem.run(nominal)
-    spread = np.abs(total).sum(axis=(1, 3))
-    return FeedbackPlan(problem, disturbance, nominal, gains, centre - spread, centre + spread)
-
-
-def _all_constraints(problem: ReachabilityProblem) -> tuple[Floats, Floats, tuple[str, ...]]:
-    """Constraints with the bounds on states, which come first."""
-    unit = np.eye(problem.states)
-    normals, offsets = problem.further
-    names = [f"the bound on {problem.state_name(i)}" for i in range(problem.states)] * 2
-    names += [problem.name_of(k) for k in range(len(normals))]
-    bounds = np.tile(np.concatenate([problem.state_bounds] * 2), (problem.periods + 1, 1))
-    return np.vstack([unit, -unit, normals]), np.hstack([bounds, offsets]), tuple(names)
-
-
-def _pairs(problem: ReachabilityProblem) -> tuple[Places, Places]:
-    """Return the times t and s < t of all gains."""
-    return np.tril_indices(problem.periods, -1)
-
-
-class _Program(NamedTuple):
-    """Minimise cost x with matrix x <= limits."""
-
-    cost: Floats
-    matrix: csr_array
-    limits: Floats
-
-
-class _Responses(NamedTuple):
-    """Derivatives of the states by the variables of the program.
-
-    Parameters
-    ----------
-    nominal : ndarray, shape (T + 1, n, T m)
-        By the nominal controls.
-    gains : ndarray, shape (T + 1, T, n, pairs m)
-        For each w(s), by the gains of one component.
-    """
-
-    nominal: Floats
-    gains: Floats
-
-
-class _Constraints(NamedTuple):
-    """Constraints of states after t = 0, divided by their sizes.
-
-    Parameters
-    ----------
-    rows : ndarray, shape (kinds, n)
-        Normals.
-    ends : ndarray, shape (T + 1, kinds)
-        Offsets.
-    times, kinds : ndarray of int
-        Time and kind of each constraint whose offset is finite.
-    """
-
-    rows: Floats
-    ends: Floats
-    times: Places
-    kinds: Places
-
-
-class _Effects(NamedTuple):
-    """Effects of the single w(s) on the constraints: their moduli are variables of the program.
-
-    Parameters
-    ----------
-    sums : ndarray of bool, shape (constraints, effects)
-        Which effects a constraint sums.
-    by_gains : ndarray, shape (effects, pairs m)
-        Derivatives of an effect by the gains of one component.
-    fixed : ndarray, shape (effects, q)
-        Effects without feedback.
-    """
-
-    sums: Flags
-    by_gains: Floats
-    fixed: Floats
-
-
-def _program(problem: ReachabilityProblem, effect: Floats) -> _Program:
-    """Return the linear program of a plan.
-
-    Its variables are the nominal controls; the gains of all (t, s), by component of w; absolute
-    values of the effect of each w(s) on each constraint, and of each gain, by component; and the
-    maximum terminal states. Controls are divided by their bounds, and constraints by their sizes.
-    """
-    periods, n, m = problem.control.shape
-    q = effect.shape[3]
-    responses = _responses(problem)
-    constraints = _constraints(problem)
-    effects = _effects(responses, effect, constraints)
-    times = constraints.times
-    kinds = constraints.kinds
-
-    normals = constraints.rows[kinds]
-    nominal = np.einsum("cn,cnu->cu", normals, responses.nominal[times])
-    uncontrolled = problem.run(np.zeros((periods, m)))[times]
-    coasting = np.einsum("cn,cn->c", normals, uncontrolled)
-
-    # Sums of absolute values: of the effects on each constraint, and of the gains of each control.
-    at, _ = _pairs(problem)
-    of_controls = np.kron(at == np.arange(periods)[:, None], np.eye(m))
-    spread = np.kron(np.ones(q), block_diag(effects.sums, of_controls))
-    spread_states = spread[: len(times)]
-    spread_controls = spread[len(times) :]
-    of_gains = np.eye(len(at) * m)
-    inner = kron(np.eye(q), csr_array(np.vstack([effects.by_gains, of_gains])))
-    constant = np.vstack([effects.fixed, np.zeros((len(at) * m, q))]).T.ravel()
-
-    last = (times == periods) & (kinds < 2 * n)
-    unit = np.eye(periods * m)
-    ones = np.ones(periods * m)
-    matrix = block_array(
-        [
-            [nominal, None, spread_states, None],
-            [unit, None, spread_controls, None],
-            [-unit, None, spread_controls, None],
-            [nominal[last], None, spread_states[last], -np.tile(np.eye(n), (2, 1))],
-            [None, inner, -eye_array(len(constant)), None],
-            [None, -inner, -eye_array(len(constant)), None],
-        ],
-        format="csr",
-    )
-    ends = constraints.ends[times, kinds]
-    limits = np.concatenate([ends - coasting, ones, ones, -coasting[last], -constant, constant])
-    controls = periods * m + inner.shape[1]
-    cost = np.repeat([0.0, _GAIN_COST, 1.0], [controls, len(constant), n])
-    return _Program(cost, matrix, limits)
-
-
-def _responses(problem: ReachabilityProblem) -> _Responses:
-    periods, n, m = problem.control.shape
-    at, earlier = _pairs(problem)
-    nominal = np.zeros((periods + 1, n, periods * m))
-    gains = np.zeros((periods + 1, periods, n, len(at) * m))
-    for t in range(periods):
-        push = problem.control[t] * problem.control_bounds
-        nominal[t + 1] = problem.transition[t] @ nominal[t]
-        nominal[t + 1, :, t * m : (t + 1) * m] += push
-        gains[t + 1] = problem.transition[t] @ gains[t]
-        for pair in np.flatnonzero(at == t):
-            gains[t + 1, earlier[pair], :, pair * m : (pair + 1) * m] += push
-    return _Responses(nominal, gains)
-
-
-def _constraints(problem: ReachabilityProblem) -> _Constraints:
-    normals, offsets, _ = _all_constraints(problem)
-    sizes = np.abs(normals) @ problem.state_bounds
-    ends = offsets / sizes
-    is_later = (np.arange(problem.periods + 1) > 0)[:, None]
-    times, kinds = np.nonzero(np.isfinite(ends) & is_later)
-    return _Constraints(normals / sizes[:, None], ends, times, kinds)
-
-
-def _effects(responses: _Responses, effect: Floats, constraints: _Constraints) -> _Effects:
-    """Return the effects that are not always zero."""
-    # Both bounds on a state have the same absolute values: the second one stands for both.
-    n = effect.shape[2]
-    rows = constraints.rows[n:]
-    by_gains = np.einsum("kn,tsn...->tks...", rows, responses.gains)
-    fixed = np.einsum("kn,tsn...->tks...", rows, effect)
-    is_limited = np.isfinite(constraints.ends[:, n:, None])
-    kept = (by_gains.any(axis=-1) | fixed.any(axis=-1)) & is_limited
-
-    at_time, of_kind, _ = np.nonzero(kept)
-    kinds = np.where(constraints.kinds < n, constraints.kinds, constraints.kinds - n)
-    is_at_time = at_time == constraints.times[:, None]
-    return _Effects(is_at_time & (of_kind == kinds[:, None]), by_gains[kept], fixed[kept])
+    gains = np.zeros((periods, periods, m, components))
+    by_pair = np.moveaxis(of_pairs.reshape(components, count, m), 0, -1)
+    gains[pairs] = by_pair * problem.control_bounds[:, None]
+    return nominal.reshape(periods, m) * problem.control_bounds, gains

@@ -105,6 +105,7 @@ def minimum_peak(optimal: OptimalControls) -> Floats:
     scale = optimal.scale
     if not space.size:
         return optimal.at(np.zeros(0))
+
     bound, point = min_peak(space, scale, optimal.problem.controls)
     if space.ball:
         return optimal.at(point)
@@ -208,6 +209,7 @@ def _barrier(space: Lifted, point: Floats) -> _Barrier:
     if float(slack.min(initial=np.inf)) <= 0.0:
         return outside
     value = -float(np.log(slack).sum())
+
     rows = space.rows / slack[:, None]
     if not space.ball:
         return _Barrier(value, rows, np.ones(len(rows)))
@@ -245,6 +247,7 @@ def vertices(optimal: OptimalControls, most: int = MAX_VERTICES) -> Floats:
     for part in optimal.blocks:
         is_unique = part.optimal.size == 0
         corners.append(np.zeros((1, 0)) if is_unique else optimal_polytope(part).vertices)
+
     count = int(np.prod([len(block) for block in corners]))
     if count > most:
         raise TooManyVerticesError(

@@ -109,6 +109,7 @@ class ReachableSets:
             scaled = part.projection(kind, time, rows, tolerance)
             points.append(scaled * block.scale[places])
             order += [states[place] for place in places]
+
         return combined(points)[:, [order.index(axis) for axis in axes]]
 
 
@@ -227,6 +228,7 @@ def optimal_polytope(optimum: BlockOptimum) -> Polytope:
             f"the optimal controls of a block span {optimal.size} dimensions, more than the limit "
             f"of {_MAX_DIMENSIONS} for vertices"
         )
+
     try:
         return Polytope.from_constraints(optimal.rows, optimal.limits).needed().bounded()
     except EmptyPolytopeError as error:  # the centre is inside

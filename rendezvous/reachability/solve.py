@@ -102,6 +102,7 @@ class OptimalControls:
         best = np.zeros(self.problem.states)
         for part in self.blocks:
             best[part.block.states] = part.terminal * part.block.scale
+
         last = self.problem.run(thrust)[..., -1, :]
         away = (np.abs(last - best) / self.problem.state_bounds).max(axis=-1)
         return np.asarray(np.maximum(self.problem.excess(thrust), away))
@@ -117,9 +118,11 @@ class OptimalControls:
             lifted = optimal_set(part)
             costs = np.vstack([-lifted.control_response, lifted.control_response])
             moving = np.abs(costs).max(axis=1, initial=0.0) > _STILL
+
             points = Maximiser(lifted).maximise_all(costs[moving])
             best = np.zeros(len(costs))
             best[moving] = np.einsum("kp,kp->k", costs[moving], points)
+
             down, up = np.split(best, 2)
             ends = np.stack([lifted.control_free - down, lifted.control_free + up], axis=-1)
             result[:, part.block.controls] = ends.reshape(periods, -1, 2)
@@ -159,6 +162,7 @@ def solve(problem: ReachabilityProblem) -> Solution:
     """
     optimal = optimal_controls(problem)
     lifted = tuple(LiftedSets(optimum) for optimum in optimal.blocks)
+
     reason = _refusal(problem)
     if not reason:
         try:

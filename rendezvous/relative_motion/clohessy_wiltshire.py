@@ -19,6 +19,7 @@ QUADRATURE_BELOW_RAD = 2.0
 """Angle below which Gramians are computed by Gauss and Legendre's rule: the closed forms cancel
 below, and the rule of 12 nodes is exact to rounding. Tests compare both sides with 50 digits."""
 NODES, WEIGHTS = (rule.astype(np.float64) for rule in np.polynomial.legendre.leggauss(12))
+"""Gauss and Legendre's rule of a Gramian up to two radians, on [-1, 1]."""
 
 
 @dataclass(frozen=True)

@@ -127,6 +127,7 @@ def eccentric_of_mean(mean_rad: ArrayLike, eccentricity: ArrayLike) -> Floats:
     """
     mean = np.asarray(mean_rad, dtype=np.float64)
     e = np.asarray(eccentricity, dtype=np.float64)
+
     turns = 2.0 * np.pi * np.round(mean / (2.0 * np.pi))
     sign = np.where(mean < turns, -1.0, 1.0)
     rest = np.abs(mean - turns)

@@ -91,6 +91,7 @@ class TimeVaryingMotion(HeldMotion):
             times = starts[:, None] + (ends - starts)[:, None] * nodes
             radians = _rates(self.dynamics(times)).max(axis=1) * (ends - starts)
             long = (radians > 1.0) & (ends > starts)
+
             settled.append(ends[~long])
             middles = 0.5 * (starts[long] + ends[long])
             starts = np.concatenate([starts[long], middles])
@@ -134,6 +135,7 @@ def _first_panels(dynamics: OfTime, starts: Floats, ends: Floats) -> int:
     """One panel for each radian of the fastest motion at the ends and the middle."""
     if not len(starts):
         return 1
+
     durations = (ends - starts)[:, None]
     places = ends[:, None] - durations * np.array([0.0, 0.5, 1.0])
     radians = float((_rates(dynamics(places)) * np.abs(durations)).max())
@@ -154,6 +156,7 @@ def _rates(matrices: Floats) -> Floats:
 def _gauss_collocation() -> tuple[Floats, Floats, Floats]:
     """Nodes and weights on [0, 1], and integrals of Lagrange polynomials from 0 to each node."""
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
+
     values = np.polynomial.legendre.legvander(nodes, NODES - 1)
     integrals = np.polynomial.legendre.legval(
         nodes, np.polynomial.legendre.legint(np.eye(NODES), lbnd=-1.0)

@@ -121,6 +121,7 @@ class TschaunerHempel(HeldMotion):
         first, last = (
             float(anomaly) for anomaly in self.orbit.eccentric_anomaly(np.array([start_s, end_s]))
         )
+
         times = self.orbit.time_of_eccentric(
             even_breaks(first, last, (last - first) / self._panel_rad)
         )

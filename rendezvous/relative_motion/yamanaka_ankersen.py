@@ -188,8 +188,10 @@ def leg_between(
         ellipse.root * math.sin(0.5 * passed_rad) / math.sqrt(start.distance * end.distance)
     )
     half_turn_cosine = start.half_cosine * end.half_cosine + start.half_sine * end.half_sine
+
     middle_sine = start.half_sine * end.half_cosine + start.half_cosine * end.half_sine
     middle_cosine = start.half_cosine * end.half_cosine - start.half_sine * end.half_sine
+
     return Leg(
         sine=2.0 * start.half_sine * start.half_cosine,
         cosine=start.half_cosine * start.half_cosine - start.half_sine * start.half_sine,
@@ -268,6 +270,7 @@ def fill_normal(ellipse: Ellipse, leg: Leg, z: float, z_rate: float, column: Flo
     """
     z_end = z * leg.turn_cosine + z_rate * leg.turn_sine
     z_rate_end = z_rate * leg.turn_cosine - z * leg.turn_sine
+
     rho_end = leg.rho + ellipse.eccentricity * leg.cosine_change
     fill_axis(ellipse, leg.sine + leg.sine_change, rho_end, z_end, z_rate_end, column[2::3])
 

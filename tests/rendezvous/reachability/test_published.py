@@ -53,7 +53,7 @@ def exact(paper: Paper) -> Solution:
     return solve(paper())
 
 
-def test_matrices_are_the_identified_ones(paper: Paper) -> None:
+def test_matrices_agree_with_the_identified_matrices(paper: Paper) -> None:
     problem = paper()
     # Rows and columns in the paper's axes.
     a, b = (

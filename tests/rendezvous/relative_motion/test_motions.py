@@ -108,7 +108,7 @@ def test_matrices_satisfy_their_differential_equations(name: str, duration: floa
         )
 
 
-def test_gramian_agrees_with_the_published_one() -> None:
+def test_gramian_agrees_with_the_published_gramian() -> None:
     found = in_paper_axes(ClohessyWiltshire(0.001176).gramian(0.0, 30.0))[:, INTERLEAVED][
         INTERLEAVED
     ]
