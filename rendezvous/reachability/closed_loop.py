@@ -134,4 +134,4 @@ def _relaxation_for_start(
     normals, offsets = problem.further
     beyond_bounds = float((np.abs(estimated) / problem.state_bounds).max()) - 1.0
     excess = (normals @ estimated - offsets[start]) / _sizes(problem)
-    return float(min(missing, max(beyond_bounds, excess.max(initial=-np.inf))))
+    return float(min(missing, max(beyond_bounds, float(excess.max(initial=-np.inf)))))
