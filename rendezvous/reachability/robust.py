@@ -1,4 +1,8 @@
-"""Bounded disturbances: tightened constraints, and plans with feedback from past disturbances."""
+"""Bounded disturbances: tightened constraints, and plans with disturbance feedback.
+
+A disturbance acts as x(t + 1) = A(t) x(t) + B(t) u(t) + D(t) w(t) with |w_k(t)| <= 1; arguments
+named `disturbance` are the matrices D, of shape (T, n, q), in the units of the states.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +36,7 @@ class NoRobustPlanError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class FeedbackPlan:
-    """Controls u(t) = nominal(t) + sum over s < t of gains[t, s] w(s), with disturbances w.
+    """Controls u(t) = nominal(t) + sum over s < t of gains[t, s] w(s), under a disturbance.
 
     Parameters
     ----------
@@ -62,8 +66,8 @@ class FeedbackPlan:
 def accumulated(problem: ReachabilityProblem, disturbance: Floats) -> Floats:
     """Return the effect of each w(s) on each x(t), without feedback, shape (T + 1, T, n, q).
 
-    The effect of w(s) at t is A(t - 1) ... A(s + 1) disturbance[s], zero for s >= t. Raise
-    `ValueError` if the problem has constraints within periods.
+    The effect is A(t - 1) ... A(s + 1) disturbance[s], and zero for s >= t. Raise `ValueError` if
+    the problem has constraints within periods.
     """
     if problem.between is not None:
         raise ValueError("disturbances need constraints at whole periods only")
@@ -77,12 +81,12 @@ def accumulated(problem: ReachabilityProblem, disturbance: Floats) -> Floats:
 
 
 def tightened(problem: ReachabilityProblem, disturbance: Floats) -> ReachabilityProblem:
-    """Return the problem whose controls keep the constraints under every disturbance.
+    """Return a problem whose controls satisfy the constraints of `problem` for all disturbances.
 
-    The controls are without feedback. The problem has constraints at whole periods only. x(t + 1) =
-    A x + B u + disturbance[t] w(t), |w_k(t)| <= 1, with a `disturbance` of shape (T, n, q); states
-    of the new problem are states without disturbance. Each constraint is tightened by the support
-    of the accumulated disturbance along its normal, which is exact.
+    The controls do not react to the `disturbance`, of shape (T, n, q). Its matrices act as x(t + 1)
+    = A x + B u + disturbance[t] w(t), |w_k(t)| <= 1. Constraints must apply at whole periods only.
+    The states of the new problem are the states without disturbance. Each constraint is tightened
+    by the support of the accumulated disturbance along its normal, which is exact.
     """
     effect = accumulated(problem, disturbance)
     constraints = _all_constraints(problem)
