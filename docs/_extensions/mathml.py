@@ -22,7 +22,8 @@ _LEFT_BAR = re.compile(r"(?<!\\left)\\lvert\b")
 _RIGHT_BAR = re.compile(r"(?<!\\right)\\rvert\b")
 # docutils puts the index of an accented symbol under it: <munderover> base index accent.
 _ACCENT_AND_INDEX = re.compile(
-    r"<munderover>\s*(<mi>[^<]*</mi>)\s*(<m[in]>[^<]*</m[in]>)\s*(<mo stretchy=\"false\">[^<]*</mo>)\s*</munderover>"
+    r"<munderover>\s*(<mi>[^<]*</mi>)\s*(<m[in]>[^<]*</m[in]>)\s*"
+    r"(<mo stretchy=\"false\">[^<]*</mo>)\s*</munderover>"
 )
 _log = logging.getLogger(__name__)
 

@@ -23,6 +23,7 @@ from infoset.geometry.polygon import (
     copy,
     following,
     move,
+    preceding,
     put,
     vertex,
 )
@@ -356,7 +357,7 @@ def reflex_vertex(points: Points, count: int) -> int:
     area = 0.0
     is_flat = True
     for j in range(count):
-        a = vertex(points, j - 1)
+        a = vertex(points, preceding(j, count))
         b = vertex(points, j)
         c = vertex(points, following(j, count))
         area += orientation(vertex(points, 0), b, c)
@@ -368,7 +369,7 @@ def reflex_vertex(points: Points, count: int) -> int:
     peaks = 0
     second_peak = -1
     for j in range(count):
-        a = vertex(points, j - 1)
+        a = vertex(points, preceding(j, count))
         b = vertex(points, j)
         c = vertex(points, following(j, count))
         turn = side(a, b, c) * sense

@@ -377,7 +377,7 @@ class LinearObserver:
     (array([0.4 , 0.35]), array([0.6 , 0.65]))
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913  # the parts of a linear system
         self,
         state_matrix: ArrayLike,
         output_matrix: ArrayLike,

@@ -98,7 +98,8 @@ def test_hover_shows_the_records_numbers(
     opened.point_at(
         "columns[0].plane",
         "(({ plane, truth, limits: { rateUnit, angleUnit } }) =>"
-        " [plane.across(truth.rate * rateUnit[1]), plane.up(truth.angle * angleUnit[1])])(columns[0])",
+        " [plane.across(truth.rate * rateUnit[1]), plane.up(truth.angle * angleUnit[1])])"
+        "(columns[0])",
     )
     rate, angle, range_km = numbers(opened.tip())
     assert "µrad/s" in opened.tip()

@@ -109,9 +109,7 @@ def test_script_that_ends_before_the_flight_is_refused() -> None:
         ScriptedNoise({"angle": np.zeros((1, 1, 3))}).measure(sight(0.0, 3e6, step=3), looked_at())
 
 
-def test_switching_noise_is_the_game_where_both_extremes_are_equally_bad_and_keeps_its_order_elsewhere() -> (
-    None
-):
+def test_switching_noise_is_the_game_where_both_extremes_are_equally_bad() -> None:
     information = InformationSet(MODEL, 1)
     seen = sight(0.0, 5801.3e3, ranging=False, rating=False)
 

@@ -201,6 +201,8 @@ STAR = [(math.cos(turn), math.sin(turn)) for turn in 0.8 * math.pi * np.arange(5
         ([(0, 0), (0.5, 2.0**-60), (1, 0), (0.5, 1)], 1),
         ([(0, 0), (1, 1), (1, 0), (0, 1)], 0),
         (STAR, 3),
+        # a closed ring, whose first vertex is the one that is not convex
+        ([(0.5, 0.2), (1, 0), (1, 1), (0, 1), (0, 0), (0.5, 0.2)], 0),
     ],
 )
 def test_ring_is_refused_if_it_is_not_convex_and_the_constructor_takes_its_hull(

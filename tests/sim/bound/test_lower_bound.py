@@ -439,9 +439,9 @@ def test_bound_of_two_measurements_in_space_equals_its_formula() -> None:
     """As in the plane, with V_z within 2 m/s and V_y within 1 m/s, both measurements the same and
     no impulse left.
 
-    |dv_y| <= 2 m/s: dy(2) = dy(1) + dv_y is at most 2 + 2 = 4 m, with dy(0) = 0; dz(2) is at most 6 m. One of the two
-    is half of |(4, 6)| m from the target at x = 0. The velocity across x is at most |(1, 2)| m/s,
-    and 1.5 m/s by impulses.
+    |dv_y| <= 2 m/s: dy(2) = dy(1) + dv_y is at most 2 + 2 = 4 m, with dy(0) = 0; dz(2) is at most
+    6 m. One of the two is half of |(4, 6)| m from the target at x = 0. The velocity across x is at
+    most |(1, 2)| m/s, and 1.5 m/s by impulses.
     """
     scenario = in_space(toy(vz_m_s=2.0))
     bounds = replace(scenario.set_model.bounds, vy_m_s=(-1.0, 1.0))
