@@ -44,7 +44,7 @@ def step_of(
     """
 
     @allocation_free
-    def step(  # noqa: PLR0913, RUF100 - state, slopes and result in two parts each
+    def step(  # noqa: PLR0913 - state, slopes and result in two parts each
         t: float,
         h: float,
         first: int,
