@@ -81,6 +81,7 @@ class SetState:
         self.model = model
         self.laws = section_laws(model)
         self.table = law_table(self.laws)
+
         minimum, maximum = model.label_limits_m
         # A new grid has one label more than twice the fewest sections.
         self._grid = 2 * model.fewest_sections + 1
@@ -91,6 +92,7 @@ class SetState:
             labels[:, 0] = 0.5 * (minimum + maximum)
         used = np.full(batch, model.sections)
         self.sections = section_passes.room_for_sections(len(self.laws), labels, used)
+
         self.history = History(len(self.laws), batch)
         self.lower_label = np.full(batch, minimum)
         self.upper_label = np.full(batch, maximum)
@@ -186,6 +188,7 @@ class SetState:
         history = self.history
         event = history.record(RATE, omega, active, error)
         before = (self.lower_label.copy(), self.upper_label.copy())
+
         self._catch_up()
         self._make_room(active)
         points = chain_storage.working_room()
@@ -210,6 +213,7 @@ class SetState:
         nearer = self._min_cosine(alpha) if self.model.is_guaranteed else 1.0
         lower = measured * nearer / ((1.0 + relative_error) * (1.0 + eta)) + travelled - slack
         upper = measured / ((1.0 - relative_error) * (1.0 - eta)) + travelled + slack
+
         before = (self.lower_label.copy(), self.upper_label.copy())
         self.lower_label[active] = np.maximum(self.lower_label, lower)[active]
         self.upper_label[active] = np.minimum(self.upper_label, upper)[active]
@@ -302,6 +306,7 @@ class SetState:
         if event is not None:
             was_feasible |= slots["emptied_at"] == event
         slots["feasible"][empty] = (is_used & was_feasible)[empty]
+
         self.lower_label[empty] = lower[empty]
         self.upper_label[empty] = upper[empty]
         self.status[empty] = SetStatus.TRACKING.value
@@ -328,6 +333,7 @@ class SetState:
         active = self.computes_phi & where & impulse.any(axis=0)
         if not some(active):
             return
+
         self.history.record(IMPULSE, impulse, active)
         self._catch_up()
         section_passes.shift_all(active, impulse, self.elapsed, self.sections, self.table)
@@ -346,6 +352,7 @@ class SetState:
             # A label between the stored ones may pass the threshold. The status must not depend on
             # whether Phi is computed.
             self.some_left |= active & (self.lower_label < min_label)
+
         np.maximum(self.lower_label, min_label, out=self.lower_label, where=computes_phi)
         if self.min_label >= min_label:
             return np.zeros(self.labels.shape, dtype=bool)
