@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from infoset._compile import TRUE, ZERO, allocation_free, entry
+from infoset._compile import TRUE, ZERO, allocation_free, entry, pasted
 from infoset.arrays import Flags, Floats, Integers
 from infoset.engine import chains
 from infoset.engine.history import EventLog, History
@@ -72,7 +72,7 @@ class Leaving(NamedTuple):
     elapsed: Integers
 
 
-@allocation_free
+@pasted
 def list_leaving(leaving: Leaving, b: int, past: Past, pieces: Records) -> int:
     """Write the labels of an engagement that leave in each step as one piece, whose bound is
     infinite; return the number of pieces.
@@ -105,7 +105,7 @@ def worst_of(pieces: Records, count: int) -> int:
     return worst
 
 
-@allocation_free
+@pasted
 def divide(
     i: int,
     b: int,

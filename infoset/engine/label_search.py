@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from infoset._compile import allocation_free, constants
+from infoset._compile import allocation_free, constants, pasted
 from infoset.engine.concave_bounds import is_infeasible_between
 from infoset.engine.replays import Emptying, empties_later, evaluate_label, run
 from infoset.engine.section_life import NEVER_EMPTIED
@@ -119,7 +119,7 @@ def locate_end(
     return infeasible, feasible
 
 
-@allocation_free
+@pasted
 def narrow_ends(lower: float, upper: float, resolution: float, past: Past) -> FeasibleLabels:
     """Locate both ends of the feasible labels; their sections are in the rows `LOWER` and `UPPER`
     of the workspace afterwards.

@@ -90,7 +90,7 @@ def list_known_labels(
     return KnownLabels(last, highest > 0, lowest, highest)
 
 
-@allocation_free
+@pasted
 def check_limits(labels: KnownLabels, past: Past) -> KnownLabels:
     """Replay the limits of the search where no infeasible label separates them from the feasible
     ones.
@@ -128,7 +128,7 @@ def bracket_latest(last: int, past: Past) -> None:
     bracket[LAST] = known[min(best + 1, last)]
 
 
-@allocation_free
+@pasted
 def bracket_found(label: float, last: int, past: Past) -> None:
     """Write the bracket of a feasible label between known labels: this label and its neighbours.
 
@@ -196,7 +196,7 @@ def is_convex(laws: Laws) -> bool:
     return True
 
 
-@allocation_free
+@pasted
 def fill_slot(
     b: int, s: int, number: int, labels: FeasibleLabels, sections: Sections, past: Past
 ) -> int:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from infoset._compile import allocation_free, entry
+from infoset._compile import allocation_free, entry, pasted
 from infoset.arrays import Floats, Integers
 from infoset.engine import chains
 from infoset.engine.history import ANGLE, PREDICTION, History
@@ -55,7 +55,7 @@ class Emptying(NamedTuple):
     emptied_axis: int
 
 
-@allocation_free
+@pasted
 def replay_angles(
     done: Replayed, label: float, until: int, past: Past, law: SectionLaw
 ) -> tuple[int, Replayed]:
