@@ -186,7 +186,7 @@ class ConeProgram:
         violation, gap = self.violation_and_gap(point, multipliers, cost)
         if violation <= max_violation and gap > max_gap:
             balanced = self._balanced(point, multipliers, cost)
-            gap = self.violation_and_gap(point, balanced, cost).gap
+            _, gap = self.violation_and_gap(point, balanced, cost)
         if not (violation <= max_violation and gap <= max_gap):
             raise NoSolutionError(
                 f"a convex program was not solved to {max_gap:g}: relative gap {gap:.2g}, "

@@ -48,7 +48,10 @@ class EllipticOrbit:
         gravitational_parameter_m3_s2: float,
         true_anomaly_rad: float = 0.0,
     ) -> EllipticOrbit:
-        """Return the orbit of a semi-major axis, with its true anomaly at t = 0."""
+        """Return the orbit of a semi-major axis and an `eccentricity` in [0, 1).
+
+        The true anomaly is that at t = 0.
+        """
         rate = float(np.sqrt(gravitational_parameter_m3_s2 / semi_major_axis_m**3))
         return cls(rate, eccentricity, true_anomaly_rad)
 
