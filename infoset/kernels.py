@@ -253,7 +253,7 @@ class CompileNotice(event.Listener):
         else:
             how = f"once; later runs load the machine code from {folder.parent}"
         LOGGER.warning(
-            "compiling the numerical kernels%s (up to about 25 s), %s", self._of_what(), how
+            "compiling the numerical kernels%s (up to a minute), %s", self._of_what(), how
         )
 
     def _of_what(self) -> str:
