@@ -227,7 +227,7 @@ def _draw_cloud(axes: Axes, name: str, runs: pd.DataFrame, colour: str) -> None:
 
 
 def _note_beyond(axes: Axes, count: int) -> None:
-    """Write the number of runs above the axis, if there are any."""
+    """Write in the upper right corner of a panel how many runs are above its axis, if any are."""
     if not count:
         return
     place: dict[str, Any] = {
@@ -236,7 +236,9 @@ def _note_beyond(axes: Axes, count: int) -> None:
         "va": "top",
         "path_effects": HALO,
     }
-    axes.annotate(f"{count} runs above", (0.97, 0.97), fontsize="small", **place)
+    text = "1 run above" if count == 1 else f"{count} runs above"
+    # Clear of the frame; chosen.
+    axes.annotate(text, (0.97, 0.97), fontsize="small", **place)
 
 
 def _draw_bins(axes: Axes, start: Floats, miss_m: Floats) -> None:
