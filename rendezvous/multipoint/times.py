@@ -38,7 +38,7 @@ _SETTLED = 1e-3
 _WELL_SETTLED = 1e-6
 """Residual of a minimum below which no further descent is made."""
 _OBJECTIVE_ROUNDING = 1e-26
-"""Square of the rounding error of states, times some hundred: an objective that is zero."""
+"""Square of a relative error of states of 1e-13, some 450 roundings: its cost counts as zero."""
 _MIN = float(np.finfo(float).tiny)
 """Smallest divisor."""
 _CLOCK = 1e-9
@@ -311,14 +311,15 @@ def _polished(trials: _Trials, best: _Trial, tolerance: float, enough: float) ->
 def _unsettled(trials: _Trials, best: _Trial) -> float:
     """Return the residual of the conditions of a minimum, relative to the objective.
 
-    To first order, the share of the objective by which a change of one gap by its length, or down
-    to the minimum gap, would lower it, as far as the limits let it change; at the latest time, at
-    the cost of the other gaps.
+    It is the greatest share of the objective, to first order, that the change of one gap saves:
+    lengthening it by its own length or as far as the limits allow, or shortening it to the minimum
+    gap. `slope` is the derivative of the objective by the gaps. If no time is left (`full`), a
+    longer gap takes its time from the others, in proportion to their excess over the minimum gap.
     """
     gaps = best.gaps
     excess = np.maximum(best.gaps - trials.minimum, 0.0)
     slope = best.slope
-    full = bool(np.isfinite(trials.total)) and trials.total - gaps.sum() <= 1e-9 * trials.total
+    full = bool(np.isfinite(trials.total)) and trials.total - gaps.sum() <= _CLOCK * trials.total
     if full and excess.sum() > 0.0:
         slope = slope + max(0.0, -float(excess @ slope) / float(excess.sum()))
     farthest = max(trials.total - gaps.sum(), 0.0) + excess.sum()

@@ -50,15 +50,15 @@ class Craft:
 class Encounter:
     """Craft that meet at one time.
 
-    `free` lists the free components of the terminal state, at least one; for an intercept of the
-    position only. `fixed`, shape (6,), contains the values of the other components, m and m/s;
-    those of free components are ignored.
+    `free` lists the free components of the terminal state, at least one, each once; in an
+    intercept, components of the position only. `fixed`, shape (6,), contains the values of the
+    other components, m and m/s; those of free components are ignored.
 
     Raises
     ------
     ValueError
-        If there is no free component, all weights are zero, a craft starts at the meeting or later,
-        or names repeat.
+        If there is no free component, a component repeats, a velocity is free in an intercept, all
+        weights are zero, a craft starts at the meeting or later, or names repeat.
     """
 
     craft: tuple[Craft, ...]
@@ -72,9 +72,7 @@ class Encounter:
             raise ValueError("two craft have the same name")
         if not self.free or len(set(self.free)) < len(self.free):
             raise ValueError("name one or more free components of x, y, z, vx, vy, vz, each once")
-        if self.meeting is Meeting.INTERCEPT and any(
-            component.value >= 3 for component in self.free
-        ):
+        if any(component.value >= self.common for component in self.free):
             raise ValueError(
                 "the velocities of the craft differ in an intercept; free only x, y and z"
             )

@@ -30,6 +30,8 @@ _PRESSED = 1e-7
 """Pressure on the bound of a thrust in a ball, relative to the largest multiplier, above which the
 thrust is the same in every optimal control: the error of multipliers in a program with cones
 (`CONE_TOLERANCE`)."""
+_MIN_PRESSURE = 1e-300
+"""Pressure up to which a bound holds nothing, also if all multipliers are zero."""
 _CLOSE = 1e-12
 """Relative gap between the norm and its lower bound at which the search stops: the maximum gap of a
 small norm (`_ABSOLUTE`)."""
@@ -132,10 +134,11 @@ def block_optimum(block: StateBlock, *, relative: bool = False) -> BlockOptimum:
 
 
 def _same_for_all(lifted: Lifted, minimum: MinimumNorm) -> Floats:
-    """Rows of the linear functions of v that have one value for all optimal controls.
+    """Return rows a, shape (k, p), of functions a . v with one value for all optimal controls.
 
-    They are the constraints with positive multipliers, and for thrust in a ball the thrusts that a
-    bound presses on: on the sphere such a thrust is unique.
+    v are the variables of `lifted`. The functions are the constraints whose multiplier exceeds both
+    their gap, which decides which of the two is zero, and `_ACTIVE`; and the components of thrusts
+    in a ball that their bound holds (`_PRESSED`): on the sphere such a thrust is unique.
     """
     gaps = lifted.limits - lifted.rows @ minimum.point
     largest = max(
@@ -146,7 +149,7 @@ def _same_for_all(lifted: Lifted, minimum: MinimumNorm) -> Floats:
     fixed = np.zeros(len(lifted.control_free), dtype=bool)
     if lifted.ball:
         pressed = np.linalg.norm(minimum.pressures.reshape(-1, lifted.ball), axis=1)
-        fixed = np.repeat(pressed > max(_PRESSED * largest, 1e-300), lifted.ball)
+        fixed = np.repeat(pressed > max(_PRESSED * largest, _MIN_PRESSURE), lifted.ball)
     return np.vstack([lifted.rows[held], lifted.control_response[fixed]])
 
 
