@@ -18,7 +18,8 @@ _NEARLY_PARABOLIC = 1e-5
 """Binding below which the time to the perigee is computed as for a parabola, with a relative error
 of the same size."""
 _RADIAL = 1e-6
-"""Perigee, relative to the semi-major axis, up to which an orbit is a fall through the centre."""
+"""Perigee, relative to the semi-major axis, up to which an orbit is a fall through the centre.
+Chosen: far above the rounding of a perigee, some 1e-15, and far below the radius of a planet."""
 _STUMPFF_SERIES = np.array(
     [[(-1) ** k / math.factorial(order + 2 * k) for order in (2, 3)] for k in range(10)]
 )

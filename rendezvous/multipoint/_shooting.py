@@ -222,20 +222,24 @@ class Shot:
     unknowns: Floats
 
     def along(self, time_s: Floats) -> Floats:
-        """Return states and costates, SI, shape (k, 12), at times; at a node, after the jump."""
+        """Return states and costates, SI, shape (k, 12), at k times.
+
+        The times, s, do not decrease, and begin no earlier than the block. At a node but the last,
+        the costate is that after its jump.
+        """
         block = self.block
-        duration = self.block.units[1]
+        _, unit_s = block.units
         z = _initial(block, self.unknowns[:6])
         now = block.start_s
         node = 0
         values = np.empty((len(time_s), 12))
         for row, time in enumerate(time_s):
             while node < len(block.time_s) - 1 and block.time_s[node] <= time:
-                _advance(z, (block.time_s[node] - now) / duration)
+                _advance(z, (block.time_s[node] - now) / unit_s)
                 self._jump(z, node)
                 now = block.time_s[node]
                 node = node + 1
-            _advance(z, (time - now) / duration)
+            _advance(z, (time - now) / unit_s)
             now = time
             values[row] = z[:12, 0]
         return values * block.value_units

@@ -166,30 +166,32 @@ def _subtract_axial(
 def _rates(s: float, y: Floats, z: Floats, parameters: _Parameters, dy: Floats, dz: Floats) -> None:
     """Fill the rates, in time to go, of the state and of its variations.
 
-    r' = -v, v' = -(g + (T / m) u), p_r' = G p_v and p_v' = p_r, where G is the gradient of g and u
-    the direction of p_v. At the end of the game p_v is zero, and u is the direction of its rate,
-    p_r.
+    r' = -v, v' = -(g + (T / m) u), p_r' = G p_v and p_v' = p_r, where g is the acceleration of
+    gravity, G its gradient, u the direction of p_v and m the mass at the end + flow s. At the end
+    of the game p_v is zero, and u is the direction of its rate, p_r.
 
     The variations follow, with K the gradient of G p_v: dr' = -dv, dv' = -(G dr + (T / m) du),
     dp_r' = G dp_v + K dr, dp_v' = dp_r. The last column also changes the mass by one.
 
-    `parameters` are the craft (mu, oblateness, thrust, mass at the end, flow) and working arrays
-    for G and K, shape (3, 3).
+    All values are nondimensional, with shapes as in `flow_back`: y and dy (12,), z and dz (12, 9),
+    or (0, 9) without variations. `parameters` are the craft (mu, oblateness, thrust, mass at the
+    end, flow) and working arrays for G and K, shape (3, 3).
     """
     craft, gradient, gradient_change = parameters
     thrust = craft[2]
     mass = craft[3] + craft[4] * s
     push = thrust / mass
     with_variations = len(z) > 0
+    # The rows of v' hold g until the thrust is added.
     gravity = dy[V:P_R]
     derivatives(
         y[:V], y[P_V:], craft[0], craft[1], gravity, gradient, gradient_change, with_variations
     )
 
-    primer_row = P_V if s > 0.0 else P_R
-    x0 = y[primer_row]
-    x1 = y[primer_row + 1]
-    x2 = y[primer_row + 2]
+    u_row = P_V if s > 0.0 else P_R
+    x0 = y[u_row]
+    x1 = y[u_row + 1]
+    x2 = y[u_row + 2]
     inverse = 1.0 / np.sqrt(x0 * x0 + x1 * x1 + x2 * x2)
     u = (x0 * inverse, x1 * inverse, x2 * inverse)
     for i in range(3):
@@ -202,7 +204,7 @@ def _rates(s: float, y: Floats, z: Floats, parameters: _Parameters, dy: Floats, 
         dy[V + i] = -dy[V + i] - push * u[i]
 
     if with_variations:
-        _vary(z, primer_row, u, push * inverse, gradient, gradient_change, dz)
+        _vary(z, u_row, u, push * inverse, gradient, gradient_change, dz)
         # dv' of the mass: the derivative of -(T / m) u by m.
         fall = push / mass
         for i in range(3):
@@ -212,7 +214,7 @@ def _rates(s: float, y: Floats, z: Floats, parameters: _Parameters, dy: Floats, 
 @allocation_free
 def _vary(
     z: Floats,
-    primer_row: int,
+    u_row: int,
     u: _Vector,
     turn: float,
     gradient: Floats,
@@ -221,15 +223,15 @@ def _vary(
 ) -> None:
     """Fill the rates of the variations, see `_rates`, with the mass fixed.
 
-    The variation of u, a unit vector along the vector x in rows `primer_row` to `primer_row` + 2,
-    is du = (dx - (u . dx) u) / |x|, and `turn` is T / (m |x|).
+    The variation of u, a unit vector along the vector x in rows `u_row` to `u_row` + 2, is du = (dx
+    - (u . dx) u) / |x|, and `turn` is T / (m |x|).
     """
     g = _upper_triangle(gradient)
     k = _upper_triangle(gradient_change)
     for j in range(COLUMNS):
         dr = _vector_at(z, R, j)
         dp_v = _vector_at(z, P_V, j)
-        dx = _vector_at(z, primer_row, j)
+        dx = _vector_at(z, u_row, j)
         along = u[0] * dx[0] + u[1] * dx[1] + u[2] * dx[2]
 
         by_gravity = _product(g, dr)

@@ -365,7 +365,11 @@ def _forward_rates(time: float, y: Floats, craft: ExtremalCraft) -> Floats:
 
 
 def _gravity(r: Any, craft: ExtremalCraft) -> Any:
-    """Return the acceleration of gravity in its usual form, for a real or complex position."""
+    """Return the acceleration of gravity at r, shape (3,), in Cartesian form.
+
+    The formula is independent of `_extremal.derivatives`, and has no norm and no absolute value, so
+    that a complex position gives the derivative. `oblateness` is mu J2 R^2 / 2, about the z axis.
+    """
     q = (r * r).sum()
     cube = q * np.sqrt(q)
     if craft.oblateness == 0.0:

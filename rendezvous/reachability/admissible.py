@@ -198,7 +198,11 @@ def _lifted(
     equal: Floats,
     levels: Floats,
 ) -> Lifted:
-    """Add the bounds on controls, the first variables."""
+    """Return the set with the bounds on the controls, the first `width` of the p variables.
+
+    In a box the bounds |v_i| <= 1 are rows, which have no time and no label: -1. In a ball they
+    are no rows, and `ball` of the result stands for them.
+    """
     width = block.periods * len(block.controls)
     unit = np.eye(width, response.shape[2])
     if not block.ball:

@@ -215,9 +215,11 @@ class ReachabilityProblem:
         return np.asarray(worst)
 
     def _state_excess(self, states: Floats, times: Places) -> Floats:
-        """Maximum violation over the last two axes (time, state) by states at or after `times`.
+        """Return the maximum violation of a constraint by `states`, relative to the bounds.
 
-        Within the period from t to t + 1 the constraints of time t apply.
+        `states` have the shape (..., k, n), and the result (...); it is at most 0 if all hold.
+        State i obeys the constraints of time times[i], shape (k,); states between the times t and
+        t + 1 belong to time t.
         """
         worst = (np.abs(states) / self.state_bounds).max(axis=(-1, -2)) - 1.0
         normals, offsets = self.further
