@@ -527,12 +527,15 @@ def is_crowded(section: SectionView) -> bool:
 
 @allocation_free
 def reduce_outward(section: SectionView, tau: float, points: Floats) -> None:
-    """Enlarge a section by removing edges of the longer chain until it has `REDUCED` vertices.
+    """Enlarge a section to at most `REDUCED` vertices by removing edges of its longer chain.
 
     An edge is removed by extending its neighbours to their intersection; the edge that adds the
     minimum area is removed first. Vertices that are not convex because of rounding are removed
-    before. If no edge can be removed, three sides of a box around the chain replace it. `points`,
-    shape (3 CAPACITY + 4, 2), is a working array.
+    before. If no edge can be removed, three sides of a box around the chain replace it. The peak
+    of the chain is not known afterwards (`find_peak`).
+
+    `points` is a working array (`working_room`): its first CAPACITY + 2 rows hold the chain, and
+    the others, at least 2 CAPACITY, the tree of `drop_inner_edges`.
     """
     right, left, rings, _ = section
     in_right = right.end - right.begin

@@ -80,8 +80,8 @@ class Outlines(NamedTuple):
     counts : ndarray of int, shape (C, MAX_LABELS)
         Numbers of vertices.
     supports : ndarray, shape (4, MAX_LABELS)
-        Supports of the sections along one axis: maximum V, maximum -V, maximum and minus minimum of
-        the predicted miss. `write_supports` writes them.
+        Supports of the sections along one axis: maximum V, maximum -V, maximum and minus the
+        minimum of the predicted miss. `write_supports` writes them.
     """
 
     labels: Floats
@@ -215,11 +215,11 @@ def miss_at(outlines: Outlines, i: int, past: Past) -> float:
 
 @allocation_free
 def max_exact_miss(replayed: PieceLabels, reached: float, past: Past, outlines: Outlines) -> float:
-    """Return the maximum miss of the exact sections of replayed labels, m; with rates, the miss of
-    one of them.
+    """Return the maximum miss of the sections of the replayed feasible labels, m.
 
-    With rates, the sections of a window contain the sections of its labels. If they reach less than
-    `reached`, their maximum is returned, and no exact section is computed.
+    With rates (`past.errors`) these sections are those of the window, which are too large. If they
+    exceed `reached`, the label of their maximum is replayed alone: its sections overwrite those of
+    label 0 of `outlines`, and its miss is returned, or 0 if it is infeasible alone.
     """
     worst = ZERO
     miss = 0.0
@@ -360,7 +360,11 @@ def bound_pieces(
 
 @allocation_free
 def write_supports(channel: int, begin: int, end: int, tau: float, outlines: Outlines) -> None:
-    """Write the supports of labels `begin` to `end` along an axis, at time to go `tau`, s."""
+    """Write the supports of the labels from number `begin` to before `end` along one axis.
+
+    They replace those along the last axis. `channel` is the axis, and `tau` the time to go, s: the
+    predicted miss is z + V tau.
+    """
     supports = outlines.supports
     for k in range(begin, end):
         points = outlines.points[channel, k]

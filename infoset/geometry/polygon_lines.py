@@ -28,7 +28,8 @@ UNBOUNDED = -1
 LONGEST = 16
 """Maximum number of terms of a coefficient of a side of a difference.
 
-An offset is two products of sums of two numbers, and a product of two numbers has two terms.
+An offset is two products of sums of two numbers, and a product of two numbers has two terms: 16 in
+all.
 """
 DETERMINANT_ROUNDING = 1e-14
 """Share of the products in a determinant from which its sign is certain.
@@ -276,10 +277,12 @@ def write_box_rows(a: Points, b: Points, rows: Floats) -> None:
 
 
 @compiled
-def write_side_row(start: Point, end: Point, b: Points, row: Floats) -> int:
-    """Write the side from start to end, moved inward by the extent of b; return the rows written.
+def write_side_row(start: Point, end: Point, other: Points, row: Floats) -> int:
+    """Write a side, from start to end, moved inward by another polygon; return the rows written.
 
-    It is none for a side along an axis, which is a side of the bounding box, and for a point.
+    The side, of a counter-clockwise polygon, is moved by the support of `other`, and becomes a line
+    of shape (3, LONGEST); `row` must be zero. Return 1, or 0 for a point and for a side along an
+    axis, which the bounding box has: `row` is then zero again.
     """
     row[0, 0], row[0, 1] = two_sum(end.y, -start.y)
     row[1, 0], row[1, 1] = two_sum(start.x, -end.x)
@@ -287,7 +290,7 @@ def write_side_row(start: Point, end: Point, b: Points, row: Floats) -> int:
         row[:] = 0.0
         return 0
 
-    farthest = vertex(b, farthest_along(row, b))
+    farthest = vertex(other, farthest_along(row, other))
     from_x = np.empty(2)
     from_y = np.empty(2)
     from_x[0], from_x[1] = two_sum(start.x, -farthest.x)

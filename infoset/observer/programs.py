@@ -124,7 +124,10 @@ class _Table:
         self._column = list[Integers]()
 
     def add(self, block: Floats, first: int, *, below: bool = True) -> None:
-        """Add a block from a column on: new rows, or more columns of the last rows."""
+        """Write a block from column `first` on, in new rows below the others.
+
+        If not `below`, it is written in the last len(block) rows. Zeros are not stored.
+        """
         if below:
             self.rows += len(block)
         top = self.rows - len(block)

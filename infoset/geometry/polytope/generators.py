@@ -92,10 +92,12 @@ class Span:
 
     @cached_property
     def coefficients(self) -> Floats:
-        """Generators as combinations of the base, shape (m, d), in which no set is thin.
+        """Coordinates of the generators in the base, shape (m, d): result @ base = rows.
 
-        The residuals of two corrections have doubled digits, so that they are exact to rounding
-        also if the set is.
+        In them the basis spans a box from -1 to 1 along each axis, so that no zonotope is thin. One
+        solution and two corrections, whose residuals are computed in doubled digits, are exact to
+        rounding also if the given set is thin. The generators of the basis have coefficients of
+        exactly 0, 1 or -1.
         """
         space = len(self.own)
         equations = np.hstack([self.base.T, -np.eye(space)])
@@ -387,10 +389,11 @@ def _facets(generators: Floats) -> Faces | None:
 
 
 def _parallelograms(within: Flags, outside: Floats, first: Integers, second: Integers) -> _Part:
-    """Return the facets that are parallel to no more than the two generators of a pair.
+    """Return the facets that exactly two of the m generators span, one of each two opposite ones.
 
-    `within`, shape (p, m), is whether a generator is in the plane of a pair, and `outside` its
-    factor if not.
+    `first` and `second`, shape (p,), are the generators of the p pairs. `within`, shape (p, m), is
+    whether a generator is in the plane of a pair; `outside`, shape (p, m), are the factors of the
+    others at the facet, 0 for those within. The four corners of a facet are in no order around it.
     """
     simple = np.flatnonzero(within.sum(axis=1) == 2)
     corners = np.repeat(outside[simple, None], 4, axis=1)

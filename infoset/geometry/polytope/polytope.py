@@ -710,10 +710,12 @@ class Polytope(PolytopeArrays, ConvexSet):
         return corners, np.abs(np.linalg.det(edges))
 
     def area(self) -> float:
-        """Return the area of a set of R^2; 0 for a segment or a point.
+        """Return the area of a set of R^2; a ValueError is raised in other spaces.
 
-        `volume` is for any space.
+        It is 0 for the empty set, a point or a flat set, and inf for an unbounded set with an
+        interior. `volume` is for any space.
         """
+        # `exact` exists only if the set is unbounded.
         if self.exact is not None and self.space == 2:
             return float("inf") if self.dimension == self.space else 0.0
         return self.volume() if len(self._polygon()) > 2 else 0.0
