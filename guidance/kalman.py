@@ -173,7 +173,10 @@ class KalmanBank:
         return np.asarray(np.divide(weight, total, out=np.zeros_like(weight), where=total > 0.0))
 
     def _misses(self, to_go: Floats) -> tuple[Floats, Floats]:
-        """Return the misses of the filters without pending impulses, and their variances."""
+        """Return the predicted miss of each filter and its variance, each of shape (C, B, M).
+
+        Pending impulses are not counted. `to_go`, of the same shape, is x / speed, at least zero.
+        """
         speed = self.mean[..., SPEED]
         velocity = self.mean[..., VZ]
         miss = self.mean[..., Z] + velocity * to_go
@@ -183,6 +186,7 @@ class KalmanBank:
             miss = miss + 0.5 * acceleration * to_go**2
             final_velocity = velocity + acceleration * to_go
 
+        # By z, V_z, x, speed (and a), in this order; x and speed change `to_go`.
         gradient = [
             np.ones_like(miss),
             to_go,

@@ -14,8 +14,8 @@ from infoset.guidance.symmetric_impulse import range_at_impulse, symmetric_impul
 from infoset.limits import Checked, Limits
 
 LAST_SECONDS_S = 3.0
-"""Time before the arrival or the last impulse in which the strategy acts as U_s. Chosen for the
-scenario of 1997, where it is six steps.
+"""Time before the arrival or the last impulse in which the strategy acts as U_s
+(`symmetric_impulse`). Chosen for the scenario of 1997, where it is six steps.
 """
 
 
@@ -64,7 +64,11 @@ class Patient(Checked):
         """Start without a state."""
 
     def decide(self, situation: Situation, state: None) -> Floats:
-        """Return the certain part of the correction, or the urgent part if it is larger, m/s."""
+        """Return k_s in the last seconds, before them what cannot wait, m/s, shape (C, B).
+
+        What cannot wait is the greater of two corrections: the certain one, which every hypothesis
+        needs, and the urgent one, the excess over a share of what later impulses can correct.
+        """
         miss = situation.predicted_miss
         e = situation.closing_speed_m_s
         lead_s = situation.lead_s
@@ -72,6 +76,7 @@ class Patient(Checked):
         if situation.last_s <= lead_s + LAST_SECONDS_S:
             return symmetric
 
+        # Lower end first.
         ends_m = np.stack([miss.lower_point.range_m, miss.upper_point.range_m], axis=-1)
         later_m = correctable_later_m(situation, ends_m)
         above = np.maximum(miss.upper_m - self.share * later_m[..., 1], 0.0)

@@ -99,7 +99,18 @@ class RandomNoise(ScriptedNoise):
             need_draws("bias", self.bias[..., None])
 
     def errors_of_step(self, sight: LineOfSight) -> dict[str, Floats]:
-        """Return the errors of a step by sensor, in units of their bounds."""
+        """Return the errors of a step by sensor, in units of their bounds.
+
+        With a bias, the draw of a camera is the error of the pixel part, and the bias that of the
+        centroid part.
+
+        Raises
+        ------
+        ValueError
+            If errors are missing for this step, or have another shape than the measurements.
+        KeyError
+            If there is a bias, but `errors` has none of the camera.
+        """
         errors = super().errors_of_step(sight)
         if self.bias is None:
             return errors

@@ -114,6 +114,10 @@ def _best(
     times_are_free: bool,
     progress: Callable[[float], None],
 ) -> BestOrder:
+    """Return the best visits; an order or times that are not free are those of the file.
+
+    If the order is free and the times are not, the times of the file are sorted by size.
+    """
     tour = problem.tour
     order = tuple(range(len(problem.target)))
     guesses = [] if problem.times_s is None else [np.sort(problem.times_s)]
@@ -124,12 +128,18 @@ def _best(
     if times_are_free:
         timed = best_times(tour, order, problem.limits(), guesses, progress=progress)
         return BestOrder(
-            order, timed.path, timed.objective, 1, timed.evaluations, time_search=timed.search
+            order,
+            timed.path,
+            timed.objective,
+            nodes=1,
+            evaluations=timed.evaluations,
+            time_search=timed.search,
         )
     assert problem.times_s is not None
     path = tour.fly(order, problem.times_s)
     price_per_s = 0.0 if problem.times is None else problem.times.price_per_s
-    return BestOrder(order, path, path.cost + price_per_s * float(problem.times_s[-1]), 1, 1)
+    objective = path.cost + price_per_s * float(problem.times_s[-1])
+    return BestOrder(order, path, objective, nodes=1, evaluations=1)
 
 
 COMMAND = ProblemCommand(

@@ -232,7 +232,10 @@ def _parsed(content: bytes) -> Manifest:
 
 
 def _flat(value: Any, path: str = "") -> dict[str, Any]:
-    """Return nested values by dotted key."""
+    """Return the leaves of nested tables by dotted key; lists and empty tables are leaves.
+
+    `Manifest.identity` hashes them: with other keys, stored campaigns would be refused.
+    """
     if isinstance(value, dict) and value:
         return {
             name: leaf
