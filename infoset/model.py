@@ -14,7 +14,7 @@ from infoset.sensors import BearingSensor, Sensor
 Interval = tuple[float, float]
 
 MAX_SECTIONS = 10_000
-"""Maximum number of sections: they take 6 MB for each engagement (docs/performance.md)."""
+"""Maximum number of sections: they take 6 MB for each engagement (docs/measured/performance.md)."""
 CENTROID_ERRORS_AT_THRESHOLD = 10.0
 """Minimum range threshold in centroid errors of the camera.
 

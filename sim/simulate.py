@@ -19,11 +19,13 @@ from infoset.sim.results import GuaranteeWarning, Results, join
 from infoset.sim.scenario import Scenario, with_noise, with_strategy
 
 ENGAGEMENTS_AT_ONCE = 200
-"""Maximum number of engagements of a batch: 25 % faster than 64 (docs/performance.md); larger ones
-gain little, and their sections leave the processor's cache.
+"""Maximum number of engagements of a batch: 25 % faster than 64 (docs/measured/performance.md);
+larger ones gain little, and their sections leave the processor's cache.
 """
 SECTIONS_AT_ONCE = 6000
-"""Maximum number of sections of a batch: 200 engagements with 29 sections, which take 3.7 MB."""
+"""Maximum number of sections of a batch: 200 engagements with 29 sections, which take 3.7 MB (L3
+cache).
+"""
 STEPS_AT_ONCE = 500_000
 """Maximum number of engagements of a batch times their steps; each takes about 600 bytes."""
 FLIGHT_SHARE = 0.75
@@ -185,8 +187,8 @@ def _run_numbers(runs: int | Sequence[int]) -> Integers:
 def _engagements_at_once(scenario: Scenario) -> int:
     """Return the number of engagements of a batch.
 
-    Small batches fit into the processor's cache; with very many sections or steps, larger ones
-    would not fit into memory.
+    The sections of a batch must fit into the processor's cache, its history into memory (500 000
+    times 600 bytes are 300 MB).
     """
     by_sections = SECTIONS_AT_ONCE // scenario.set_model.sections
     by_steps = STEPS_AT_ONCE // max_number_of_steps(scenario)

@@ -28,10 +28,10 @@ from infoset.engine.chains import (
 
 ROOM_AT_START = 64
 """Initial room of a chain, in vertices, a power of two: enough for the 36 vertices that both chains
-of a section have on average in a flight of 1000 steps (docs/performance.md)."""
+of a section have on average in a flight of 1000 steps (docs/measured/performance.md)."""
 ROOM_AHEAD = 8 * MAX_ADDED
 """Additional room, in vertices, allocated when a section grows: the rooms of a batch are counted
-once in eight steps, which makes an engagement 5 to 10 % faster (docs/performance.md)."""
+once in eight steps, which makes an engagement 5 to 10 % faster (docs/measured/performance.md)."""
 
 TAKEN = 0
 """Index in the rings of the number of floats in use; rings that were replaced remain in use."""
@@ -61,8 +61,9 @@ class Chains(NamedTuple):
 def empty_sections(number: int, room: int = CAPACITY) -> Chains:
     """Return empty chains with room for `room` vertices each, a power of two.
 
-    The rings are allocated at their maximum size; the operating system provides memory when it is
-    written.
+    `number` is the number of sections, with two chains each. They take at most 8 CAPACITY floats a
+    section: rings that were replaced remain, and both chains with rooms of 64, 128 and 256 vertices
+    take 1840 floats of 2048. The operating system provides memory when it is written.
     """
     records = np.zeros(2 * number, dtype=record_of(Chain))
     records["ring"] = FIRST_RING + (2 * room + LINE) * np.arange(2 * number)

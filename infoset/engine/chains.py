@@ -41,7 +41,7 @@ EPSILON = float(np.finfo(np.float64).eps)
 where two of them are compared, 4 ulp allow for both, and for the two origins."""
 CAPACITY = 256
 """Maximum number of vertices of a section, a power of two. The sections of a flight of 4 h with
-10 000 steps have 110 vertices on average (docs/performance.md)."""
+10 000 steps have 110 vertices on average (docs/measured/performance.md)."""
 MAX_ADDED = 4
 """Maximum number of vertices that one step adds: two at each of its two turns."""
 REDUCED = 160

@@ -40,11 +40,11 @@ is then at most 0.1 % greater than the exact maximum. Chosen.
 """
 MAX_DIVIDED = 400
 """Maximum number of pieces that are divided. If more are needed, Phi is a greater bound:
-docs/guarantee-miss.md has medians of Phi for 100 and 400 pieces. A piece takes 0.1 to 0.4 ms.
+docs/measured/guarantee.md has medians of Phi for 100 and 400 pieces. A piece takes 0.1 to 0.4 ms.
 """
 GROUPS = 3000
 """Labels that leave within this part of a flight are bounded together, if they need several steps:
-a flight of 10 000 steps has a Phi that is 2 % greater (docs/performance.md).
+a flight of 10 000 steps has a Phi that is 2 % greater (docs/measured/performance.md).
 """
 MISS_ROUNDING = 4.0 * chains.EPSILON
 """Rounding error of a miss, relative to the maximum label: of x at the closest approach, also if z
