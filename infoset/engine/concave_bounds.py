@@ -58,19 +58,21 @@ def bound_between(
 
 
 @allocation_free
-def is_infeasible_between(infeasible: Records, latest: Floats) -> bool:
-    """Return whether all labels from the first to the last of some infeasible labels, in increasing
-    order, are infeasible.
+def is_infeasible_between(infeasible: Records, room: Floats) -> bool:
+    """Return whether no label between the first and the last infeasible one can be feasible.
 
-    The overlap at the latest event at which one of them became empty is a concave function of the
-    label. `latest`, shape (2, len(infeasible)), is a working array.
+    False if that is not proven. `infeasible` are records with increasing labels. The overlap at the
+    last event at which one of them became empty is a concave function of the label. Only the labels
+    that became empty at this event have its overlap (negative: empty); an equal label counts once.
+    With the slope 0, `bound_between` adds no line. `room`, shape (2, len(infeasible)), is a working
+    array.
     """
     last_event = infeasible[0].emptied_at
     for i in range(1, len(infeasible)):
         last_event = max(last_event, infeasible[i].emptied_at)
 
-    labels = latest[0]
-    overlaps = latest[1]
+    labels = room[0]
+    overlaps = room[1]
     count = ZERO
     for i in range(len(infeasible)):
         record = infeasible[i]

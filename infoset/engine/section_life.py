@@ -150,10 +150,14 @@ def slope_band(
 ) -> tuple[float, float]:
     """Return the minimum and the maximum slope z/x that agree with measured angles, at range x.
 
-    By (8), the tangents of alpha -+ b(x), with the error bound b(x) of the label: part 4 of Lemma
-    1. The paper's model takes the angles in place of their tangents. `alpha` and `across` are the
-    angles of this axis and of the other one, rad. `travelled` is the decrease of the range since
-    the start, m, the same for all labels.
+    By (8) they are the tangents of alpha -+ b(x), where b(x) is the error bound of the label (Lemma
+    1, part 4); infinite beyond a right angle, and lower > upper (an empty band) where b < 0. The
+    paper's model takes the angles in place of their tangents. `law.linear_band` (a camera, or a
+    bound that rises with the range) takes the wider band (21); only it uses `across` and
+    `travelled`.
+
+    `alpha` and `across` are the angles of this axis and of the other one, rad. `travelled` is the
+    decrease of the range since the start, m, the same for all labels.
     """
     if law.linear_band:
         return linear_slope_band(alpha, across, travelled, x, law)

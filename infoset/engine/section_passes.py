@@ -106,7 +106,11 @@ class Sections(NamedTuple):
 
 
 def room_for_sections(channels: int, labels: Floats, used: Integers) -> Sections:
-    """Allocate the arrays of a batch of sections for a number of axes."""
+    """Allocate the sections of B engagements x S slots along `channels` lateral axes.
+
+    `start_all` writes them. `labels`, shape (B, S), m, is copied; `used`, shape (B,), is kept.
+    Nothing is feasible yet, and all summaries are out of date.
+    """
     slots = np.zeros(labels.shape, dtype=record_of(Slot))
     slots["label"] = labels
     slots["emptied_at"] = NEVER_EMPTIED

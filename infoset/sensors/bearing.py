@@ -165,8 +165,10 @@ class BearingSensor(Sensor):
     def share(self, apart: Apart) -> Floats:
         """Return half of the maximum difference of the angles, in units of the bound, shape (n,).
 
-        An angle changes by at most as much as z/x. The bound may fall with the distance, which is
-        greater than the range. An axis that is measured without error is left out.
+        Half, because both motions get the value in the middle. An angle changes by at most as much
+        as z/x. Bounds have the shape (n,), or (2, n) if the axes differ, and are smallest at an end
+        of [range_m, farthest_m]. An axis measured without error is left out: such an engagement is
+        one in a plane (docs/guarantee-bound.md).
         """
         angles = np.abs(apart.offset_m) / apart.range_m
         bounds = np.minimum(self.error_bounds(apart.range_m), self.error_bounds(apart.farthest_m))
