@@ -269,9 +269,10 @@ def real_values(name: str, value: ArrayLike) -> Floats:
 
 
 def real_array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
-    """Return finite real numbers as an array of a shape.
+    """Return finite real numbers as a float array of a shape.
 
-    `value` is such an array, or one number for all elements.
+    `value` is such an array, which is returned itself, not as a copy, if its elements are floats
+    (float64); or it is one number for all elements.
 
     A TypeError is raised as by `real_values`, a ValueError if a number is not finite, or if the
     shape is different.

@@ -619,10 +619,10 @@ class ConvexPolygons(ConvexSet):
         return self._measure_at(kernels.margin, "point", point)[..., 0]
 
     def contains(self, point: ArrayLike, tolerance: float = 0.0) -> Flags:
-        """Return whether a point is in the set or on its boundary, or within a distance of it.
+        """Return whether a point is in the set or at most `tolerance` from it, shape (...).
 
-        The point has the shape (2,) or (..., 2). O(n). Exact for a tolerance of 0: rounding does
-        not affect the answer.
+        False for the empty set. The boundary belongs to the set. The point has the shape (2,) or
+        (..., 2). O(n). Exact for a tolerance of 0: rounding does not affect the answer.
         """
         distance = self._measure_at(kernels.nearest, "point", point)[..., 2]
         return np.asarray(distance <= not_negative("tolerance", tolerance))

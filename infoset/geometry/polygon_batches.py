@@ -287,7 +287,10 @@ def gap(
 
 @compiled
 def nearest(vertices: Floats, counts: Integers, out: Floats, point: Floats) -> None:
-    """Nearest points of polygons, and their distances."""
+    """Write nearest points (x, y) of polygons and their distances in the columns of `out`.
+
+    The distance from the empty set is inf, without a nearest point.
+    """
     for i in range(counts.size):
         out[i, 2] = np.inf
         if counts[i] > 0:

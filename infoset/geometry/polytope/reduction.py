@@ -86,7 +86,14 @@ def _cut_by_worst(
 
 @_kernels.allocation_free
 def _write_box(points: Floats, sides: Floats, rays: Floats, bits: Bits) -> None:
-    """Write the 2 n sides of the bounding box of points, its vertices, and their bits."""
+    """Write the 2 n sides of the bounding box of points, its vertices, and their bits.
+
+    `points` has the shape (N, n). `sides`, which contains zeros, gets rows (a, b) with a . y <= b:
+    row j for the maximum of coordinate j, row n + j for its minimum. `rays`, which contains ones,
+    gets the vertices as in double description: vertex k has the minimum of coordinate j if bit j of
+    k is set. Its entry is b or -b. Bit i of a vertex in `bits`: it lies on row i. All 2 n bits must
+    be in word 0, so 2 n is at most 64.
+    """
     n = points.shape[1]
     for j in range(n):
         sides[j, j] = 1.0
