@@ -42,6 +42,16 @@ RADIUS_SHOWN = 2.0
 """The axes extend to the radius of the body if it is at most this multiple of the maximum miss
 shown.
 """
+_PANEL_MM = (56.0, 68.0)
+_BESIDE_MM = (22.0, 40.0)
+"""Width and height of the room of a panel, and of the legend and the labels, mm; chosen."""
+_MARKER_PT = 45.0
+_MARKER_LIMITS_PT = (1.6, 3.5)
+_OPACITY = 30.0
+_OPACITY_LIMITS = (0.35, 0.8)
+"""Size and opacity of the markers of N points: both are this number times N^(-1/2), within the
+limits. Chosen; with this size the total area of the markers stays the same.
+"""
 _AT_BODY_SCALE = "at the scale of the body"
 _BODY_FROM = 4.0
 """Ratio of the axes to the radius of the body above which a second panel shows the body."""
@@ -144,7 +154,9 @@ def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figu
     if len(clouds) > 1:
         columns = min(_MAX_COLUMNS, len(clouds))
     rows = -(-len(halves) // columns)
-    figure, grid = subplots(40.0 + 68.0 * rows, rows, columns, width_mm=56.0 * columns + 22.0)
+    width_mm = _BESIDE_MM[0] + _PANEL_MM[0] * columns
+    height_mm = _BESIDE_MM[1] + _PANEL_MM[1] * rows
+    figure, grid = subplots(height_mm, rows, columns, width_mm=width_mm)
     panels = first_panels(grid, len(halves))
     titles = []
 
@@ -153,6 +165,7 @@ def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figu
     ):
         lines = _draw_cloud(axes, each, half, radius_m)
         if place >= len(clouds):
+            # The last line of `_draw_cloud` is the hits: there is a radius here.
             lines = [_AT_BODY_SCALE, lines[-1]]
         titles.append("\n".join([plain(each.title), *lines]))
 
@@ -208,9 +221,9 @@ def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) ->
 
 
 def _draw_points(axes: Axes, each: Cloud) -> list[str]:
-    """Draw the misses with circles and ellipses, and return the quantiles as text.
+    """Draw the misses with circles and ellipses, and return the quantiles that the sample shows.
 
-    Many points are smaller and paler.
+    Each quantile is one text. Many points are smaller and paler.
     """
     count = len(each.miss_m)
     point: dict[str, Any] = {
@@ -218,8 +231,8 @@ def _draw_points(axes: Axes, each: Cloud) -> list[str]:
         "marker": "o",
         "linestyle": "none",
         "markeredgewidth": 0.0,
-        "markersize": float(np.clip(45.0 / np.sqrt(count), 1.6, 3.5)),
-        "alpha": float(np.clip(30.0 / np.sqrt(count), 0.35, 0.8)),
+        "markersize": float(np.clip(_MARKER_PT / np.sqrt(count), *_MARKER_LIMITS_PT)),
+        "alpha": float(np.clip(_OPACITY / np.sqrt(count), *_OPACITY_LIMITS)),
         "rasterized": count > MAX_VECTORS,
         "zorder": 3.2,  # the white edge of a circle would hide the points on it
     }

@@ -41,6 +41,8 @@ Angle and rate grow as 1/x and 1/x^2 there.
 """
 _MIN_RATE = 0.02
 """Quantile of the moduli of the rates at which their logarithmic axis starts: a rate can be 0."""
+_IMPULSE_ROOM = 1.2
+"""Limit of the axes in units of the greatest impulse; chosen."""
 _ZERO: dict[str, Any] = {"color": LIMIT, "linewidth": 0.6}
 
 Trace = tuple[Record, int]
@@ -85,7 +87,7 @@ def draw_process(records: Sequence[Record]) -> Figure:
         _level(angles, traces_of(records), "angle")
         _level(rates, traces_of(records), "rate")
     for axes in impulses:
-        axes.set_ylim(-1.2 * impulse_m_s, 1.2 * impulse_m_s)
+        axes.set_ylim(-_IMPULSE_ROOM * impulse_m_s, _IMPULSE_ROOM * impulse_m_s)
     level_predicted_miss(misses)
     legend_below(figure, 3, markerscale=2.0)
     return figure
@@ -169,7 +171,7 @@ def _dots(axes: Axes, times: Floats, values: Floats, label: str) -> None:
 
 
 def _draw_angle_error(axes: Axes, trace: Trace, clock: Clock) -> None:
-    """Draw the errors of the measured angle, µrad, in their bounds."""
+    """Draw the errors of the measured angle and their bound at the true range, µrad."""
     record = trace[0]
     steps, values = _measured(trace, "angle")
     times = clock.at(record)[steps]
@@ -177,6 +179,7 @@ def _draw_angle_error(axes: Axes, trace: Trace, clock: Clock) -> None:
     axes.axhline(0.0, **_ZERO)
     band: dict[str, Any] = {"facecolor": MEASURED, "alpha": 0.18, "linewidth": 0.0}
     axes.fill_between(times, -bounds, bounds, label="bound of the angle error", **band)
+    # `_measured` and `_true` are in mrad.
     errors = 1e3 * (values - _true(trace, "angle")[steps])
     _dots(axes, times, errors, "error of the measured angle")
 
@@ -215,12 +218,16 @@ def _level_moduli(row: Sequence[Axes]) -> None:
 
 
 def _draw_impulse(axes: Axes, trace: Trace, clock: Clock, impulse_m_s: float) -> None:
+    """Draw the impulses along one axis, m/s, and the engine's maximum.
+
+    `impulse_m_s` is the greatest impulse of all records, on which the limits of the axes depend.
+    """
     record, axis = trace
     maximum = record.scenario.thruster.max_impulse_m_s
     times = clock.at(record)
     axes.axhline(0.0, **_ZERO)
     label = f"maximum impulse, {maximum:g} m/s"
-    if maximum > 1.2 * impulse_m_s:
+    if maximum > _IMPULSE_ROOM * impulse_m_s:
         label = f"maximum {maximum:g} m/s, beyond the axis"
     for limit in (-maximum, maximum):
         axes.axhline(limit, label=label, **BOUND)
