@@ -42,7 +42,9 @@ def correctable_m(
 ) -> Floats:
     """Return the miss (m) that impulses can correct, as many as the budget allows.
 
-    The last impulse has the rest of the budget.
+    Impulses have their maximum, the earliest first, until the budget is spent or x = 0 (the range
+    is zero). One more has the rest of the budget, none if the rest is below the minimum impulse.
+    The result has the broadcast shape.
 
     Parameters
     ----------
@@ -53,15 +55,16 @@ def correctable_m(
     first : ndarray of int or int
         Index of the first impulse that counts.
     """
-    number = np.maximum(np.searchsorted(times_s, to_go_s) - first, 0)
-    full = np.minimum(budget // thruster.max_impulse_m_s, number).astype(np.int64)
+    possible = np.maximum(np.searchsorted(times_s, to_go_s) - first, 0)
+    full = np.minimum(budget // thruster.max_impulse_m_s, possible).astype(np.int64)
     rest = np.minimum(budget - full * thruster.max_impulse_m_s, thruster.max_impulse_m_s)
-    rest = np.where((full < number) & (rest >= thruster.min_impulse_m_s), rest, 0.0)
+    rest = np.where((full < possible) & (rest >= thruster.min_impulse_m_s), rest, 0.0)
 
     # The sum of the times to go of the impulses from `first` to `end`, by sums of all times.
     end = first + full
     times_s = times_s[: end.max(initial=0) + 1]
     sums_s = np.append(0.0, np.cumsum(times_s))
+    # After the last time the rest is zero: any number will do.
     next_s = np.append(times_s, 0.0)[end]
     return np.asarray(
         thruster.max_impulse_m_s * (full * to_go_s - (sums_s[end] - sums_s[first]))

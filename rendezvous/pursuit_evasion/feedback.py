@@ -101,16 +101,18 @@ def fly(
     Raises
     ------
     ValueError
-        If the game has no capture and therefore no first plan, or `replan_s` is not positive.
+        If the game has no capture and therefore no first plan, or `replan_s` is not positive and
+        finite.
     PathError
         If the evader's path cannot be followed.
 
     Notes
     -----
-    Each plan starts Newton's method at the previous one: 2 ms and, for a steered evader, 2 ms of
-    its flight. The last leg is simulated without observation. If Newton's method fails from the
-    previous plan, the game is solved from scratch; the previous plan is kept if that would take
-    much longer.
+    The first plan is the solution of the game, from the true states. Each later plan starts
+    Newton's method at the previous one. A step costs 2 ms for the plan and, with a `steering`, 2 ms
+    for the evader's path. The last leg is the one in which the plan predicts the capture: no plan
+    is made in it. If Newton's method fails from the previous plan, the game is solved from scratch;
+    the previous plan is kept if the capture would be much later.
     """
     if not 0.0 < replan_s < np.inf:
         raise ValueError("the time between plans must be positive")
@@ -127,7 +129,13 @@ def fly(
 
 
 class _Pursuit:
-    """One pursuit in progress, nondimensional."""
+    """One pursuit in progress, nondimensional.
+
+    `_past` has the start time and the evader's path, by the time from there, of each flown leg.
+    `_log` has of each plan its time, the time of its predicted capture, and the position of the
+    evader relative to the pursuer, shape (3,). `_dry` are the dry masses of pursuer and evader, and
+    `_work` the radians left for plans from scratch.
+    """
 
     def __init__(
         self,

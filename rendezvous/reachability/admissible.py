@@ -129,8 +129,10 @@ def lift(block: StateBlock) -> Lifted:
 def lift_with_states(block: StateBlock) -> Lifted:
     """Return the set of `lift` with v = all controls, then all states x(1)..x(T).
 
-    T n equations determine the states. The rows are sparse, which speeds up an interior-point
-    method.
+    With T periods, n states and m controls, v has p = T m + T n variables: u(0)..u(T-1), then
+    x(1)..x(T). The T n equations x(t + 1) - A(t) x(t) - B(t) u(t) = 0 determine the states; the
+    start is in the first levels. Rows on states are ordered by period, unlike in `lift`. The rows
+    are sparse, which speeds up an interior-point method.
     """
     periods = block.periods
     n = block.size
