@@ -128,9 +128,10 @@ class _ConstructedNoise(GameNoise):
 
 
 def by_axis(values: Floats, sensor: Sensor | None = None) -> Floats:
-    """Return values of shape (n, C, ...) as a sensor uses them.
+    """Return values of n engagements along C lateral axes, shape (n, C, ...), with the axis first.
 
-    The shape is (C, n, ...) if it measures by axis, otherwise (n, ...). None is the angle sensor.
+    The shape is then (C, n, ...), as engagements take them. A sensor that does not measure by axis
+    has those of the first axis, shape (n, ...); None is the angle sensor. The result is a view.
     """
     if sensor is None or sensor.is_lateral:
         return np.moveaxis(values, 1, 0)
@@ -172,6 +173,7 @@ class Planner:
         self._random = np.random.default_rng(seed)
         others = [sensor for name, sensor in scenario.sensors.items() if name != BearingSensor.name]
         self.sensors: tuple[Sensor, ...] = (scenario.bearing_sensor, *others)
+        # Minimum and maximum start, ordered and in units as `Plans.start`.
         self._lower, self._upper = corners(model.bounds)
         self._axes = len(model.axes)
 
@@ -184,6 +186,7 @@ class Planner:
                 self.acceleration_m_s2 = np.maximum(self.acceleration_m_s2, amplitudes)
 
         self.constructions: list[str] = []
+        # The order and the number are part of what a seed means: a change gives other plans.
         # Moves of the start are listed three times: they are chosen three times as often.
         self._changes: list[Callable[[Plans, int], None]] = [
             self._flip,

@@ -150,12 +150,17 @@ def flight_bounds(
 
 
 def _nominal(middle: Floats, sun: Sun, times_s: Floats) -> _Motion:
-    """Return the motion from a relative position and velocity, shape (2, axes)."""
+    """Return the motion of spacecraft and object without impulses or disturbance.
+
+    `middle`, shape (2, axes), is the relative position (m) and velocity (m/s) at t = 0, and
+    `times_s` are equal steps from 0.
+    """
     motion = KeplerMotion(middle[None, 0], middle[None, 1], sun)
     states = [motion.bodies()]
     for _ in times_s[1:]:
         motion.advance(times_s[1])
         states.append(motion.bodies())
+    # `bodies` has the axes: position or velocity, craft, axis, engagement.
     place_m, speed_m_s = np.moveaxis(np.array(states)[..., 0], 0, -1)
     return _Motion(place_m, speed_m_s)
 

@@ -37,11 +37,13 @@ class LabelEnds:
         self._laws = section_laws(model)
         self.published_m: Floats = np.zeros(batch)
         self.left: Flags = np.zeros(batch, dtype=bool)
-        self._exists = np.zeros(batch, dtype=bool)
-        # Without control, no later section counts.
+        # Engagements with a section whose control has ended, shape (B,).
+        self._has_ended = np.zeros(batch, dtype=bool)
+        # Engagements whose control is over, shape (B,): sections that leave afterwards are not
+        # added.
         self._is_over = np.zeros(batch, dtype=bool)
-        # Sections whose control has ended: engagement, label and misses. Impulses move them until
-        # their range is zero.
+        # Sections whose control has ended: engagement, label (m) and minimum and maximum miss (m),
+        # shape (2, C, sections). Impulses move them until their range is zero.
         self._engagements = np.empty(0, dtype=np.int64)
         self._labels_m = np.empty(0)
         self._misses_m = np.empty((2, len(self._laws), 0))
@@ -97,7 +99,7 @@ class LabelEnds:
         np.maximum.at(self.published_m, leaving, _max(misses)[leaves])
 
         counts = ~self._is_over[engagements]
-        self._exists[engagements[counts]] = True
+        self._has_ended[engagements[counts]] = True
         self._engagements = np.concatenate((self._engagements, engagements[counts]))
         self._labels_m = np.concatenate((self._labels_m, labels[counts]))
         self._misses_m = np.concatenate((self._misses_m, misses[:, :, counts]), axis=2)
@@ -110,7 +112,7 @@ class LabelEnds:
         The true state is such a state if it was always inside its section. Where the set became
         empty, or no section has ended, only the true state counts.
         """
-        ended = self._exists & ~results.set_emptied
+        ended = self._has_ended & ~results.set_emptied
         truth_m = np.where(ended & ~results.truth_kept, 0.0, results.miss_m)
         misses_m = _max(self._misses_m) * self._scale(self._labels_m)
         sections_m = np.zeros_like(self.published_m)

@@ -35,7 +35,8 @@ class Distribution:
     values : ndarray, shape (n,)
         The sample in ascending order.
     probability : ndarray, shape (n,)
-        Share of the sample at or below each value.
+        k/n for the k-th value. Of equal values, the last one has the share of the sample at or
+        below it.
     lower, upper : ndarray, shape (n,)
         Band of the distribution function at each value. The true function lies within it everywhere
         with at least the probability of the confidence.
@@ -59,6 +60,8 @@ def empirical_distribution(sample: ArrayLike, confidence: float = 0.95) -> Distr
 
     Raises
     ------
+    TypeError
+        If the sample or the confidence is not real numbers.
     ValueError
         If the sample is empty or not finite, or the confidence is not in (0, 1).
 
