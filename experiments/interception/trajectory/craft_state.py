@@ -302,7 +302,12 @@ def _covariance_at(segment: OemSegment, where: str, seconds: Fraction) -> OemCov
 def _axes_of(
     covariance: OemCovariance, where: str, segment: OemSegment, frame: Frame, state: Floats
 ) -> Floats:
-    """Return the axes of a covariance as rows, in the axes of the states."""
+    """Return the axes of a covariance as rows, shape (3, 3), in the frame of the states.
+
+    No COV_REF_FRAME means that frame. `state`, shape (2, 3), gives the axes of the orbit; the
+    suffix _INERTIAL (axes fixed at the epoch) does not change them. `InputError`, beginning with
+    `where`, for any other frame; EME2000 and ICRF count as different.
+    """
     name = covariance.frame
     if name is None:
         return np.eye(3)
