@@ -73,16 +73,22 @@ def solve(problem: ParetoProblem, options: Pareto, begin: BeginProgress) -> Pare
 
 
 def _preferred(text: str, problem: ParetoProblem) -> Floats:
-    """Read a preferred meeting: a value for each free component."""
+    """Read `--prefer`, KEY=VALUE,.. in SI units: one value for each free component.
+
+    The values, shape (f,), are in the order of `encounter.free`. Raise `InputError` if a component
+    is missing, unknown or given twice, or if a value is not a finite number within the limit.
+    """
     keys = [TERMINAL[component.name.lower()] for component in problem.encounter.free]
     pairs = [part.partition("=") for part in text.split(",")]
     try:
         values = {key.strip(): float(number) for key, _, number in pairs}
     except ValueError:
         values = {}
-    # A NaN is not within the limit.
-    if sorted(values) != sorted(keys) or not all(
-        abs(value) <= MAXIMUM for value in values.values()
+    # A key that is given twice leaves fewer values than pairs; a NaN is not within the limit.
+    if (
+        len(values) != len(pairs)
+        or sorted(values) != sorted(keys)
+        or not all(abs(value) <= MAXIMUM for value in values.values())
     ):
         example = ",".join(f"{key}=0" for key in keys)
         raise InputError(

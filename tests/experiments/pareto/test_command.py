@@ -144,6 +144,7 @@ def test_bound_that_no_meeting_keeps_is_refused_with_the_smallest_one(infoset: C
         "x_m=0",
         "x_m=0,z_m=1,y_m=2",
         "x_m=0,x_m=1",
+        "x_m=0,x_m=1,z_m=2",
         "x_m=0,z_m=far",
         "x_m=0,z_m=nan",
         "x_m=0,z_m=1e300",
