@@ -37,8 +37,8 @@ def possible_miss_m(
     closing_speed_m_s, pixel_error_rad, centroid_error_m : float
         e, p and c: at the distance d the error bound of an image is p + c / d.
     first_image_s, last_image_s : float
-        t_f and t_c, times before the arrival of the first image and of the last one before the last
-        impulse, s.
+        t_f and t_c, times before the arrival of the first image and of the last one until the
+        decision of the last impulse, s.
     disturbance_m_s2 : float
         Bound nu of the acceleration of the target along the axis, m/s^2.
     constant_bias : bool
@@ -112,17 +112,17 @@ def possible_miss(scenario: Scenario) -> PossibleMiss | None:
 
     None means fewer than two images before it.
     """
-    before_s = np.array(image_times_s(scenario))
-    if before_s.size < 2:
+    images_s = np.array(image_times_s(scenario))
+    if images_s.size < 2:
         return None
 
     camera = scenario.bearing_sensor
     has_closed_form = isinstance(camera, Camera) and camera.miss_probability == 0.0
     images_m = possible_miss_of(scenario) if has_closed_form else None
-    return PossibleMiss(images_m, _images_and_speeds_m(scenario, before_s))
+    return PossibleMiss(images_m, _images_and_speeds_m(scenario, images_s))
 
 
-def _images_and_speeds_m(scenario: Scenario, before_s: Floats) -> float:
+def _images_and_speeds_m(scenario: Scenario, images_s: Floats) -> float:
     """Return the distance of the two motions of `worst_shift_m` at the arrival, m.
 
     In space it is the distance across both axes.
@@ -130,8 +130,8 @@ def _images_and_speeds_m(scenario: Scenario, before_s: Floats) -> float:
     model = scenario.set_model
     misses_m = []
     for axis in map(model.axis, model.axes):
-        bound_m, speed_m_s = _worst_difference(axis, before_s, scenario.nominal_arrival_s)
-        misses_m.append(_at_arrival_m(bound_m, speed_m_s, before_s[-1], axis.disturbance_m_s2))
+        bound_m, speed_m_s = _worst_difference(axis, images_s, scenario.nominal_arrival_s)
+        misses_m.append(_at_arrival_m(bound_m, speed_m_s, images_s[-1], axis.disturbance_m_s2))
     return math.hypot(*misses_m)
 
 
@@ -153,23 +153,23 @@ def worst_shift_m(scenario: Scenario) -> Floats | None:
     model = scenario.set_model
     if scenario.impulse_steps is None:
         return None
-    before_s = np.array(image_times_s(scenario))
-    if before_s.size < 2:
+    images_s = np.array(image_times_s(scenario))
+    if images_s.size < 2:
         return None
 
     shifts_m = [
-        _worst_shift_along_m(model.axis(name), before_s, scenario.nominal_arrival_s)
+        _worst_shift_along_m(model.axis(name), images_s, scenario.nominal_arrival_s)
         for name in model.axes
     ]
     return np.stack(shifts_m)
 
 
-def _worst_difference(model: SetModel, before_s: Floats, arrival_s: float) -> tuple[float, float]:
+def _worst_difference(model: SetModel, images_s: Floats, arrival_s: float) -> tuple[float, float]:
     """Return b0, m, and the maximum s, m/s, of `worst_shift_m` in the planar model of one axis."""
-    range_m = before_s * model.closing_speed_m_s
+    range_m = images_s * model.closing_speed_m_s
     bound_m = model.angle_sensor.error_bound(range_m) * range_m
-    last_s = before_s[-1]
-    earlier_s = before_s[:-1] - last_s
+    last_s = images_s[-1]
+    earlier_s = images_s[:-1] - last_s
     disturbance = model.disturbance_m_s2
     minimum, maximum = model.bounds.vz_m_s
     by_images_m_s = np.min(2.0 * (bound_m[-1] + bound_m[:-1]) / earlier_s + disturbance * earlier_s)
@@ -177,14 +177,14 @@ def _worst_difference(model: SetModel, before_s: Floats, arrival_s: float) -> tu
     return bound_m[-1], min(by_images_m_s, by_start_m_s)
 
 
-def _worst_shift_along_m(model: SetModel, before_s: Floats, arrival_s: float) -> Floats:
+def _worst_shift_along_m(model: SetModel, images_s: Floats, arrival_s: float) -> Floats:
     """Return `worst_shift_m` in the planar model of one axis, shape (steps,).
 
-    `before_s` are the times of images before the arrival, s.
+    `images_s` are the times of images before the arrival, s.
     """
-    bound_m, speed_m_s = _worst_difference(model, before_s, arrival_s)
+    bound_m, speed_m_s = _worst_difference(model, images_s, arrival_s)
     disturbance = model.disturbance_m_s2
-    last_s = before_s[-1]
+    last_s = images_s[-1]
 
     # Times before the last image, up to the minimum of the difference.
     steps = np.arange(math.ceil((arrival_s - last_s) / model.step_s) + 1)
@@ -199,9 +199,10 @@ def _worst_shift_along_m(model: SetModel, before_s: Floats, arrival_s: float) ->
 def possible_miss_of(scenario: Scenario, *, constant_bias: bool = False) -> float:
     """Return `possible_miss_m` of the camera and the last impulse of a scenario, m.
 
-    In space it is the miss across both axes. It uses the images, and nothing about the start: the
-    set on board is smaller if the speeds across are known well from the start
-    (`PossibleMiss.images_and_speeds_m`, which ``infoset scenarios check`` prints too).
+    In space it is the miss across both axes. It uses the images until the last decision
+    (`image_times_s`), and nothing about the start: the set on board is smaller if the speeds across
+    are known well from the start (`PossibleMiss.images_and_speeds_m`, which ``infoset scenarios
+    check`` prints too).
 
     The disturbance is `set_model.disturbance_m_s2` of each axis; `constant_bias` is an argument of
     `possible_miss_m`.
@@ -210,7 +211,7 @@ def possible_miss_of(scenario: Scenario, *, constant_bias: bool = False) -> floa
     ------
     ValueError
         If the angle sensor is not a camera, images can be lost, or there are fewer than two images
-        before the last impulse.
+        until the decision of the last impulse.
     """
     model = scenario.set_model
     camera = model.angle_sensor
@@ -223,19 +224,19 @@ def possible_miss_of(scenario: Scenario, *, constant_bias: bool = False) -> floa
             "the closed form is that of a camera that loses no image: set camera.miss_probability "
             "= 0"
         )
-    before_s = image_times_s(scenario)
-    if len(before_s) < 2:
+    images_s = image_times_s(scenario)
+    if len(images_s) < 2:
         raise ValueError(
-            "a bound of the miss needs two images before the last impulse: take more images, or "
-            "earlier"
+            "a bound of the miss needs two images until the decision of the last impulse: take "
+            "more images, or earlier"
         )
     along = (
         possible_miss_m(
             model.closing_speed_m_s,
             camera.constant_error_rad,
             camera.centroid_error_m,
-            before_s[0],
-            before_s[-1],
+            images_s[0],
+            images_s[-1],
             disturbance_m_s2=model.axis(axis).disturbance_m_s2,
             constant_bias=constant_bias,
         )
