@@ -343,7 +343,11 @@ class _AdversarySearch:
         return results.miss_m
 
     def _evaluate(self, plans: Plans, constructions: Constructions | None) -> tuple[Plans, int]:
-        """Return plans with their values, and the number of engagements whose set became empty."""
+        """Fly plans, and return them with values, and the number of sets that became empty.
+
+        The value is -inf for plans that do not count. Game noise writes its errors into `plans`;
+        the returned plans share these arrays.
+        """
         flight = self.engagements(plans, constructions)
         while flight.flying:
             flight.advance()

@@ -181,11 +181,15 @@ class Engagements:
         return self._label_ends.any_state_miss_m(results)
 
     def results(self, runs: NDArray[np.int64]) -> Results:
-        """Return the results so far, with these run numbers."""
+        """Return the results so far, with these run numbers.
+
+        Without a closest approach so far, the miss is the present range.
+        """
         arrivals_s = self._flight.arrivals_s(self.step)
         miss = self._flight.miss()
         radius_m = self.scenario.radius_m
         hit = np.ma.MaskedArray(miss.distance_m <= (radius_m or 0.0), mask=radius_m is None)
+        missed = ~hit.filled(True)  # Without a radius nothing counts as missed.
         set_emptied = self._information.inconsistent
         return Results(
             runs=runs,
@@ -195,7 +199,8 @@ class Engagements:
             outcomes=self._outcomes(miss.distance_m, set_emptied),
             set_emptied=set_emptied,
             hit=hit,
-            **self._decisions.columns(miss.lateral_m, arrivals_s, ~hit.filled(True)),
+            # causes, unguided_miss_m, engine_corrects_m, budget_corrects_m, last_possible_m
+            **self._decisions.columns(miss.lateral_m, arrivals_s, missed),
             truth_margin_m=self._truth_section.min_margin_m(arrivals_s),
             position_m=self._draws.position_m,
             velocity_m_s=self._draws.velocity_m_s,

@@ -17,12 +17,13 @@ error that the class promises, because the bound is an order of magnitude only. 
 than a step only where gravity is strong.
 """
 SHORTEST_LEAP = 1e-6
-"""Minimum length of a leap in units of the step. Only a fall into the attracting body needs shorter
-ones.
+"""Minimum length of a leap, relative to the step, and in `arrive` to the time to x = 0. Only a fall
+into the attracting body needs shorter ones.
 """
 NEWTON_STEPS = 8
 """Maximum number of Newton's steps: from a first error of 1 % the error is squared in each, and
-three steps reach rounding errors. Bisection follows where they do not converge.
+three steps reach rounding errors. In `approach` bisection follows where they do not converge;
+`arrive` counts only steps that no leap limits, and returns after the last one.
 """
 CONVERGED = 1e-9
 """Error of the time of a closest approach that Newton's method may leave, as a share of the leap.
@@ -498,9 +499,10 @@ def arrive(
     acceleration_error_m_s2: float,
     stage: Floats,
 ) -> float:
-    """Advance a state to x = 0 without impulses, and return the time, s.
+    """Advance a state to x = 0 without impulses, and return the time, s, negative if x = 0 is past.
 
-    Newton's method takes leaps of limited length.
+    Newton's method takes leaps of limited length. If x no longer decreases, the time is that of a
+    straight line through the current state. `stage` is as in `leap`.
     """
     total = 0.0
     last = 0

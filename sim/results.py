@@ -311,7 +311,8 @@ def _joined(parts: Sequence[Any]) -> Any:
     """Return the values of one field of several results as one value."""
     first = parts[0]
     if isinstance(first, bool):
-        return all(parts)
+        return all(parts)  # guarantees
+    # b_plane_t_rad, or an absent array: equal in all parts, which are of one scenario.
     if first is None or isinstance(first, float):
         return first
     if isinstance(first, tuple):

@@ -104,8 +104,11 @@ def _asked_images(scenario: Scenario, images_s: Sequence[float]) -> Iterator[Dif
         yield Difference(f"{sensor.table}.last_image_s", sensor.last_image_s, images_s[-1])
 
 
-def _asked_impulses(scenario: Scenario, impulses_s: Sequence[float]) -> Iterator[Difference]:
-    """Yield the impulses of the scenario, with their times in the schedule."""
+def _asked_impulses(scenario: Scenario, scheduled_s: Sequence[float]) -> Iterator[Difference]:
+    """Yield each time that the thruster's table asks for, and the time of its step.
+
+    `scheduled_s` are the times of all possible impulses.
+    """
     thruster = scenario.thruster
     arrival_s = scenario.nominal_arrival_s
     step_s = scenario.step_s
@@ -116,14 +119,14 @@ def _asked_impulses(scenario: Scenario, impulses_s: Sequence[float]) -> Iterator
 
     for time_s in thruster.impulses_s:
         yield nearest_step("impulses_s", time_s)
-    if impulses_s and thruster.first_impulse_s is not None:
-        yield Difference("thruster.first_impulse_s", thruster.first_impulse_s, impulses_s[0])
+    if scheduled_s and thruster.first_impulse_s is not None:
+        yield Difference("thruster.first_impulse_s", thruster.first_impulse_s, scheduled_s[0])
 
     last_s = thruster.last_impulse_s
-    if not last_s:
+    if not last_s:  # None and 0 are no cut-off.
         return
     yield nearest_step("last_impulse_s", last_s)
     if thruster.impulse_period_s is not None:
-        for periods in range(1, len(impulses_s)):
+        for periods in range(1, len(scheduled_s)):
             time_s = last_s + periods * thruster.impulse_period_s
             yield nearest_step("impulse_period_s", time_s)
