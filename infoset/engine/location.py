@@ -155,9 +155,10 @@ def bracket_found(label: float, last: int, past: Past) -> None:
 def locate_feasible_labels(
     b: int, limit_below: float, limit_above: float, sections: Sections, past: Past
 ) -> FeasibleLabels:
-    """Locate the feasible labels of an engagement within limits, from its stored labels.
+    """Locate the feasible labels of engagement `b` within limits, from its stored labels.
 
-    The sections at both ends are in the rows `LOWER` and `UPPER` of the workspace afterwards.
+    The limits, m, are the first and the last known label. If `exists`, the sections at both ends
+    are in the rows `LOWER` and `UPPER` of the workspace afterwards.
     """
     nothing = FeasibleLabels(False, limit_below, limit_below, limit_above, limit_above)
     if limit_below > limit_above:
@@ -180,6 +181,7 @@ def locate_feasible_labels(
             bracket_found(label, labels.last, past)
         lower = bracket[MIDDLE].label
         upper = lower
+    # The outer labels of the bracket are infeasible, or feasible limits whose sections are stored.
     resolution = LABEL_RESOLUTION * max(abs(limit_below), abs(limit_above))
     return narrow_ends(lower, upper, resolution, past)
 

@@ -570,10 +570,11 @@ class ConvexPolygons(ConvexSet):
         return intervals
 
     def reduce_outward(self, cap: int) -> ConvexPolygons:
-        """Return polygons of at most `cap` (>= 4) vertices that contain these.
+        """Return polygons of at most `cap` vertices that contain these up to rounding.
 
-        The sides whose removal adds the minimum area are removed first. O(n) for each side; new
-        vertices are rounded.
+        `cap` is at least 4: every convex polygon of five vertices has a side that can be removed, a
+        parallelogram has none. The sides whose removal adds the minimum area are removed first.
+        O(n) for each side; new vertices are rounded.
         """
         Limits(minimum=4, whole=True).need("cap", cap)
         return self._make(0, kernels.reduce_outward, np.int64(cap))

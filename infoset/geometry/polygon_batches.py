@@ -80,11 +80,11 @@ def cut(
 
 @compiled
 def linear_map(
-    vertices: Floats, counts: Integers, out: Floats, made: Integers, matrix: Floats
+    vertices: Floats, counts: Integers, out: Floats, made: Integers, matrices: Floats
 ) -> None:
-    """Images under matrices."""
+    """Image of polygon i under matrix i; `matrices` has the shape (B, 2, 2)."""
     for i in range(counts.size):
-        m = matrix[i]
+        m = matrices[i]
         made[i] = polygon.map_linearly(
             vertices[i], counts[i], m[0, 0], m[0, 1], m[1, 0], m[1, 1], out[i]
         )

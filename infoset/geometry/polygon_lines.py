@@ -262,9 +262,11 @@ def difference(points: Points, count: int, other: Points, other_count: int, out:
 
 @compiled
 def write_box_rows(a: Points, b: Points, rows: Floats) -> None:
-    """Write the sides of the bounding box of a, moved inward by the extent of b.
+    """Write the first four rows of a difference a - b: the sides of the bounding box of a.
 
-    They close the difference if a is a segment or a point.
+    They are the sides in the directions x, -x, y and -y, moved inward by the extent of b. They
+    bound the difference if a is a segment or a point. `rows`, shape (k, 3, L >= 2), are zero
+    before.
     """
     made = 0
     for axis in range(2):

@@ -32,8 +32,8 @@ _OPTIONS = HIGHS | {"presolve": False}
 half the time.
 """
 _NO_ROW = 128.0 * UNSURE
-"""Length of a row of a strip, relative to its terms, below which it is the rounding errors of its
-products: 512 of them.
+"""Largest entry of a row, relative to the terms of its products, up to which the row is rounding:
+512 spacings of floats, chosen.
 """
 
 
@@ -100,10 +100,13 @@ class Stage:
 
 
 class _Rows(NamedTuple):
-    """Strips of a stage in the program: their numbers, and the lengths that divide their rows."""
+    """Strips of a stage in the program: their numbers, and the largest entries of their rows.
+
+    The rows are divided by these entries.
+    """
 
     strips: Integers
-    lengths: Floats
+    largest: Floats
 
 
 class _State(NamedTuple):
@@ -266,7 +269,7 @@ class Program:
         for stage, rows in zip(self._stages, self._lines.strips, strict=True):
             end = start + len(rows.strips)
             m = np.zeros(len(stage.normals))
-            m[rows.strips] = marginals[start:end] / rows.lengths
+            m[rows.strips] = marginals[start:end] / rows.largest
             multipliers.append(m)
             start = end
         return multipliers
@@ -299,7 +302,7 @@ class _Builder:
         self._levels = list[Floats]()
         self._strips = _Table()
         self._ends = list[Floats]()
-        self._numbers = list[_Rows]()
+        self._rows = list[_Rows]()
 
     def add_unknowns(self, count: int, least: float, most: float) -> int:
         """Add unknowns between two limits; return the number of the first one."""
@@ -328,18 +331,21 @@ class _Builder:
         return _State(np.zeros(len(units)), np.diag(units), first)
 
     def add_strips(self, stage: Stage, state: _State) -> None:
-        """Add the rows of the strips of a stage, each one divided by its largest number."""
+        """Add the rows of the strips of a stage, each divided by its largest entry.
+
+        Rows that are only rounding are left out.
+        """
         matrix = stage.normals @ state.matrix
-        lengths = np.abs(matrix).max(axis=1, initial=0.0)
+        largest = np.abs(matrix).max(axis=1, initial=0.0)
         # A row of rounding errors would be a constraint on unknowns that do not enter it.
-        used = np.flatnonzero(lengths > _NO_ROW * (np.abs(stage.normals) @ stage.sizes))
-        rows = _Rows(used, lengths[used])
-        self._numbers.append(rows)
-        self._strips.add(matrix[used] / rows.lengths[:, None], state.first)
+        used = np.flatnonzero(largest > _NO_ROW * (np.abs(stage.normals) @ stage.sizes))
+        rows = _Rows(used, largest[used])
+        self._rows.append(rows)
+        self._strips.add(matrix[used] / rows.largest[:, None], state.first)
 
         heights = stage.normals @ state.offset
         ends = np.column_stack([stage.lower, stage.upper]) - heights[:, None]
-        self._ends.append(ends[used] / rows.lengths[:, None])
+        self._ends.append(ends[used] / rows.largest[:, None])
 
     def lines(self, state: _State) -> _Lines:
         """Return the program: normal . x of a strip is an unknown within its ends."""
@@ -349,7 +355,7 @@ class _Builder:
         rows = sp.block_array([strips, equations])
         levels = np.concatenate([np.zeros(count), *self._levels])
         limits = np.vstack([*self._limits, *self._ends])
-        return _Lines(rows.tocsr(), levels, limits, self._numbers, state)
+        return _Lines(rows.tocsr(), levels, limits, self._rows, state)
 
 
 def _lines_of(stages: Sequence[Stage], at: int) -> _Lines:

@@ -346,7 +346,9 @@ class Polytopes:
     def predicted(self, motion: Motion) -> Polytopes:
         """Return the sets after a step; raise ArithmeticError if one has too many vertices."""
         w = motion.disturbance
-        shape = (len(self.members), len(motion.matrix))
+        shape = (len(self.members), len(motion.matrix))  # (B, n)
+        # The centre of a zonotope is part of the shift: `RunPolytope.predicted` adds its generators
+        # only. A polytope is added where it is.
         centre = w.centre if isinstance(w, Zonotope) else np.zeros(shape[1])
         shifts = np.broadcast_to(motion.shifts + centre, shape)
         terms = np.broadcast_to(motion.terms + sizes_of(w), shape)

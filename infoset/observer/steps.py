@@ -366,12 +366,13 @@ def update_all(sets: Batch, strips: Strips, excess: Floats, out: Batch) -> None:
 
 @compiled
 def cut_to_preimage(sets: Batch, later: Batch, matrix: Floats, out: Batch) -> None:
-    """Write the points x of each polygon for which matrix x is in a later polygon.
+    """Write the points x of each polygon for which matrix x is in the polygon of `later`.
 
-    The result has at most four vertices more than both. The half-planes of the later polygon are
-    enlarged by `CUT_SLACK` times the terms of a height. The level of each one is the maximum height
-    of all vertices, so that the half-plane of an edge of a few ulp with a wrong direction contains
-    the set. Half-planes along the axes bound the set at sharp tips, which such edges leave open.
+    That is the polygon with the same index. The result has at most four vertices more than the two
+    polygons together. The half-planes of the later polygon are enlarged by `CUT_SLACK` times the
+    sizes of the products whose sum is a height. The level of each one is the maximum height of all
+    vertices, so that the half-plane of an edge of a few ulp with a wrong direction contains the
+    set. Half-planes along the axes bound the set at sharp tips, which such edges leave open.
     """
     for b in range(sets.counts.size):
         out.counts[b] = 0
@@ -387,6 +388,7 @@ def cut_to_preimage(sets: Batch, later: Batch, matrix: Floats, out: Batch) -> No
         other_x, other_y = reach(other, sides)
         terms_x = max(other_x, abs(matrix[0, 0]) * x + abs(matrix[0, 1]) * y)
         terms_y = max(other_y, abs(matrix[1, 0]) * x + abs(matrix[1, 1]) * y)
+        # Sides -4 to -1 of `normal_of_side` are the four directions along the axes.
         for i in range(-4, sides):
             normal_x, normal_y = normal_of_side(other, sides, i)
             top = polygon.support_index(other, sides, normal_x, normal_y)
