@@ -424,6 +424,9 @@ class _Dual:
     def _expand(self, sampled: Sequence[_Samples], point: Floats) -> _Expansion:
         """Return the negative dual and its derivatives at a point.
 
+        One of `sampled` belongs to each arc. The value is infinite for a point that is NaN or
+        beyond `_FARTHEST` (the basis is orthonormal), so that Newton's step is halved.
+
         Raises
         ------
         BoundTooSmallError
@@ -432,7 +435,8 @@ class _Dual:
         if not np.linalg.norm(point) <= _FARTHEST * np.linalg.norm(np.concatenate(self.goals)):
             return _Expansion(np.inf, np.full(point.shape, np.inf), np.eye(len(point)))
 
-        # `gained` exceeds `most` only if no control has the effects (problem of moments).
+        # gained = sum w y . d, most = sum w u_max int |s| dt: if gained > most, no bounded control
+        # has the effects d (problem of moments).
         value = 0.0
         most = 0.0
         gained = 0.0
@@ -526,9 +530,10 @@ def _effect(samples: _Samples, control: Floats) -> Floats:
 
 
 def _curvature(samples: _Samples, wanted: Floats, sizes: Floats, max_m_s2: float) -> Floats:
-    """Second derivatives of int h(|s|) dt, shape (c, c).
+    """Second derivatives of int h(|s|) dt by the whitened effort y, shape (c, c).
 
-    The second derivative of h is I inside the bound, and u_max (I - s s' / |s|^2) / |s| beyond it.
+    `wanted`, shape (k, 3), is s = effects' y at the nodes, and `sizes`, shape (k,), is |s|. The
+    second derivative of h is I inside the bound, and u_max (I - s s' / |s|^2) / |s| beyond it.
     """
     inside = sizes <= max_m_s2
     share = np.where(inside, 1.0, max_m_s2 / np.maximum(sizes, max_m_s2))

@@ -36,7 +36,7 @@ from infoset.rendezvous.pursuit_evasion.steering import Policy
 MAX_HAMILTONIAN_DRIFT = 1e-8
 """Relative: the Hamiltonian is constant to the errors of propagation, ten times `MAX_RESIDUAL`."""
 MAX_INTEGRATOR_GAP = 1e-7
-"""In units of length: metres of a geostationary orbit."""
+"""In units of length: some 4 m in a geostationary orbit. Chosen."""
 MAX_GAIN_S = 1e-2
 """Difference of capture times by which a deviation must be better: above their rounding."""
 MAX_EXCESS = 1e-6
@@ -327,9 +327,10 @@ def _along(paths: tuple[ExtremalPath, ExtremalPath], node: Node) -> tuple[float,
 
 
 def _integrator_gap(pursuer: ExtremalCraft, evader: ExtremalCraft, node: Node) -> float:
-    """Integrate both forward by a multistep method, and return the distance of the ends.
+    """Return the distance of a second integrator's ends from those in `node`, in units of length.
 
-    The initial values are the states and costates at the start.
+    LSODA integrates both craft forward, from their states and costates at the start. The result is
+    the larger of the two distances.
     """
     gaps = []
     for craft, costate, end in zip(

@@ -154,7 +154,11 @@ def _rates(matrices: Floats) -> Floats:
 
 @lru_cache(maxsize=1)
 def _gauss_collocation() -> tuple[Floats, Floats, Floats]:
-    """Nodes and weights on [0, 1], and integrals of Lagrange polynomials from 0 to each node."""
+    """Nodes and weights on [0, 1], shape (8,), and integrals, shape (8, 8).
+
+    Integral [j, k] is that of the Lagrange polynomial of node k from 0 to node j. The arrays are
+    cached: do not write to them.
+    """
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
 
     values = np.polynomial.legendre.legvander(nodes, NODES - 1)
