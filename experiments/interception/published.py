@@ -21,7 +21,9 @@ from infoset.sim.parallel import Task
 PAPER = "interception"
 MANY, SINGLE = OF_PAPER
 ONE_RUN = "section 8, one run"
-"""Miss and impulse of the two engagements from z = -8 km, without a range sensor."""
+"""Miss and impulse of the two engagements from `ONE_RUN_START`, without a range sensor."""
+ONE_RUN_START = "z = \N{MINUS SIGN}8 km"
+"""Start of these engagements, as text for a legend."""
 RUNS = 200
 """Number of runs of a curve of figure 4, and of one engagement with random errors."""
 

@@ -16,8 +16,12 @@ from infoset.sim.results import from_columns
 FORMAT = "infoset-results-1"
 """Value of the key ``format`` of a file of results; another number means other keys."""
 MAX_FILE_BYTES = 1 << 28
-"""About 500 000 runs; larger samples are campaigns, which have files of their own."""
+"""Maximum size of a file that `load_results` reads, about 500 000 runs; `save` does not check it.
+
+Larger samples are campaigns, which have files of their own.
+"""
 KEYS = ("format", "guarantees", "b_plane_t_rad", "burns_m_s", "columns")
+"""Keys of a file of results: exactly those that `save` writes."""
 
 
 def save(

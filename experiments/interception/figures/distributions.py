@@ -22,6 +22,7 @@ from infoset.experiments.common.figure_style import (
 )
 from infoset.experiments.common.screen import some_runs
 from infoset.experiments.interception.figures.shared import RADIUS
+from infoset.experiments.interception.published import ONE_RUN_START
 from infoset.experiments.interception.study import Curve
 from infoset.sim import empirical_distribution
 
@@ -70,8 +71,10 @@ def draw_distributions(
 ) -> Figure:
     """Draw the distribution functions of the curves of the experiment with `draw_samples`.
 
-    `printed` are the miss, m, and the impulse, m/s, of the run that the paper prints for a noise;
-    if `numbered`, the curves have their numbers in the paper's figure 4.
+    `radius_m` is the body's radius, a line. `printed` are the miss, m, and the impulse, m/s, of the
+    run that the paper prints for a noise (`published.ONE_RUN`): without a range sensor, from
+    `ONE_RUN_START`. They are marks in the colour of the curve of this noise without that sensor. If
+    `numbered`, the curves have their numbers in the paper's figure 4.
     """
     samples = []
     runs = []
@@ -85,7 +88,7 @@ def draw_distributions(
         )
         if printed and curve.noise in printed and not curve.range_sensor:
             miss_m, impulse_m_s = np.array(printed[curve.noise])[:, None]
-            title = f"printed: one run from z = \N{MINUS SIGN}8 km, {curve.noise} noise"
+            title = f"printed: one run from {ONE_RUN_START}, {curve.noise} noise"
             runs.append(
                 Sample(title, {"color": CURVE_LOOKS[curve.number]["color"]}, miss_m, impulse_m_s)
             )

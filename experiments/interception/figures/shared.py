@@ -27,6 +27,11 @@ _MORE_TICKS_S = (0.1, 10.0, 10.0 * SECONDS["min"], 6.0 * SECONDS["h"], 10.0 * SE
 """Ticks that have a label only in a short flight: in a long one the labels would overlap."""
 _LONG = 1000.0
 """Ratio of the first and the last time from which a flight is long."""
+_BEFORE_START = 1.1
+"""Start of the axis, by the first time: a margin, so that the first points are not on its edge.
+
+Chosen.
+"""
 _MIN_DISC = 0.02
 """Share of the axes below which the disc of a body is not drawn.
 
@@ -105,9 +110,10 @@ def draw_impulses(axes: Axes, times: Any, sizes: Any, **look: Any) -> None:
 
 
 def count_down(column: Sequence[Axes], scenario: Scenario) -> None:
-    """Make the time axis of a column of axes logarithmic in the time before the arrival.
+    """Make the time axes of a column logarithmic in the time to go, decreasing to the right.
 
-    The times of the schedule are drawn as vertical lines.
+    It is the time before the nominal arrival. The times of the schedule (`marks`) are drawn as
+    vertical lines. In a long flight `_MORE_TICKS_S` are minor ticks without labels.
     """
     begin_s = scenario.nominal_arrival_s
     end_s = min_to_go_s(scenario)
@@ -119,7 +125,7 @@ def count_down(column: Sequence[Axes], scenario: Scenario) -> None:
 
     for axes in column:
         axes.set_xscale("log")
-        axes.set_xlim(1.1 * begin_s, end_s)
+        axes.set_xlim(_BEFORE_START * begin_s, end_s)
         axes.xaxis.set_major_locator(FixedLocator(ticks))
         axes.xaxis.set_minor_locator(FixedLocator(more))
         axes.xaxis.set_major_formatter(FuncFormatter(lambda tick, _: duration_text(tick)))
