@@ -30,6 +30,8 @@ class LineOfSight:
 
     Parameters
     ----------
+    step : int
+        Number of the step.
     alpha_rad, omega_rad_s : ndarray, shape (C, B)
         True line-of-sight angles atan2(z, x), in space atan2(y, x) and atan2(z, x), rad, and their
         rates, rad/s.
@@ -64,7 +66,9 @@ class LineOfSight:
 def checked_measurements(
     measured: Measurements, sight: LineOfSight, noise: object
 ) -> dict[str, Floats]:
-    """Return the measurements of a noise as arrays; `real_array` describes the errors in numbers.
+    """Return the measurements of a noise as arrays.
+
+    Numbers that are not real or not finite raise as in `real_array`.
 
     Raises
     ------

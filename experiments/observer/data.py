@@ -91,7 +91,11 @@ def _signs(errors: Errors, shape: tuple[int, ...], generator: np.random.Generato
 
 
 def _point(shape: Set, errors: Errors, generator: np.random.Generator) -> Floats:
-    """Return a random point of a set; an extreme point for extremal errors."""
+    """Return a random point of a set, not uniform in it.
+
+    For extremal errors it is a vertex, or for a zonotope the centre with each generator added or
+    subtracted, which need not be a vertex.
+    """
     if isinstance(shape, Zonotope):
         return np.asarray(
             shape.centre + _signs(errors, (len(shape.generators),), generator) @ shape.generators
