@@ -33,6 +33,10 @@ It is far above the rounding of a range, 1e-16 of the label, and far below a ran
 
 _APPROACH = Limits(below=0.0)
 _SECTIONS = Limits(minimum=1, maximum=MAX_SECTIONS, whole=True)
+_WRONG_IMAGES = Limits(minimum=0, maximum=3, whole=True)
+_IMAGE_CLASSES = Limits(minimum=3, maximum=16, whole=True)
+MAX_SETS = 64
+"""Maximum number C(G, q) of sets of an engagement: 3 wrong images and 8 classes give 56."""
 
 
 class Model(Enum):
@@ -161,6 +165,12 @@ class SetSettings:
         If fewer sections are left, replay makes a new grid of 2 fewest_sections + 1.
     recovery : Recovery
         Treatment of a set that a measurement leaves empty.
+    wrong_images : int
+        Maximum number q of images of a flight whose errors may be arbitrary. Only in the guaranteed
+        model, and without a sensor of rates.
+    image_classes : int or None
+        Number G of classes into which the images are dealt if some may be wrong; None is 2q + 2.
+        There are C(G, q) sets. More classes make the guaranteed miss smaller.
     range_threshold_m : float
         Hypotheses whose range is about to fall below this value eps leave the set, m.
     disturbance_m_s2 : float
@@ -181,6 +191,8 @@ class SetSettings:
     sections: Annotated[int, _SECTIONS] = 29
     fewest_sections: Annotated[int, _SECTIONS] = 5
     recovery: Recovery = Recovery.WIDENED
+    wrong_images: Annotated[int, _WRONG_IMAGES] = 0
+    image_classes: Annotated[int, _IMAGE_CLASSES] | None = None
     range_threshold_m: NotNegative = 0.0
     disturbance_m_s2: NotNegative = 0.0
     disturbance_y_m_s2: NotNegative | None = None
@@ -200,6 +212,39 @@ class SetSettings:
                 'contain all possible starts, as model = "guaranteed" must; leave initial_set out, '
                 'or write model = "paper"'
             )
+
+        self._check_wrong_images()
+
+    def _check_wrong_images(self) -> None:
+        """Check that wrong images fit the model and the number of classes."""
+        if self.wrong_images == 0:
+            if self.image_classes is not None:
+                raise ValueError(
+                    "image_classes belongs to wrong_images, which is 0: leave image_classes out, "
+                    "or set wrong_images"
+                )
+            return
+        if not self.is_guaranteed:
+            raise ValueError(
+                'wrong_images must be 0 in model = "paper", which guarantees nothing: got '
+                f"{self.wrong_images}"
+            )
+        if self.classes < self.wrong_images + 2:
+            raise ValueError(
+                f"image_classes must be at least {self.wrong_images + 2}, two more than "
+                f"wrong_images: got {self.classes}"
+            )
+        sets = math.comb(self.classes, self.wrong_images)
+        if sets > MAX_SETS:
+            raise ValueError(
+                f"image_classes must give at most {MAX_SETS} sets: {self.classes} classes with "
+                f"{self.wrong_images} wrong images give {sets}"
+            )
+
+    @property
+    def classes(self) -> int:
+        """Number G of classes of images."""
+        return 2 * self.wrong_images + 2 if self.image_classes is None else self.image_classes
 
     @property
     def is_guaranteed(self) -> bool:

@@ -14,8 +14,10 @@ from infoset.guidance import NoiseKind, TieRule
 from infoset.sim.covariance import Covariance
 from infoset.sim.gravity import max_impulses_m_s, with_gravity
 from infoset.sim.scenario import Scenario, corners
+from infoset.sim.wrong_images import draw_wrong_images
 
 START, TIE, EXECUTION, TARGET, POINTING, BIAS, IMAGES = 0, 3, 5, 6, 7, 8, 9
+WRONG_IMAGES = 11
 """Streams of a run; each kind of sensor has a separate one (`Sensor.stream`). Their numbers are
 never changed or used again: runs of a seed would change.
 """
@@ -56,6 +58,9 @@ class Draws:
     images : ndarray, shape (B, steps), or None
         Uniform in [0, 1); an image is lost if its number is less than the probability of a loss.
         None loses no image.
+    wrong : ndarray, shape (C, B, steps), or None
+        Errors of wrong images in units of their bounds, zero for other images; None has no wrong
+        image.
     redraws : ndarray of int, shape (B,), or None
         Normal starts outside the dispersion that were drawn again; None for uniform starts.
     """
@@ -69,6 +74,7 @@ class Draws:
     pointing: Floats | None = None
     bias: Floats | None = None
     images: Floats | None = None
+    wrong: Floats | None = None
     redraws: Integers | None = None
 
     @property
@@ -122,7 +128,32 @@ def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
         pointing=uniform(POINTING) if thruster.pointing_error_rad > 0.0 else None,
         bias=lateral(BIAS, 1)[..., 0] if camera.has_constant_bias else None,
         images=images,
+        wrong=_wrong_images(scenario, runs, seed, steps),
         redraws=starts.redraws,
+    )
+
+
+def _wrong_images(scenario: Scenario, runs: Sequence[int], seed: int, steps: int) -> Floats | None:
+    """Return the errors of wrong images, shape (C, B, steps); None without any."""
+    wrong = scenario.wrong_images
+    if wrong is None or wrong.number == 0:
+        return None
+
+    model = scenario.set_model
+    camera = scenario.bearing_sensor
+    every = model.steps_in(camera.period_s)
+    before_s: Floats = scenario.nominal_arrival_s - model.step_s * np.arange(float(steps))
+    for step, before in enumerate(before_s.tolist()):
+        if step % every != 0 or not camera.measures_at(before):
+            before_s[step] = np.nan
+
+    axes = len(model.axes)
+    return np.stack(
+        [
+            draw_wrong_images(wrong, before_s, axes, generator(seed, run, WRONG_IMAGES))
+            for run in runs
+        ],
+        axis=1,
     )
 
 

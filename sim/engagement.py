@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset.arrays import Flags, Floats
+from infoset.covered_set import information_set
 from infoset.engine.predicted_miss import PredictedMiss
 from infoset.guidance import (
     MeasurementNoise,
@@ -20,8 +21,8 @@ from infoset.guidance.noise import NoiseSource
 from infoset.guidance.noise_registry import NoiseBatch, make_noise
 from infoset.guidance.strategy import checked_impulses
 from infoset.guidance.thruster import modulus
-from infoset.information_set import InformationSet, InformationSetView
-from infoset.sensors import Measurements
+from infoset.information_set import InformationSetView
+from infoset.sensors import BearingSensor, Measurements
 from infoset.set_queries import MaskedFloats, MaskedIntegers
 from infoset.sim.closed_form import worst_shift_m
 from infoset.sim.draws import Draws
@@ -108,7 +109,7 @@ class Engagements:
         self._strategy = strategy or make_strategy(scenario.strategy)
         self._state = self._strategy.start(lateral)
 
-        self._information = InformationSet(model, batch, guarantee=guarantee)
+        self._information = information_set(model, batch, guarantee=guarantee)
         self._view = self._information.view()
         self._truth_section = TruthSection(model, batch)
         self._label_ends = LabelEnds(model, batch)
@@ -224,9 +225,24 @@ class Engagements:
             for name, sensor in measured.sensors.items():
                 if name in values:
                     sensor.cut(self._information, values, where)
-                    sensor.cut(self._truth_section, values, where)
+                    counts = where & self._cuts_truth_section(name)
+                    sensor.cut(self._truth_section, values, counts)
             self._truth_section.store_state(where, sight)
         return measured.values
+
+    def _cuts_truth_section(self, sensor: str) -> Flags:
+        """Return where a measurement of this step cuts the section of the true state, shape (B,).
+
+        A wrong image does not: the section is that of the set that uses no wrong image. There is no
+        such set if more images are wrong than the model allows for.
+        """
+        wrong = self._draws.wrong
+        everywhere = np.ones(self._information.batch, dtype=bool)
+        if wrong is None or sensor != BearingSensor.name:
+            return everywhere
+        is_wrong = (wrong != 0.0).any(axis=0)
+        has_sound_set = is_wrong.sum(axis=1) <= self._model.wrong_images
+        return np.asarray(~(is_wrong[:, self.step] & has_sound_set))
 
     def _decide(
         self, miss: PredictedMiss, measured: Measurements, pending: Pending, tracking: Flags

@@ -15,6 +15,7 @@ from infoset.sim.draws import Draws
 from infoset.sim.impulse_queue import Pending
 from infoset.sim.kepler import Sight
 from infoset.sim.scenario import Scenario
+from infoset.sim.wrong_images import wrong_angles
 
 
 class Cut(NamedTuple):
@@ -105,6 +106,11 @@ class Instruments:
         )
         values = self._noise.measure(asked, information)
         measured = checked_measurements(values, asked, self._noise)
+        wrong = self._draws.wrong
+        camera = BearingSensor.name
+        if wrong is not None and camera in measured:
+            angles = wrong_angles(due[camera], asked, measured[camera], wrong[..., step])
+            measured[camera] = angles
         if self._draws.images is not None and BearingSensor.name in measured:
             seen = self._draws.images[:, step] >= self._image_loss
             return self._with_lost_images(due, measured, seen, tracking)

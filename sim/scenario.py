@@ -30,6 +30,7 @@ from infoset.limits import (
 from infoset.model import SetModel, SetSettings, StateBox
 from infoset.sensors import AngleSensor, BearingSensor, Camera, RangeSensor, RateSensor, Sensor
 from infoset.sim.covariance import Covariance
+from infoset.sim.wrong_images import WrongImages
 
 LIGHT_M_S = 299_792_458.0
 """Speed of light, m/s: exact, by the definition of the metre."""
@@ -185,6 +186,8 @@ class Scenario:
         Choices of the information set.
     sun : Sun or None
         None is free space.
+    wrong_images : WrongImages or None
+        Images with errors beyond their bound in the simulated flights; None has none.
     target : Target or None
         A target that manoeuvres; None does not.
     body : Body or None
@@ -215,6 +218,7 @@ class Scenario:
     camera: Camera | None = None
     range_sensor: RangeSensor | None = None
     rate_sensor: RateSensor | None = None
+    wrong_images: WrongImages | None = None
     target: Target | None = None
     body: Body | None = None
     thruster: Thruster
@@ -233,6 +237,11 @@ class Scenario:
         if self.information_set.is_guaranteed:
             _ = self.set_model.label_limits_m
         self._check_lengths()
+        if self.information_set.wrong_images and self.rate_sensor is not None:
+            raise ValueError(
+                "information_set.wrong_images must be 0 with a rate_sensor, for which there is no "
+                f"proof: got {self.information_set.wrong_images}"
+            )
 
     def _check_lengths(self) -> None:
         """Check the number of steps, the distance of the Sun and the radius of the body."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 import warnings
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -190,6 +191,8 @@ def _engagements_at_once(scenario: Scenario) -> int:
     The sections of a batch must fit into the processor's cache, its history into memory (500 000
     times 600 bytes are 300 MB).
     """
-    by_sections = SECTIONS_AT_ONCE // scenario.set_model.sections
+    model = scenario.set_model
+    sets = math.comb(model.classes, model.wrong_images)
+    by_sections = SECTIONS_AT_ONCE // (model.sections * sets)
     by_steps = STEPS_AT_ONCE // max_number_of_steps(scenario)
     return max(1, min(ENGAGEMENTS_AT_ONCE, by_sections, by_steps))

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from infoset.arrays import Floats
+from infoset.covered_set import information_set
 from infoset.experiments.common.errors import InputError, input_errors, on_a_screen
 from infoset.experiments.common.input_file import read_input
 from infoset.experiments.common.output import write_file
@@ -249,7 +250,7 @@ def replayed(
     from measurements and impulses, arrays as in `Record`, and equals the set of the engagement bit
     for bit if the versions of the packages are the same.
     """
-    information = InformationSet(on_board_model(scenario), guarantee=False)
+    information = information_set(on_board_model(scenario), guarantee=False)
     is_known = {
         name: np.asarray(~np.isnan(values.reshape(len(values), -1)).any(axis=1))
         for name, values in measured.items()

@@ -1,0 +1,83 @@
+"""Wrong images of simulated flights: which ones, and by how much."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from infoset.arrays import Floats
+from infoset.limits import Checked, Limits, NotNegative
+from infoset.sensors import Sensor
+from infoset.sensors.sensor import Geometry
+
+MAX_NUMBER = 1000
+MAX_ANGLE_RAD = 1.5
+"""Maximum size of a wrong angle: less than a right angle, which no camera sees."""
+_NUMBER = Limits(minimum=0, maximum=MAX_NUMBER, whole=True)
+_SIZE = Limits(minimum=1.0, maximum=1e6)
+
+
+@dataclass(frozen=True)
+class WrongImages(Checked):
+    """Images with errors beyond their bound in the simulated flights.
+
+    They are simulated whatever the set allows for: `wrong_images` of `[information_set]` is what
+    the set allows for.
+
+    Parameters
+    ----------
+    number : int
+        Number of wrong images of each flight.
+    size : tuple of float
+        Minimum and maximum error of a wrong image in units of its bound: the logarithm is uniform,
+        and the sign of each axis random.
+    when_s : tuple of float, or None
+        Interval of the times before the nominal arrival, s; None is the whole flight.
+    """
+
+    number: Annotated[int, _NUMBER]
+    size: Annotated[tuple[float, float], _SIZE] = (2.0, 100.0)
+    when_s: tuple[NotNegative, NotNegative] | None = None
+
+
+def draw_wrong_images(
+    wrong: WrongImages, before_arrival_s: Floats, axes: int, random: np.random.Generator
+) -> Floats:
+    """Return the errors of the wrong images of one flight.
+
+    Parameters
+    ----------
+    before_arrival_s : ndarray, shape (steps,)
+        Time of the image of each step before the nominal arrival, s; NaN without an image.
+    axes : int
+        Number of lateral axes.
+
+    Returns
+    -------
+    ndarray, shape (axes, steps)
+        Errors in units of the bounds; zero for images that are not wrong.
+    """
+    earliest_s, latest_s = math.inf, -math.inf
+    if wrong.when_s is not None:
+        latest_s, earliest_s = wrong.when_s
+    possible = np.flatnonzero((before_arrival_s >= latest_s) & (before_arrival_s <= earliest_s))
+    steps = random.permutation(possible)[: wrong.number]
+    smallest, largest = wrong.size
+    logarithms = random.uniform(math.log(smallest), math.log(largest), size=(axes, len(steps)))
+    signs = np.where(random.uniform(size=(axes, len(steps))) < 0.5, -1.0, 1.0)
+    errors = np.zeros((axes, len(before_arrival_s)))
+    errors[:, steps] = signs * np.exp(logarithms)
+    return errors
+
+
+def wrong_angles(sensor: Sensor, sight: Geometry, measured: Floats, errors: Floats) -> Floats:
+    """Return measured angles, rad, with those of wrong images in place of the others.
+
+    `errors`, shape (C, B), are in units of the bounds, and zero for images that are not wrong.
+    """
+    is_wrong = (errors != 0.0).any(axis=0)
+    angles = np.clip(sensor.measured(sight, errors), -MAX_ANGLE_RAD, MAX_ANGLE_RAD)
+    return np.where(is_wrong, angles, measured)

@@ -1,0 +1,106 @@
+"""Flights with wrong images: the guarantee with at most q of them, and what happens with more."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from infoset import Model
+from infoset.experiments.interception.scenario_file import load_scenario
+from infoset.guidance import NoiseKind
+from infoset.sim import Results, Scenario
+from infoset.sim.draws import draw
+from infoset.sim.simulate import simulate_runs
+from infoset.sim.wrong_images import WrongImages, draw_wrong_images
+
+
+def scenario_of(name: str, allowed: int, number: int, noise: NoiseKind) -> Scenario:
+    """A scenario in the guaranteed model, from anywhere in the box of starts."""
+    scenario = load_scenario(name)
+    settings = replace(
+        scenario.information_set, model=Model.GUARANTEED, initial_set=None, wrong_images=allowed
+    )
+    return replace(
+        scenario,
+        dispersion=scenario.uncertainty,
+        information_set=settings,
+        noise=noise,
+        wrong_images=WrongImages(number, size=(1.05, 1000.0)),
+    )
+
+
+def flown(name: str, allowed: int, number: int, noise: NoiseKind, runs: int) -> Results:
+    return simulate_runs(scenario_of(name, allowed, number, noise), runs, seed=5)
+
+
+@pytest.mark.parametrize(
+    ("name", "allowed", "noise", "runs"),
+    [
+        ("asteroid-1997", 1, NoiseKind.RANDOM, 30),
+        ("asteroid-1997", 1, NoiseKind.GAME, 10),
+        ("asteroid-1997", 2, NoiseKind.RANDOM, 10),
+        ("asteroid-1997-space", 1, NoiseKind.RANDOM, 10),
+        pytest.param("asteroid-1997", 1, NoiseKind.RANDOM, 1800, marks=pytest.mark.thorough),
+        pytest.param("asteroid-1997", 1, NoiseKind.GAME, 400, marks=pytest.mark.thorough),
+        pytest.param("asteroid-1997", 2, NoiseKind.RANDOM, 400, marks=pytest.mark.thorough),
+        pytest.param("asteroid-1997-space", 1, NoiseKind.RANDOM, 500, marks=pytest.mark.thorough),
+        pytest.param("haiv-2013", 1, NoiseKind.RANDOM, 400, marks=pytest.mark.thorough),
+        pytest.param("dart-2022", 1, NoiseKind.RANDOM, 200, marks=pytest.mark.thorough),
+    ],
+)
+def test_miss_is_at_most_phi_in_every_flight_with_as_many_wrong_images_as_allowed(
+    name: str, allowed: int, noise: NoiseKind, runs: int
+) -> None:
+    results = flown(name, allowed, allowed, noise, runs)
+    assert not results.set_emptied.any()
+    assert results.truth_kept.all()
+    assert results.phi_held.count() == runs
+    assert results.phi_held.all()
+
+
+def test_set_that_allows_for_no_wrong_image_loses_its_bound_with_one() -> None:
+    results = flown("asteroid-1997", 0, 1, NoiseKind.RANDOM, 30)
+    assert results.set_emptied.sum() > 10
+
+
+def test_flight_with_more_wrong_images_than_allowed_ends() -> None:
+    results = flown("asteroid-1997", 1, 4, NoiseKind.RANDOM, 20)
+    assert np.isfinite(results.miss_m).all()
+    assert results.set_emptied.any()
+
+
+def test_flights_without_wrong_images_do_not_depend_on_the_table() -> None:
+    scenario = scenario_of("asteroid-1997", 1, 0, NoiseKind.RANDOM)
+    with_table = simulate_runs(scenario, 5, seed=0)
+    without = simulate_runs(replace(scenario, wrong_images=None), 5, seed=0)
+    np.testing.assert_array_equal(with_table.miss_m, without.miss_m)
+
+
+def test_wrong_images_are_images_in_the_interval_of_times() -> None:
+    before_s = np.array([5.0, np.nan, 4.0, 3.0, np.nan, 2.0, 1.0, 0.0])
+    wrong = WrongImages(3, size=(2.0, 4.0), when_s=(1.0, 4.0))
+    errors = draw_wrong_images(wrong, before_s, 2, np.random.default_rng(0))
+    changed = np.flatnonzero(errors.any(axis=0))
+    assert len(changed) == 3
+    assert set(changed) <= {2, 3, 5, 6}
+    assert (np.abs(errors[:, changed]) >= 2.0).all()
+    assert (np.abs(errors[:, changed]) <= 4.0).all()
+
+
+def test_wrong_images_of_a_run_do_not_depend_on_the_batch() -> None:
+    scenario = scenario_of("asteroid-1997", 1, 2, NoiseKind.RANDOM)
+    together = draw(scenario, [0, 1, 2], 0).wrong
+    alone = draw(scenario, [2], 0).wrong
+    assert together is not None
+    assert alone is not None
+    np.testing.assert_array_equal(together[:, 2], alone[:, 0])
+
+
+def test_wrong_images_with_a_rate_sensor_are_refused() -> None:
+    from infoset import RateSensor
+
+    scenario = scenario_of("asteroid-1997", 1, 0, NoiseKind.RANDOM)
+    with pytest.raises(ValueError, match="wrong_images must be 0 with a rate_sensor"):
+        replace(scenario, rate_sensor=RateSensor(1.0, 1e-6))
