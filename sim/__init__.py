@@ -22,6 +22,7 @@ from infoset.sim.statistics import (
 )
 from infoset.sim.stopping_rule import QuantileName, StoppingRule
 from infoset.sim.storage import Axis
+from infoset.sim.wrong_images import WrongImages
 
 __all__ = [
     "Axis",
@@ -51,6 +52,7 @@ __all__ = [
     "Sun",
     "Target",
     "WorstEngagement",
+    "WrongImages",
     "empirical_distribution",
     "estimate_hits",
     "estimate_quantiles",
