@@ -18,7 +18,7 @@ class ManoeuvreState:
     """State of predictive guidance.
 
     `due_s`, shape (C, B), is the time to go at which the next manoeuvre begins, s; infinite before
-    the first estimate.
+    the first step in which an impulse can be decided.
     """
 
     estimator: KalmanBank
@@ -33,15 +33,16 @@ class Predictive(Checked):
     ----------
     spacing : float
         The ratio of the times to go of two manoeuvres in a row, greater than 1, if the engine has
-        no scheduled times.
+        no scheduled times. The default was chosen on runs with seed 11 (docs/strategies.md).
 
     Notes
     -----
     The impulse is k = m / tau, with the estimated miss m and the time to go tau. If the engine has
     scheduled times (`Thruster.impulses_s`), each of them corrects the whole miss. Otherwise the
-    manoeuvres begin at the times to go T/s, T/s^2, ..., with the estimated time T from the start to
-    the arrival, and at the last time that the engine allows. A manoeuvre that is greater than the
-    maximum impulse of the engine continues in the next steps.
+    first manoeuvre begins at the time to go T/s, with T estimated at the first step in which the
+    engine can give an impulse, and each further one at 1/s of the time to go at which the one
+    before ended. One also begins at the last time that the engine allows. A manoeuvre that is
+    greater than the maximum impulse of the engine continues in the next steps.
 
     After a manoeuvre, its miss is the error of its estimate. With independent errors of angles this
     falls in proportion to the time to go, or faster, so geometric times make the impulses after the

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -116,15 +117,19 @@ def _best(
 ) -> BestOrder:
     """Return the best visits; an order or times that are not free are those of the file.
 
-    If the order is free and the times are not, the times of the file are sorted by size.
+    If the order is free and the times are not, the times of the file are sorted by size. If the
+    times are free, those of the file are only a start of the search.
     """
     tour = problem.tour
     order = tuple(range(len(problem.target)))
     guesses = [] if problem.times_s is None else [np.sort(problem.times_s)]
     if order_is_free and times_are_free:
         return best_order(tour, problem.limits(), guesses, progress=progress)
+    price_per_s = 0.0 if problem.times is None else problem.times.price_per_s
     if order_is_free:
-        return best_order_of_slots(tour, guesses[0], progress=progress)
+        # The times are given, and with them the price: it does not change the best order.
+        best = best_order_of_slots(tour, guesses[0], progress=progress)
+        return replace(best, objective=best.objective + price_per_s * float(guesses[0][-1]))
     if times_are_free:
         timed = best_times(tour, order, problem.limits(), guesses, progress=progress)
         return BestOrder(
@@ -137,7 +142,6 @@ def _best(
         )
     assert problem.times_s is not None
     path = tour.fly(order, problem.times_s)
-    price_per_s = 0.0 if problem.times is None else problem.times.price_per_s
     objective = path.cost + price_per_s * float(problem.times_s[-1])
     return BestOrder(order, path, objective, nodes=1, evaluations=1)
 

@@ -36,7 +36,7 @@ once in eight steps, which makes an engagement 5 to 10 % faster (docs/measured/p
 TAKEN = 0
 """Index in the rings of the number of floats in use; rings that were replaced remain in use."""
 LINE = 8
-"""Floats in a cache line of 64 bytes."""
+"""Floats in a cache line of 64 bytes. A ring is one line longer than its vertices."""
 FIRST_RING = LINE
 """Index in the rings of the first ring."""
 

@@ -56,7 +56,7 @@ class SectionLaw(NamedTuple):
         Whether the initial set is the paper's rectangle in (omega, alpha). Otherwise it is the box.
     linear_band : bool
         Whether the band of an angle is made linear in the range, because the exact one is not
-        concave.
+        concave: a camera, or in the guaranteed model an error bound that rises with the range.
     other_error_at_zero_range, other_error_slope : float
         Error bound of the angle of the other axis; zero in a plane.
     pointing_along, pointing_across : float

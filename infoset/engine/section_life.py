@@ -152,9 +152,9 @@ def slope_band(
 
     By (8) they are the tangents of alpha -+ b(x), where b(x) is the error bound of the label (Lemma
     1, part 4); infinite beyond a right angle, and lower > upper (an empty band) where b < 0. The
-    paper's model takes the angles in place of their tangents. `law.linear_band` (a camera, or a
-    bound that rises with the range) takes the wider band (21); only it uses `across` and
-    `travelled`.
+    paper's model takes the angles in place of their tangents. `law.linear_band` takes
+    `linear_slope_band`: in the guaranteed model the wider band (21), in the paper's model alpha -+
+    b(x) as here. Only (21) uses `across` and `travelled`.
 
     `alpha` and `across` are the angles of this axis and of the other one, rad. `travelled` is the
     decrease of the range since the start, m, the same for all labels.

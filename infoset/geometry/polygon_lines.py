@@ -22,7 +22,11 @@ FAR = 1e70
 It is far above 1e60, the maximum of all numbers, and products of three numbers stay finite.
 """
 BOX_SIDES = 4
-"""Number of lines of this box, the first ones of all."""
+"""Number of sides of a box along the axes.
+
+They are the first lines of an intersection (the box `FAR`) and the first rows of a difference (the
+bounding box).
+"""
 UNBOUNDED = -1
 """Number of vertices of an unbounded set."""
 LONGEST = 16
@@ -264,9 +268,9 @@ def difference(points: Points, count: int, other: Points, other_count: int, out:
 def write_box_rows(a: Points, b: Points, rows: Floats) -> None:
     """Write the first four rows of a difference a - b: the sides of the bounding box of a.
 
-    They are the sides in the directions x, -x, y and -y, moved inward by the extent of b. They
-    bound the difference if a is a segment or a point. `rows`, shape (k, 3, L >= 2), are zero
-    before.
+    They are the sides in the directions x, -x, y and -y, moved inward by the extent of b.
+    Every difference needs them: `write_side_row` writes no side along an axis, and a segment or a
+    point has no other bounds. `rows`, shape (k, 3, L >= 2), are zero before.
     """
     made = 0
     for axis in range(2):

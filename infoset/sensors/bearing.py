@@ -21,9 +21,10 @@ from infoset.sensors.sensor import Apart, Cuttable, Geometry, Measurements, Sens
 RangeOrRanges = TypeVar("RangeOrRanges", float, Floats)
 
 NEGLIGIBLE_ERROR_RAD = 1e-60
-"""Error bound of an axis that is measured without error.
+"""Replaces an error bound of zero (an axis measured without error) in divisions.
 
-It is not zero, so that errors in units of it exist, and far below the rounding of an angle.
+The sensor of one axis (`axis`) has it too, so that errors in units of it exist; it is far below the
+rounding of an angle. `error_bound` and `error_bounds` of the whole sensor still return zero.
 """
 
 

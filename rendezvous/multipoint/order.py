@@ -60,11 +60,12 @@ class OrderSearch(NamedTuple):
 class BestOrder:
     """Targets visited in their best `order`, first to last.
 
-    `objective` is the energy plus the price of the time, m^2/s^3. The search examined `nodes`
-    partial orders, on a grid sets of visited targets with the last of them, and computed
-    `evaluations` paths; partial orders in `lost` were skipped because no path was found.
-    `time_search` is the last search for the times; None if they were given. `order_search` is the
-    search of all orders on a grid; None if the order was given, or found by branch and bound.
+    `objective` is the energy plus the price of the time, m^2/s^3, without the price for given
+    times. The search examined `nodes` partial orders, on a grid sets of visited targets with the
+    last of them, and computed `evaluations` paths; partial orders in `lost` were skipped because no
+    path was found. `time_search` is the last search for the times; None if they were given.
+    `order_search` is the search of all orders on a grid; None if the order was given, or found by
+    branch and bound.
     """
 
     order: tuple[int, ...]

@@ -94,6 +94,8 @@ def fly(
 ) -> PursuitFlight:
     """Simulate a pursuer that computes and follows a new plan at times `replan_s` apart.
 
+    The default is some 150 plans in a revolution of a geostationary orbit; shorter games need less.
+
     `steering` steers the evader; None is optimal against the true state of the pursuer. No
     `observation` means that the evader is observed exactly; otherwise `seed` determines the errors.
     `solution` is the solution of the game, if it is known.

@@ -176,7 +176,10 @@ class WorstMisses:
         return tuple(engagement for engagement in both if engagement is not None)
 
     def misses(self) -> dict[str, float | None]:
-        """Return both values as JSON, m."""
+        """Return the values that the search maximised, m, by their JSON keys; None without one.
+
+        The order is the order of the columns of `infoset bound`.
+        """
         named = {"worst_of_search_set_kept_m": self.set_kept, "worst_of_search_m": self.overall}
         values: dict[str, float | None] = dict.fromkeys(named)
         for name, engagement in named.items():

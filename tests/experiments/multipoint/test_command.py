@@ -84,6 +84,17 @@ def test_order_and_times_override_the_file(infoset: Command, mine: Callable[[str
     assert given["cost_m2_s3"] == pytest.approx(0.021142280110555873, rel=1e-9)
 
 
+@pytest.mark.parametrize("order", ["given", "best"])
+def test_price_of_given_times_is_part_of_the_cost_with_price(
+    infoset: Command, mine: Callable[[str], Path], order: str
+) -> None:
+    file = mine(changed("latest_s = 3000.0", "price_per_s = 1e-6", TWO))
+    visits = found(infoset, file, "--order", order, "--times", "given")
+    assert visits["cost_with_price_m2_s3"] == pytest.approx(
+        visits["cost_m2_s3"] + 1e-6 * visits["times_s"][-1]
+    )
+
+
 def test_rendezvous_prices_and_eccentric_orbits(
     infoset: Command, mine: Callable[[str], Path]
 ) -> None:
