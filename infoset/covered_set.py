@@ -280,6 +280,11 @@ class CoveredSet(CoveredSetView, InformationSet):
     model : SetModel
         `wrong_images` is q, and `image_classes` is G.
 
+    Raises
+    ------
+    TypeError, ValueError
+        As `InformationSet`.
+
     Notes
     -----
     C(G, q) ordinary sets, in one batch.
