@@ -9,7 +9,7 @@ the miss.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
 from typing import Any
 
@@ -32,13 +32,6 @@ def information_set(model: SetModel, batch: int = 1, *, guarantee: bool = True) 
     return CoveredSet(model, batch, guarantee=guarantee)
 
 
-@dataclass
-class ImageCounter:
-    """Number of images so far, lost ones included. A set and its views share one object."""
-
-    number: int = 0
-
-
 class CoveredSetView(InformationSetView):
     """Read-only view of a `CoveredSet`. It follows the set and cannot change it.
 
@@ -51,21 +44,17 @@ class CoveredSetView(InformationSetView):
         Classes of images that each member leaves out.
     """
 
-    def __init__(
-        self, members: InformationSet, model: SetModel, left_out: Flags, images: ImageCounter
-    ) -> None:
+    def __init__(self, members: InformationSet, model: SetModel, left_out: Flags) -> None:
         # Queries of the base class that are not replaced below (axes, time) read the members.
         SetQueries.__init__(self, members._state)
         self.model = model
         self.left_out = left_out
         self._members = members
-        self._images = images
 
     def copy(self) -> CoveredSet:
         """Return an independent set that starts from the state of this one."""
         twin = CoveredSet.__new__(CoveredSet)
-        images = ImageCounter(self._images.number)
-        CoveredSetView.__init__(twin, self._members.copy(), self.model, self.left_out, images)
+        CoveredSetView.__init__(twin, self._members.copy(), self.model, self.left_out)
         return twin
 
     @property
@@ -297,11 +286,11 @@ class CoveredSet(CoveredSetView, InformationSet):
         left_out = classes_left_out(model.wrong_images, model.classes)
         ordinary = replace(model, wrong_images=0, image_classes=None)
         members = InformationSet(ordinary, batch * len(left_out), guarantee=guarantee)
-        CoveredSetView.__init__(self, members, model, left_out, ImageCounter())
+        CoveredSetView.__init__(self, members, model, left_out)
 
     def view(self) -> InformationSetView:
         """Return a read-only view of this set; it follows the set."""
-        return CoveredSetView(self._members, self.model, self.left_out, self._images)
+        return CoveredSetView(self._members, self.model, self.left_out)
 
     def guaranteed_miss(self) -> tuple[Floats, Flags]:
         """Return the guaranteed miss: the maximum over the members that are not refuted."""
@@ -311,9 +300,10 @@ class CoveredSet(CoveredSetView, InformationSet):
         return np.asarray(phi_of.max(axis=1)), np.asarray(exists_of.any(axis=1))
 
     def measure_angle(self, alpha_rad: ArrayLike, where: ArrayLike = True) -> None:
-        """Cut the members that use this image. Each call is one image, also where it was lost."""
-        uses = ~self.left_out[:, self._images.number % self.left_out.shape[1]]
-        self._images.number += 1
+        """Cut the members that use this image. Its number is the number of periods so far."""
+        every = self.model.steps_in(self.model.angle_sensor.period_s)
+        image = self._members._state.elapsed // every
+        uses = ~self.left_out[:, image % self.left_out.shape[1]]
         active = np.outer(self._where(where), uses)
         measured = real_array("alpha_rad", alpha_rad, (len(self.axes), self.batch))
         self._members.measure_angle(self._lateral_of_members(measured), active.ravel())

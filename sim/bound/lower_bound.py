@@ -84,6 +84,8 @@ def lower_bound(
     ------
     TypeError
         If `scenario` is not a `Scenario`.
+    ValueError
+        If its set allows for wrong images.
 
     Notes
     -----
@@ -104,6 +106,11 @@ def lower_bound(
     the bound of one axis.
     """
     need_scenario(scenario)
+    if scenario.set_model.wrong_images:
+        raise ValueError(
+            "information_set.wrong_images must be 0: the bound does not allow for wrong images; "
+            f"got {scenario.set_model.wrong_images}"
+        )
     speeds = _examined_speeds(scenario)
     grids = [label_grid(scenario, speed) for speed in speeds]
     total = sum(len(grid) + _refinements(grid) for grid in grids)

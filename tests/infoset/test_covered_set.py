@@ -193,6 +193,24 @@ def test_model_with_senseless_wrong_images_is_refused(
         replace(MODEL, **changes)
 
 
+def test_lost_image_does_not_change_the_classes_of_later_images() -> None:
+    told = CoveredSet(MODEL)
+    untold = CoveredSet(MODEL)
+    for step in range(12):
+        is_lost = step in (2, 3, 7)
+        for information in (told, untold):
+            if not is_lost:
+                information.measure_angle(1e-5 * step)
+        if is_lost:
+            told.measure_angle(0.0, where=False)
+        told.predict()
+        untold.predict()
+    for before, after in zip(
+        told.predicted_miss_by_member(), untold.predicted_miss_by_member(), strict=True
+    ):
+        np.testing.assert_array_equal(before, after)
+
+
 def test_rates_are_refused() -> None:
     with pytest.raises(ValueError, match="cannot be cut by rates"):
         CoveredSet(MODEL).measure_rate(0.0, 1e-6)

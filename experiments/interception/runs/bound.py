@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from infoset.experiments.common.errors import InputError
 from infoset.experiments.common.screen import (
     Part,
     RowByRow,
@@ -93,6 +94,11 @@ class WorstOfStrategy:
 def run(options: Bound) -> None:
     """Compute the bound, simulate the strategies, write the files and print the tables."""
     scenario, notes = study_scenario(options)
+    if scenario.set_model.wrong_images:
+        raise InputError(
+            "information_set.wrong_images must be 0: the bound does not allow for wrong images; "
+            "add --set information_set.wrong_images=0"
+        )
     strategies: Mapping[str, Strategy | None] = {}
     if options.budget > 0 or options.strategies is not None:
         strategies = chosen_strategies(scenario, options.strategies)

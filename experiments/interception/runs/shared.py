@@ -140,6 +140,8 @@ def allowance(scenario: Scenario) -> str | None:
     )
     if model.pointing_error_rad:
         line += f", error of their direction at most {model.pointing_error_rad:g} rad"
+    if model.wrong_images:
+        line += f"; at most {model.wrong_images} wrong images in a flight"
     return line
 
 
