@@ -50,7 +50,7 @@ def main() -> None:
     for allowed, classes, number in CASES:
         results = simulate_runs(case(allowed, classes, number), options.runs, seed=options.seed)
         miss = " / ".join(f"{value:.2g}" for value in np.quantile(results.miss_m, (0.5, 0.9, 1.0)))
-        phi = np.ma.median(results.guaranteed_miss_m)
+        phi = float(np.median(results.guaranteed_miss_m.compressed()))
         false = int((~results.phi_held.filled(True)).sum())
         sys.stdout.write(
             f"| {allowed}, {classes} classes | {number} | {miss} | {phi:.1f} | "
