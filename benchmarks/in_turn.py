@@ -25,11 +25,11 @@ from infoset.sim.simulate import simulate_runs
 scenario = replace(load_scenario("asteroid-1997"), noise=NoiseKind(sys.argv[2]))
 if sys.argv[1] == "without":
     scenario = replace(scenario, range_sensor=None)
-simulate_runs(scenario, 200)
+simulate_runs(scenario, 200, seed=1)
 print("ready", flush=True)
 for _ in sys.stdin:
     start = time.process_time()
-    simulate_runs(scenario, 200)
+    simulate_runs(scenario, 200, seed=1)
     print(1e3 * (time.process_time() - start), flush=True)
 """
 
