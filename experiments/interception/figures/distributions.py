@@ -114,6 +114,9 @@ def draw_samples(
     impulses = [sample.impulse_m_s for sample in samples]
     bounds = [sample.guaranteed_miss_m for sample in samples if sample.guaranteed_miss_m.size]
     scale_misses(left, [*misses, *bounds], radius_m)
+    # Marks are not clipped: one beyond the end of the axis would be drawn outside of the figure.
+    farthest_m = max((float(run.miss_m.max()) for run in runs), default=0.0)
+    left.set_xlim(right=max(left.get_xlim()[1], 1.04 * farthest_m))
     minimum = min(float(each.min()) for each in impulses)
     limit = max([axis_limit(impulses), *(float(run.impulse_m_s.max()) for run in runs)])
     margin = 0.05 * (limit - minimum) or 0.5

@@ -188,6 +188,14 @@ def test_the_axis_of_the_miss_shows_the_radius_of_the_body(
     assert low < (radius_m or 500.0) < high
 
 
+def test_a_printed_run_beyond_all_misses_is_within_the_axis() -> None:
+    few = np.array([1.1, 1.3])
+    printed = Sample("printed", {"color": "k"}, np.array([34.0]), np.array([522.0]))
+    figure = draw_samples([Sample("few", CURVE_LOOKS[1], few, few)], None, [printed])
+    for axes, value in zip(figure.axes, (34.0, 522.0), strict=True):
+        assert axes.get_xlim()[1] > value
+
+
 @pytest.mark.parametrize(
     ("runs", "marks"),
     [(2, []), (10, ["10 to 90 %"]), (100, ["10 to 90 %", "99 %"])],
