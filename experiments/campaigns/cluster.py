@@ -14,10 +14,7 @@ from infoset.experiments.common.errors import InputError
 from infoset.sim.parallel import worker_processes
 
 PATIENCE_S = 8.0
-"""Time limit for the scheduler's answer, and then for its workers, s."""
-
-RETRIES = 3
-"""Number of repetitions of a chunk whose worker has stopped; then the chunk is at fault."""
+"""Time limit for the scheduler's answer, and then for its workers, s; chosen."""
 RUNS_OF_A_PROCESS = 1500
 """Minimum number of runs for each process: a process takes as long to start as a second of runs.
 
@@ -58,7 +55,11 @@ def cluster(address: str, note: Callable[[str], None]) -> Iterator[tuple[Executo
     """Connect to a Dask scheduler; yield its executor and number of threads.
 
     The address is for example tcp://host:8786. Raise `InputError` if the scheduler does not answer
-    in time, or has no workers.
+    in time, or has no workers. The loggers of Dask stay silent afterwards.
+
+    The scheduler repeats chunks of workers that have stopped
+    (`distributed.scheduler.allowed-failures`). A chunk that raises an exception is not repeated:
+    it would raise it again.
     """
     from distributed import Client
 
@@ -90,4 +91,5 @@ def cluster(address: str, note: Callable[[str], None]) -> Iterator[tuple[Executo
 
         threads = client.nthreads()
         note(f"{len(threads)} Dask workers, {sum(threads.values())} threads")
-        yield client.get_executor(pure=False, retries=RETRIES), sum(threads.values())
+        # Not `pure`: chunks with equal arguments would have one key, and an earlier result.
+        yield client.get_executor(pure=False), sum(threads.values())

@@ -193,3 +193,29 @@ def test_scheduler_without_workers_or_with_other_versions_is_refused(
     code, _, err = infoset(*asked)
     assert code == 2
     assert f"infoset {version('infoset')} in the campaign, 0.0.1 on the worker" in err
+
+
+@pytest.mark.thorough
+@pytest.mark.filterwarnings("default")
+def test_error_of_own_code_on_a_worker_is_shown_and_not_repeated(
+    infoset: Infoset, file: Path, processes: Processes, tmp_path: Path
+) -> None:
+    calls = tmp_path / "calls"
+    (tmp_path / "failing.py").write_text(
+        f"""class Failing:
+    def measure(self, sight, predicted):
+        with open({str(calls)!r}, "a") as file:
+            file.write("called ")
+        raise ValueError("the table ends here")
+"""
+    )
+    processes.worker()
+    processes.wait_for(1)
+
+    asked = ("campaign", file, "--runs", 16, "--chunk", 16, "--out", "runs", "-q")
+    code, _, err = infoset(*asked, "--noise", "failing.py:Failing", "--dask", processes.address)
+
+    message = "failing.py, line 5: ValueError: the table ends here; correct the file"
+    assert code == 2
+    assert err.count(message) == 1
+    assert calls.read_text() == "called "
