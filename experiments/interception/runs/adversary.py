@@ -116,15 +116,15 @@ def _parts(
 ) -> Iterator[Part]:
     """Yield the table of the engagements found, and lines that explain it."""
     first = worst.engagements[0]
-    count = sum(found.evaluations for found in worst.engagements)
+    # At most the resolution of the clock; it keeps the rate finite.
+    rate = worst.evaluations / max(elapsed_s, 1e-9)
     yield (
         f"{scenario_title(scenario)}, strategy {first.strategy}: "
-        f"{count} simulated engagements, {number(count / max(elapsed_s, 1e-9))} per second"
+        f"{worst.evaluations} simulated engagements, {number(rate)} per second"
     )
 
-    is_same = worst.set_kept is worst.overall
     columns = {"set never empty": worst.set_kept, "set also empty": worst.overall}
-    if is_same:
+    if worst.set_kept is worst.overall:
         columns = {"set never empty, set also empty": worst.overall}
     table = number_table("", *columns)
     texts = [None if found is None else _rows(scenario, found) for found in columns.values()]
@@ -152,11 +152,10 @@ def _parts(
         "exist"
     )
 
-    if not is_same:
-        emptied = max(found.sets_emptied for found in worst.engagements)
+    if worst.sets_emptied:
         note = (
-            f"the set became empty in {emptied} engagements of a search; these misses show a "
-            "failure of the model"
+            f"the set became empty in {worst.sets_emptied} engagements of a search; their misses "
+            "show a failure of the model"
         )
         if not scenario.set_model.is_guaranteed:
             note += "; use --model guaranteed, whose set keeps the true state"

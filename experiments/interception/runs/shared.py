@@ -62,7 +62,10 @@ class Work:
     began_s: float
 
     def save(self, results: Mapping[str, object]) -> None:
-        """Write the scenario, and results as JSON after the keys that all commands share."""
+        """Write the scenario, and results as JSON after the keys that all commands share.
+
+        A key of `results` replaces a shared one: `engage` gives the time of its engagement.
+        """
         self.written.save("scenario.toml", to_toml(self.scenario))
         keys: dict[str, object] = {
             "versions": versions(),
@@ -163,11 +166,15 @@ class WorstMisses:
     """The engagements with the maximum values of a strategy.
 
     `set_kept` is the worst engagement whose set never became empty; None if there was none.
-    `overall` is the worst of all; None if no miss was finite.
+    `overall` is the worst of all; None if no miss was finite. `evaluations` is the number of
+    engagements of all searches, also of one whose worst engagement is neither, and `sets_emptied`
+    the number of engagements of one search whose set became empty, of the search with the most.
     """
 
     set_kept: WorstEngagement | None
     overall: WorstEngagement | None
+    evaluations: int = 0
+    sets_emptied: int = 0
 
     @property
     def engagements(self) -> tuple[WorstEngagement, ...]:
@@ -201,9 +208,9 @@ def find_worst_misses(
 ) -> WorstMisses:
     """Search for the maximum miss with the set never empty, and of all engagements.
 
-    The second search is simulated only if the set became empty in the first one; otherwise both
-    results are the same. The default objective is the objective of `infoset bound`, which compares
-    simulated misses.
+    Each search simulates `budget` engagements. The second one is simulated only if the set became
+    empty in the first one; otherwise both results are the same. The default objective is the
+    objective of `infoset bound`, which compares simulated misses.
     """
 
     def search(keep_set: bool, name: str) -> WorstEngagement | None:
@@ -223,10 +230,15 @@ def find_worst_misses(
 
     set_kept = search(True, "")
     if set_kept is not None and set_kept.sets_emptied == 0:
-        return WorstMisses(set_kept, set_kept)
+        return WorstMisses(set_kept, set_kept, evaluations=budget)
 
     # The search with all engagements can find less than the first one.
     overall = search(False, ", empty sets included")
     found = [engagement for engagement in (overall, set_kept) if engagement is not None]
     worst = max(found, key=lambda engagement: engagement.value_m, default=None)
-    return WorstMisses(set_kept, worst)
+    return WorstMisses(
+        set_kept,
+        worst,
+        evaluations=2 * budget,
+        sets_emptied=max((engagement.sets_emptied for engagement in found), default=0),
+    )

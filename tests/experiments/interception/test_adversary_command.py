@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,10 @@ from infoset import Model
 from infoset.experiments.common.input_file import to_toml
 from infoset.experiments.common.screen import number
 from infoset.experiments.interception.record_file import load_record
+from infoset.experiments.interception.runs.shared import find_worst_misses
 from infoset.experiments.interception.scenario_file import load_scenario, with_model
 from infoset.sim import Scenario
-from infoset.sim.adversary import find_worst
+from infoset.sim.adversary import WorstEngagement, find_worst
 from infoset.sim.storage.codec import fingerprint
 from infoset.sim.versions import versions
 from tests.built_in import scenario_text
@@ -183,6 +185,29 @@ def test_search_with_kept_sets_has_no_result_if_every_set_becomes_empty(
     )
     file = tmp_path / "fast.toml"
     file.write_text(text.replace("vx_km_s = [-58.1, -57.9]", "vx_km_s = [-110.05, -110.0]"))
-    found = infoset.json("adversary", file, "--model", "paper", "--budget", 2)
+    options = ("adversary", file, "--model", "paper", "--budget", 2)
+    found = infoset.json(*options)
     assert found["worst_of_search_set_kept_m"] is None
     assert found["worst_of_search_m"] == found["worst_any_state_miss_m"]
+
+    _, out, _ = infoset(*options)
+    assert ": 4 simulated engagements, " in out
+    assert "the set became empty in 2 engagements of a search; their misses show" in out
+
+
+def test_search_that_found_no_greater_miss_is_counted(
+    brief: Scenario, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The second search, with empty sets, has the same budget and another number of empty sets."""
+    worst = find_worst(brief, budget=2)
+    lesser = replace(worst, any_state_miss_m=0.5 * worst.any_state_miss_m, sets_emptied=2)
+
+    def search(_scenario: Scenario, *, keep_set: bool, **_others: object) -> WorstEngagement:
+        return replace(worst, sets_emptied=1) if keep_set else lesser
+
+    monkeypatch.setattr("infoset.experiments.interception.runs.shared.find_worst", search)
+    found = find_worst_misses(brief, None, budget=2, seed=0, begin=lambda _name: lambda _done: None)
+
+    assert found.set_kept is found.overall
+    assert found.evaluations == 4
+    assert found.sets_emptied == 2
