@@ -108,8 +108,8 @@ def _plan(
         wider = relaxed(problem, fraction) if fraction else problem
         try:
             return optimal_controls(wider.rest(start, estimated), relative=relative), fraction
-        except InadmissibleStartError as error:
-            needed = _relaxation_for_start(problem, start, estimated, error)
+        except InadmissibleStartError:
+            needed = _relaxation_for_start(problem, start, estimated)
             fraction = max(2.0 * fraction, needed * _MORE, _MIN_RELAXATION)
         except EmptyTubeError as error:
             fraction = (fraction + error.relaxation * (1.0 + fraction)) * _MORE + _MIN_RELAXATION
@@ -120,18 +120,9 @@ def _plan(
             )
 
 
-def _relaxation_for_start(
-    problem: ReachabilityProblem, start: int, estimated: Floats, error: InadmissibleStartError
-) -> float:
-    """Return a relaxation with which an estimated state is probably admissible.
-
-    It is the smaller of two estimates: from the violations in `error`, which are for the relaxed
-    problem, and from the constraints of the problem at the state.
-    """
-    smallest_size = min([*problem.state_bounds, *_sizes(problem)])
-    missing = max(excess for _, excess in error.broken) / smallest_size
-
+def _relaxation_for_start(problem: ReachabilityProblem, start: int, estimated: Floats) -> float:
+    """Return the smallest relaxation with which an estimated state is admissible, to rounding."""
     normals, offsets = problem.further
     beyond_bounds = float((np.abs(estimated) / problem.state_bounds).max()) - 1.0
     excess = (normals @ estimated - offsets[start]) / _sizes(problem)
-    return float(min(missing, max(beyond_bounds, float(excess.max(initial=-np.inf)))))
+    return max(beyond_bounds, float(excess.max(initial=-np.inf)))
