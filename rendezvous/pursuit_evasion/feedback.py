@@ -24,7 +24,8 @@ HIT_M = 100.0
 """Distance that counts as capture of a point: the accuracy of a last leg without observation."""
 
 _OUTPUT_TIMES = 65
-"""Number of times in a leg at which the distance is computed before its minimum is refined."""
+"""Number of times in a leg at which the distance is computed, before its minimum or the first time
+within the radius is refined; chosen. A capture between two of them is not seen."""
 _PAST = 1.05
 """Length of the last leg by the time to the predicted capture, to include the closest approach."""
 _WIDE = 2.0
@@ -113,8 +114,9 @@ def fly(
     The first plan is the solution of the game, from the true states. Each later plan starts
     Newton's method at the previous one. A step costs 2 ms for the plan and, with a `steering`, 2 ms
     for the evader's path. The last leg is the one in which the plan predicts the capture: no plan
-    is made in it. If Newton's method fails from the previous plan, the game is solved from scratch;
-    the previous plan is kept if the capture would be much later.
+    is made in it. If the evader is not within the radius in it, a new plan follows. If Newton's
+    method fails from the previous plan, the game is solved from scratch; the previous plan is kept
+    if the capture would be much later.
     """
     if not 0.0 < replan_s < np.inf:
         raise ValueError("the time between plans must be positive")
@@ -286,16 +288,18 @@ class _Pursuit:
     ) -> PursuitFlight | None:
         """Return the flight if it ends in the leg, else None.
 
-        It ends by a capture or, in the last leg, at the closest approach.
+        With a radius it ends when the distance reaches the radius: if that does not happen, not
+        even the last leg ends the flight, and a new plan follows. Without a radius it ends in the
+        last leg, at the closest approach.
         """
+        if self._radius == 0.0 and not last:
+            return None
 
         def distance(time: float) -> float:
             return float(np.linalg.norm(pursuer.at(time)[:3] - evader(time)[:3]))
 
         drift = spell * float(np.linalg.norm(self._pursuer.start[3:] - self._evader.start[3:]))
         if not last and min(distance(0.0), distance(spell)) - self._radius > _WIDE * drift:
-            return None
-        if self._radius == 0.0 and not last:
             return None
 
         times = np.linspace(0.0, spell, _OUTPUT_TIMES)
