@@ -22,7 +22,7 @@ from infoset.geometry.polytope.double_description import (
 )
 from infoset.geometry.polytope.incidence import packed, unpacked
 from infoset.geometry.polytope.scaled_coordinates import coordinates
-from infoset.geometry.tolerances import EPS, ON, REDUCED
+from infoset.geometry.tolerances import EPS, ON, REDUCED, UNSURE
 from infoset.kernels import Kernels
 
 _kernels = Kernels()
@@ -93,7 +93,9 @@ def swept(
 
     The segment is from -along to along. Each facet moves, and each ridge between two facets that
     face opposite ends of the segment becomes a facet. A vertex moves to an end if it lies on a
-    facet that faces this end.
+    facet that faces this end. `along`, shape (n,), is not zero. The errors, shape (n,), are the
+    maximum rounding of a coordinate of the points; facets do not contain it
+    (`construction.enlarged`).
     """
     heights = sides(facets, np.append(along / size_of(along), 0.0))
     # Numba compiles a kernel again for a Python constant, but not for one of NumPy.
@@ -127,9 +129,12 @@ def swept(
                 errors[j] = max(errors[j], abs(low))
             count += 1
 
+    # Outward: the terms of the height of `along` may cancel, as in each new facet. The sum is then
+    # rounded twice, by EPS / 2 each.
     for k in range(len(facets)):
-        reach = (1.0 + 8.0 * EPS) * abs(dot(along, facets[k]))
-        facets[k, -1] += reach + 2.0 * EPS * abs(facets[k, -1])
+        rounding = UNSURE * dot(np.abs(along), np.abs(facets[k]))
+        facets[k, -1] += abs(dot(along, facets[k])) + rounding
+        facets[k, -1] += 2.0 * EPS * abs(facets[k, -1])
     return result[:count], facets, incidence[:count], errors
 
 
