@@ -25,7 +25,10 @@ _NOT_DECREASING = 0.1
 """Ratio of two differences above which they no longer decrease: doubled panels reduce the error by
 2^16, and the ratio is then 1.5e-5."""
 MAX_PANELS = 4096
-"""Maximum number of panels of a solution: 48 x 48 systems of 80 MB in all."""
+"""Maximum number of panels of an interval, and of all intervals of a coarse solution together.
+
+They are 48 x 48 systems of 80 MB in all; the finer solution takes twice as much.
+"""
 MAX_BREAKS = 200_000
 """Maximum number of panels between breaks, as `linear_motion.MAX_PANELS`."""
 
@@ -102,22 +105,18 @@ class TimeVaryingMotion(HeldMotion):
 def _refined(dynamics: OfTime, starts: Floats, ends: Floats) -> HeldSegment:
     """Double the panels until two solutions agree, or differ by rounding only.
 
-    Many intervals are solved in two parts, to bound the memory.
+    Intervals that together have more than `MAX_PANELS` panels are solved in two parts, to bound the
+    memory.
     """
     panels = _first_panels(dynamics, starts, ends)
     if len(starts) > 1 and panels * len(starts) > MAX_PANELS:
-        half = len(starts) // 2
-        first = _refined(dynamics, starts[:half], ends[:half])
-        second = _refined(dynamics, starts[half:], ends[half:])
-        return HeldSegment(
-            np.concatenate([first.transition, second.transition]),
-            np.concatenate([first.gramian, second.gramian]),
-            np.concatenate([first.held, second.held]),
-        )
+        return _in_two_parts(dynamics, starts, ends)
 
     coarse = _collocated(dynamics, starts, ends, panels)
     apart = np.inf
     while 2 * panels <= MAX_PANELS:
+        if len(starts) > 1 and panels * len(starts) > MAX_PANELS:
+            return _in_two_parts(dynamics, starts, ends)
         panels *= 2
         fine = _collocated(dynamics, starts, ends, panels)
         before = apart
@@ -131,8 +130,23 @@ def _refined(dynamics: OfTime, starts: Floats, ends: Floats) -> HeldSegment:
     )
 
 
+def _in_two_parts(dynamics: OfTime, starts: Floats, ends: Floats) -> HeldSegment:
+    """Return the solutions of two or more intervals, solved in two halves."""
+    half = len(starts) // 2
+    first = _refined(dynamics, starts[:half], ends[:half])
+    second = _refined(dynamics, starts[half:], ends[half:])
+    return HeldSegment(
+        np.concatenate([first.transition, second.transition]),
+        np.concatenate([first.gramian, second.gramian]),
+        np.concatenate([first.held, second.held]),
+    )
+
+
 def _first_panels(dynamics: OfTime, starts: Floats, ends: Floats) -> int:
-    """One panel for each radian of the fastest motion at the ends and the middle."""
+    """One panel for each radian of the fastest motion at the ends and the middle.
+
+    At most a quarter of `MAX_PANELS`, so that the panels can be doubled twice.
+    """
     if not len(starts):
         return 1
 

@@ -18,8 +18,10 @@ from infoset.rendezvous.relative_motion import (
     LinearMotion,
     TimeVaryingMotion,
     TschaunerHempel,
+    time_varying,
 )
 from infoset.rendezvous.relative_motion.elliptic_orbit import eccentric_of_mean
+from infoset.rendezvous.relative_motion.linear_motion import HeldSegment
 
 RATE = 1.13e-3
 MOTIONS: dict[str, Callable[[], LinearMotion]] = {
@@ -160,3 +162,25 @@ def test_orbit_of_a_semi_major_axis_has_the_identified_matrices() -> None:
     assert float(orbit.time_of_eccentric(orbit.eccentric_anomaly(777.0))) == pytest.approx(
         777.0, rel=1e-13
     )
+
+
+def test_many_intervals_that_do_not_converge_are_refused_in_bounded_memory(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Formerly the number of panels was bounded for each interval only: 75 GB of 1000 of them."""
+    sizes = []
+
+    def collocated(_dynamics: object, starts: Floats, _ends: Floats, panels: int) -> HeldSegment:
+        count = len(starts)
+        sizes.append(count * panels)
+        # No two solutions agree.
+        transition = np.full((count, 6, 6), float(len(sizes)))
+        return HeldSegment(transition, transition, transition[..., :3])
+
+    monkeypatch.setattr(time_varying, "_collocated", collocated)
+    motion = TimeVaryingMotion(EllipticOrbit(RATE, 0.3, 1.0).dynamics)
+    starts = np.arange(1000.0)
+
+    with pytest.raises(ValueError, match="A\\(t\\) changes too fast"):
+        motion.segment(starts, starts + 1.0)
+    assert max(sizes) <= 2 * time_varying.MAX_PANELS
