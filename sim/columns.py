@@ -107,7 +107,8 @@ def fields_of(owner: Any, table: Mapping[str, Sequence[Cell]]) -> dict[str, Any]
     """Return the arguments of a dataclass from its columns by name: the inverse of `values_of`.
 
     Optional columns may be missing. A ValueError is raised if another column is missing or unknown,
-    if the columns differ in length, or if a value is not of the column's kind.
+    if the columns differ in length, if a value is not of the column's kind, or if one component of
+    several is unknown in some runs.
     """
     declared = columns_of(owner)
     _check_table(table, declared)
@@ -122,6 +123,8 @@ def fields_of(owner: Any, table: Mapping[str, Sequence[Cell]]) -> dict[str, Any]
         values = _array_of(column, table[column.name])
         if column.component is None:
             arguments[column.field] = values
+        elif np.ma.is_masked(values):
+            raise ValueError(f"column {column.name!r} is unknown in some runs")
         elif arguments.get(column.field) is None:
             arguments[column.field] = values[:, None]
         else:

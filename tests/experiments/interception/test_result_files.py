@@ -103,6 +103,18 @@ def test_damaged_file_is_refused(change: Change, reason: str, tmp_path: Path) ->
     assert str(refused.value).startswith(f"{file}: are not readable results: ")
 
 
+def test_file_with_half_known_positions_is_refused(tmp_path: Path) -> None:
+    """A position in space without y is not the position with y = 0."""
+    file = tmp_path / "results.json"
+    save(simulate(load_scenario("asteroid-1997-space"), 3), file)
+    content = json.loads(file.read_text())
+    content["columns"]["start_y_m"][1] = None
+    file.write_text(json.dumps(content))
+
+    with pytest.raises(InputError, match="column 'start_y_m' is unknown in some runs"):
+        load_results(file)
+
+
 @pytest.mark.parametrize("content", ["", "[", "[" * 100_000, "NaN", "{}", "\x00"])
 def test_file_without_results_is_refused(content: str, tmp_path: Path) -> None:
     file = tmp_path / "results.json"
