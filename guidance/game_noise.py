@@ -244,12 +244,7 @@ def keep_point(
     ----------
     Kumkov and Patsko (1997), section 7: the rule for ranges, and 'the same way' for angles.
     """
-    nearest = np.minimum(np.maximum(point_at_top, lower), upper)
-    wider = np.minimum(min_at_bottom, upper)
-    for_larger = np.where((nearest >= min_at_bottom) | (nearest == upper), nearest, wider)
-
-    nearest = np.minimum(np.maximum(point_at_bottom, lower), upper)
-    wider = np.maximum(max_at_top, lower)
-    for_smaller = np.where((nearest <= max_at_top) | (nearest == lower), nearest, wider)
-
+    # Up to the point, and further up only while nothing of the set is lost below.
+    for_larger = np.clip(np.maximum(point_at_top, min_at_bottom), lower, upper)
+    for_smaller = np.clip(np.minimum(point_at_bottom, max_at_top), lower, upper)
     return np.where(is_larger, for_larger, for_smaller)

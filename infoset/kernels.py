@@ -228,7 +228,8 @@ class CompileNotice(event.Listener):
     def of(self, purpose: str) -> Iterator[None]:
         """Name the purpose of the kernels that are compiled within the context.
 
-        At the end, a summary says which were compiled and how long it took.
+        At the end, a summary says which were compiled and how long it took; none if no kernel was
+        compiled, or after an exception.
         """
         self.purpose = purpose
         self._compiled = _Compiled()

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from infoset.rendezvous._arrays import Floats
 
 _STRAIGHT = 1e-15
-"""Square of the transverse speed, relative to the square of the escape speed, up to which a motion
-is straight: rounding."""
+"""Square of the transverse speed, relative to the square of the speed, up to which a motion is
+straight. Up to the escape speed the perigee is then within 1e-15 of the distance, its rounding."""
 _NEARLY_PARABOLIC = 1e-5
 """Binding below which the time to the perigee is computed as for a parabola, with a relative error
 of the same size."""
@@ -231,7 +231,8 @@ def coast(states: Floats, duration_s: ArrayLike, gravitational_parameter_m3_s2: 
     direction = np.where(duration < 0.0, -1.0, 1.0)
     ahead = start._replace(outward=direction * start.outward)
 
-    is_straight = start.transverse_squared <= _STRAIGHT * (2.0 - start.binding)
+    speed_squared = 2.0 - start.binding
+    is_straight = start.transverse_squared <= _STRAIGHT * speed_squared
     if (is_straight & (_to_perigee(ahead) <= np.abs(duration))).any():
         raise ValueError(
             "a state falls straight into the attracting point; give it a transverse velocity"

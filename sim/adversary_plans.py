@@ -150,7 +150,7 @@ class _Maker(NamedTuple):
 
 
 class Planner:
-    """Random plans of a scenario whose flights have a number of steps.
+    """Random plans of a scenario whose flights have `steps` steps.
 
     In the guaranteed model the target accelerates at the bound of the model, or at the bound of the
     scenario's target if it is greater. In the model `paper` the disturbance is fictitious.

@@ -138,8 +138,8 @@ def _images_and_speeds_m(scenario: Scenario, images_s: Floats) -> float:
 def worst_shift_m(scenario: Scenario) -> Floats | None:
     """Return the shift of the measured position across x by game noise, m, shape (C, steps).
 
-    None without a cut-off or times of impulses, or with fewer than two images before the last
-    decision.
+    The steps are from t = 0 to the last image. None without a cut-off or times of impulses, or with
+    fewer than two images until the last decision.
 
     Two motions with the same images differ by at most 2 b along an axis at each image, with the
     error bound b, m. Let this difference be 2 b0 at the last image before the last decision, and 2

@@ -50,7 +50,8 @@ class ImpulseQueue:
         self.budget_left_m_s: Floats = np.full(batch, float(thruster.budget_m_s))
         self.is_spent: Flags = np.zeros(batch, dtype=bool)
         self.last_m_s: Floats = np.zeros(lateral)
-        # One impulse for each of the next steps.
+        # One impulse for each of the next steps, in their order: `decide` appends, then `give`
+        # removes one. The zeros are one array: impulses are replaced, never changed in place.
         self._waiting = [self.last_m_s] * thruster.delay_steps
         self._not_given_m_s = np.zeros(batch)
 

@@ -67,7 +67,11 @@ def schedule(scenario: Scenario) -> Schedule | None:
 
 
 def image_times_s(scenario: Scenario) -> list[float]:
-    """Return the times of the images until the last decision, s before the nominal arrival."""
+    """Return the times of the images until the last decision, s before the nominal arrival.
+
+    They decrease. Without times of impulses the last decision is for the last step before the
+    minimum range.
+    """
     model = scenario.set_model
     steps = scenario.impulse_steps
     if steps is None:

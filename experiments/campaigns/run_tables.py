@@ -99,7 +99,10 @@ def _counts(runs: pd.DataFrame) -> dict[str, Any]:
 
 
 def _hits(hit: pd.Series[bool]) -> dict[str, Any]:
-    """Return the number of hits, and their share with its interval; NaN without a known hit."""
+    """Return the number of hits, and their share with its interval.
+
+    All are NaN if it is not known of any run whether it hit (a body without a size).
+    """
     sized = int(hit.count())
     if not sized:
         return dict.fromkeys(("hits", "hit_probability", "hit_lower", "hit_upper"), math.nan)

@@ -124,9 +124,10 @@ def read_file(
 def load_problem(
     name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None
 ) -> Any:
-    """Read a built-in problem or a problem file of any kind, with `settings` as in `read_file`.
+    """Read a built-in problem or a file of a problem, of any kind in `PROBLEMS`.
 
-    Returns the dataclass of its kind; raises `InputError` as `read_file` does.
+    `settings` are as in `read_file`. Return the dataclass of its kind. `InputError` as `read_file`,
+    also for a scenario and for a file without a known kind.
     """
     text, source = source_of(name_or_path, PROBLEMS)
     kind = kind_of(parse(text, source))
@@ -202,7 +203,9 @@ def kind_name(owner: type) -> str:
 class _Reading:
     """A file that is being read: its faults, and its keys and values as written.
 
-    Both are by their paths with the names of the fields, in SI.
+    `_faults` are the faults, and `_written` the keys and values as they are in the file, both by
+    path. A path has the names of the fields, whose units are SI. `_guessed` are the paths of the
+    fields that were probably meant by unknown keys: they are not reported as missing.
     """
 
     def __init__(self, owner: type, source: str) -> None:
@@ -251,7 +254,9 @@ class _Reading:
     def _unknown(self, path: KeyPath, known: Mapping[str, KeyField]) -> None:
         """Note a key that no field has, with the key that was probably meant.
 
-        That is the nearest key of its table, or the same key of another table.
+        That is, in this order: the same quantity with a known unit, the nearest key of its table, a
+        similar key of another table. If it is in its table, its field is not reported as missing.
+        One fault more than `_MAX_FAULTS` is kept: `made` then says that there are more.
         """
         if len(self._faults) > _MAX_FAULTS:
             return

@@ -38,7 +38,8 @@ OUTLINE_TOLERANCE = 5e-4
 STEPS_OF_A_BOX = 65535
 """Steps of the vertex grid across the box of a polygon: the most that two bytes hold.
 
-A step is about 0.01 pixels on a screen.
+A step is about 0.01 pixels on a screen. `assets/sets.js`, which reads the vertices, has the same
+constant: both must be equal.
 """
 
 
@@ -284,7 +285,7 @@ def packed_outlines(outlines: Sequence[Floats], tolerance: float = 0.0) -> dict[
 
     An outline has at least one vertex. A box is the minimum of each coordinate, then the maximum,
     both exact. With a tolerance, a share of the box, outlines are simplified by the algorithm of
-    Douglas and Peucker.
+    Douglas and Peucker. `assets/sets.js` decodes the keys and their types of numbers.
     """
     counts = np.array([len(outline) for outline in outlines], dtype=np.int64)
     if not len(counts):

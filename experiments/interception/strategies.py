@@ -72,10 +72,11 @@ def chosen_noise(text: str, names: Sequence[str] = NOISES) -> str | OwnNoise:
 
 
 def chosen_noises(names: str) -> Mapping[str, NoiseSource | None]:
-    """Return the noises of a list by name, with the noise of a Python file, None for a built-in
-    one; `all` is four.
+    """Return the noises of a comma-separated list by name.
 
-    `InputError` if there is no such noise.
+    A built-in noise has the value None, a class of a Python file its object. `all` stands for all
+    built-in ones, which come first; a repeated noise counts once. `InputError` if there is no such
+    noise.
     """
     chosen: dict[str, NoiseSource | None] = {}
     parts = [part.strip() for part in names.split(",")]

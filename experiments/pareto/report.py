@@ -203,6 +203,7 @@ def _imposed_json(report: ParetoReport) -> dict[str, object] | None:
 
 
 def _coalitions_json(coalitions: Coalitions | None, names: list[str]) -> dict[str, object]:
+    """Return the keys of the coalitions; an empty table if there are too many craft for them."""
     if coalitions is None:
         return {"coalitions": {}}
     return {

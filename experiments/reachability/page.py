@@ -20,9 +20,15 @@ from infoset.experiments.reachability.report import POINTS, ReachabilityReport
 from infoset.rendezvous.reachability import SetKind
 
 _PROJECTION_TOLERANCE = 1e-2
-"""Accuracy of the projections of the tube, see `Sets.projection`; about a pixel of the page."""
+"""Relative error of a projection of the tube, see `Sets.projection`.
+
+It is a pixel of a set that is drawn 100 pixels wide. Sets with exact vertices do not use it.
+"""
 _MAX_SETS = 24
-"""Number of periods at which the tube is shown; chosen: more make the page large and slow."""
+"""Maximum number of intervals between the times at which the tube is shown.
+
+The times, with the start and the end, are one more. Chosen: more make the page large and slow.
+"""
 _ZERO = 1e-10
 """Controls smaller than the errors of the optimization are shown as zero."""
 _VIEWS = (

@@ -51,8 +51,8 @@ class PrintedTable(NamedTuple):
     """A table of the paper, with misprints corrected.
 
     The controls have shape (4, 3), and the linear states have shape (4, 6). `contradicted`, shape
-    (4, 3), are the controls that the states contradict; they stay as printed, because the correct
-    ones are not known. The `nonlinear` states, shape (4, 6), are as printed.
+    (4, 3), are the controls that the states contradict. They stay as printed; the states imply
+    values near zero (`_implied`). The `nonlinear` states, shape (4, 6), are as printed.
     """
 
     numbers: tuple[PrintedNumber, ...]
@@ -64,7 +64,10 @@ class PrintedTable(NamedTuple):
 
 @cache
 def printed_tables() -> tuple[PrintedTable, ...]:
-    """Return tables 1 to 3."""
+    """Return tables 1 to 3.
+
+    A control with the correction 0.0000 is `contradicted`: this is how the file marks it.
+    """
     tables = []
     for numbers in read_paper("reachability").tables.values():
         printed = np.array([number.value for number in numbers])

@@ -147,10 +147,11 @@ def divide(
 def bound_all(
     leaving: Leaving, past: Past, outlines: Outlines, pieces: Records, phi: Floats
 ) -> None:
-    """Write Phi of each engagement without the error of the speed, m; minus infinity where no label
-    has left.
+    """Write Phi of each engagement without the error of the speed, m, into `phi`.
 
-    `pieces` has room for all pieces of an engagement.
+    It is minus infinity where no feasible label has left. A new piece has an infinite bound; the
+    first division of each is not counted in `MAX_DIVIDED`. `pieces` has room for all pieces of an
+    engagement.
     """
     for b in range(phi.shape[0]):
         select(past, b)

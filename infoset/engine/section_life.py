@@ -5,7 +5,8 @@ range is x = label - e t. With z = alpha x and V = omega x - e alpha, the motion
 z' = V, V' = v_z: an angle measurement is a band of z, and an impulse is a shift of V. A section
 depends only on its label and on the history. Therefore `replays` computes the section at any label
 exactly, with the functions that update the stored sections in `section_passes`. Numbers of
-equations, lemmas and assumptions are those of docs/guarantee.md, unless they are of the paper.
+equations, lemmas and assumptions are those of docs/guarantee.md and, from (15) on, of
+docs/guarantee-space.md, unless they are of the paper.
 """
 
 from __future__ import annotations
@@ -284,11 +285,13 @@ def shift_section(
 ) -> None:
     """Shift a section by an impulse k, V becomes V - k, and widen it by the error bound of k.
 
-    The error bound is (2) or (15). `across` is the impulse along the other axis.
+    The error bound is (2) of docs/guarantee.md or, in space, (15) of docs/guarantee-space.md.
+    `across` is the impulse along the other axis.
     """
     tau = time_to_go(section.label, elapsed, law)
     doubt = impulse_doubt(impulse, across, law)
     chains.shift(section, tau, -impulse)
+    # Otherwise the bound is zero: `pointing_along` is zero with `pointing_across`.
     if law.impulse_error > 0.0 or law.pointing_across > 0.0:
         chains.spread(section, tau, doubt)
 

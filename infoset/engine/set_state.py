@@ -101,6 +101,8 @@ class SetState:
         self.lost_step = np.full(batch, -1, dtype=np.int64)
         self.lost_label = np.zeros(batch)
         has_phi = guarantee and model.is_guaranteed
+        # Phi reads label limits, closing speed, step and range threshold here: all axes have the
+        # same ones.
         self.phi = GuaranteedMiss(self.laws[0], batch, model.speed_error) if has_phi else None
 
         self._none = np.zeros(batch, dtype=bool)

@@ -70,10 +70,11 @@ def bound_values(name: str, value: ArrayLike, *shapes: tuple[int, ...]) -> Float
 
 def constraint_values(
     names: tuple[str, str], rows: ArrayLike, limits: ArrayLike, *shape: str | int
-) -> Any:
+) -> tuple[Floats, Floats]:
     """Return rows of a shape (..., k, n) and their limits, shape (..., k).
 
-    The limits may be infinite.
+    The limits may be infinite, but not NaN or larger than `MAXIMUM`. Without "..." in `shape` they
+    have one axis.
     """
     normals = finite_values(names[0], rows, *shape)
     ends = real_values(names[1], limits)

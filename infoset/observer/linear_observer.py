@@ -111,7 +111,8 @@ class Estimate:
         Raises
         ------
         ValueError
-            After more than 20 000 steps and measurements: the record is no longer kept.
+            If a run is reduced and the estimate follows more than 20 000 steps and measurements:
+            the record is no longer kept.
         """
         lower, upper = (np.atleast_2d(end) for end in self._hull)
         excess = np.where(np.isnan(lower), np.nan, 0.0)
@@ -586,6 +587,9 @@ class LinearObserver:
         self, measurements: ArrayLike | Sequence[Any], inputs: ArrayLike | None = None
     ) -> list[Estimate]:
         """Process the measurements of several steps; return the estimate after each of them.
+
+        The first measurement is of the current step: there is no step before it. A second call must
+        begin after `predict`.
 
         Parameters
         ----------

@@ -296,10 +296,12 @@ def _followed(pursuer: Side, evader: Side, radius: float, latest: float, left: f
 
 
 def _along(paths: tuple[ExtremalPath, ExtremalPath], node: Node) -> tuple[float, float]:
-    """Return the drift of the Hamiltonian, scaled to one, and the minimum distance from the centre.
+    """Return the drift of the Hamiltonians, and the minimum distance from the centre.
 
-    The costate of the mass is the integral of |p_v| thrust / m^2, by Gauss and Legendre's rule on
-    panels.
+    H_P and H_E are constant each. The drift is the larger one of their maximum deviations from the
+    value at the end, divided by the closing speed: the sum of both is then one. The costate of the
+    mass is minus the integral of |p_v| thrust / m^2 from a time to the end, by Gauss and Legendre's
+    rule on panels.
     """
     points, weights = np.polynomial.legendre.leggauss(_POINTS)
     edges = np.linspace(0.0, node.duration, _PANELS + 1)

@@ -268,10 +268,11 @@ class _ThrustInAxes(NamedTuple):
 
 
 def _in_own_axes(fixed: Floats, turned: Floats, unit: float = 1.0) -> _ThrustInAxes:
-    """Return the thrust fixed + turned v, of shapes (m,) and (m, p), by directions.
+    """Return the thrust fixed + turned v by the directions in which v moves it and the others.
 
-    Its bound is `unit`. A cone that also contains the directions in which the thrust is constant is
-    the same set, but the interior-point method loses digits: gaps were 1e-7 in place of 1e-9, and
+    Shapes are (m,) and (m, p). The bound of the thrust is `unit`; changes in the other directions
+    are at most `_STILL` of it and are dropped. A cone that also contains these directions is the
+    same set, but the interior-point method loses digits: gaps were 1e-7 in place of 1e-9, and
     rounding decided which programs were refused.
     """
     axes, movements, _ = np.linalg.svd(turned, full_matrices=False)
@@ -402,6 +403,8 @@ def min_l1(lifted: Lifted, scale: Floats) -> Floats:
 def deep_point(lifted: Lifted) -> tuple[Floats, float]:
     """Return the centre and the radius of a large ball inside a set with thrust in a ball.
 
+    The set has no equations (`lifted.equal` is not used), and the radius is at most 1.
+
     The effect of the radius on the thrust of a period is bounded by the norm of its response: the
     ball is inside, but may not be the largest.
     """
@@ -409,7 +412,7 @@ def deep_point(lifted: Lifted) -> tuple[Floats, float]:
         return np.zeros(0), 0.0
     cost = np.concatenate([np.zeros(lifted.size), [-1.0]])
     rows = np.column_stack([lifted.rows, np.linalg.norm(lifted.rows, axis=1)])
-    # The minimum bound on the radius keeps the program bounded where no row depends on v.
+    # The radius is at most 1 (chosen), so that the program is bounded where no row depends on v.
     program = ConeProgram(cost).keep(
         np.vstack([rows, -cost]), np.concatenate([lifted.limits, [1.0]])
     )

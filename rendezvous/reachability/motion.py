@@ -20,8 +20,11 @@ from infoset.rendezvous.relative_motion import (
 _RELATIVE = 1e-12
 """Relative error of a step of the integrator, near the smallest that DOP853 accepts in doubles."""
 _ABSOLUTE = 1e-9
-"""Absolute error of a step of the integrator, m and m/s: it acts only near zero, below the printed
-digits of a miss."""
+"""Absolute error of a step of the integrator, m, m/s and rad (true anomaly).
+
+It is the greater part of the tolerance of components below 1000, thus of the velocities and of the
+anomaly, and below the printed digits of a miss.
+"""
 
 
 class MotionModel(Enum):
@@ -74,7 +77,7 @@ class NonlinearMotion:
     """Relative motion in a central field, in Hill's axes (see `relative_motion`).
 
     Equations (1) of Shorikov and Goranov (2021), whose x is -y here and whose y is x, with w^2 r^4
-    / p = mu, integrated by DOP853 to 1e-12. The passive craft is on the `orbit`.
+    / p = mu, integrated by DOP853 (`_RELATIVE`, `_ABSOLUTE`). The passive craft is on the `orbit`.
     """
 
     orbit: EllipticOrbit
@@ -105,7 +108,10 @@ class NonlinearMotion:
             return np.repeat(initial[:, None, :], len(times), axis=1)
 
         def slope(_time: float, flat: Floats) -> Floats:
-            """Rates of (true anomaly, states of all paths, by component)."""
+            """Rates of (true anomaly, states of all paths, by component).
+
+            `push` is the acceleration, m/s^2; k2 = (mu / p^3)^(1/2), so that w = k2 rho^2.
+            """
             anomaly = flat[0]
             x, y, z, vx, vy, vz = flat[1:].reshape(6, count)
             rho = 1.0 + e * np.cos(anomaly)

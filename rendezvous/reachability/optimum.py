@@ -156,7 +156,9 @@ def _same_for_all(lifted: Lifted, minimum: MinimumNorm) -> Floats:
 def block_reaches_zero(block: StateBlock) -> bool:
     """Return whether admissible controls lead a block to zero.
 
-    `NoSolutionError` is raised if neither such a control nor a positive lower bound was found.
+    One program decides whether the constraints have a solution; if they have, `_OptimumSearch`
+    solves one or more cone programs. `NoSolutionError` is raised if neither such a control nor a
+    positive lower bound was found.
     """
     relaxation, _ = min_relaxation(lift(block))
     if relaxation > _KEPT:

@@ -207,7 +207,13 @@ def min_periods(problem: ReachabilityProblem) -> int | None:
     """Return the minimum number of periods in which zero can be reached, at most T, or None.
 
     If the zero state satisfies all constraints, it can be held, and the minimum number is computed
-    by bisection; otherwise all numbers are tried. Each block and number needs a linear program.
+    by bisection; otherwise all numbers are tried, in ascending order, up to the first that reaches
+    zero. Each block and number needs the programs of `block_reaches_zero`.
+
+    Raises
+    ------
+    NoSolutionError
+        If a minimum norm was not solved to its accuracy.
     """
 
     def reached(periods: int) -> bool:

@@ -167,10 +167,12 @@ def strip_of(normal_x: float, normal_y: float) -> Strip:
 def remove_part(
     segments: Segments, i: int, sign: float, to_remove: float, strip: Strip, removed: Removed
 ) -> tuple[float, Removed]:
-    """Remove a segment, or the part of it with the height `to_remove`.
+    """Remove a segment, or the part of it with the height `to_remove`, which is positive.
 
     Return the height that is still to be removed, not positive if the segment was enough, and the
-    sum of what was removed. `sign` is the sign of the segment in this sum.
+    sum of what was removed. `sign` is the sign of the segment in this sum. The removed part is
+    noted in `segments.part`. The share is exactly 1 for a whole segment, so that exactly nothing of
+    it is left (`remove_whole_segments`).
     """
     height = abs(strip.normal_x * segments.x[i] + strip.normal_y * segments.y[i])
     share = 1.0 if height <= to_remove else to_remove / height
@@ -187,7 +189,10 @@ def remove_part(
 
 @allocation_free
 def remove_whole_segments(segments: Segments, count: int) -> int:
-    """Close the gaps of segments of which nothing is left, and return the number of the others."""
+    """Close the gaps of segments of which nothing is left, and return the number of the others.
+
+    The share that is left of a whole segment is exactly zero (`remove_part`).
+    """
     kept = 0
     for i in range(count):
         if segments.share[i] == 0.0:

@@ -2,6 +2,7 @@
 "use strict";
 // Sections of information sets as they travel in the page.
 
+// Equal to STEPS_OF_A_BOX of interception/page.py.
 const STEPS_OF_A_BOX = 65535;
 
 /** The sets of a record. A set predicted from a step is that before the measurement of the next step, if the page has both. */

@@ -27,9 +27,13 @@ from infoset.sim.statistics import shows
 _BINS = 48
 """Number of bins of a histogram: a panel has room for bars of a millimetre and a half."""
 _HILL = 0.62
-"""Height of a histogram, in rows."""
+"""Height of a histogram, in rows; chosen."""
 _BAR = 0.17
-"""Distance of the quantile bar below the histogram, in rows."""
+"""Distance of the quantile bar below the histogram, in rows; chosen."""
+_ABOVE = 0.78
+"""Room above the first line, in rows: a histogram, with a margin of 0.16; chosen."""
+_BELOW = 0.38
+"""Room below the last line, in rows: a quantile bar, with a margin of 0.21; chosen."""
 _MARK: dict[str, Any] = {"color": INK, "linestyle": "none", "zorder": 4.0}
 
 
@@ -37,8 +41,9 @@ _MARK: dict[str, Any] = {"color": INK, "linestyle": "none", "zorder": 4.0}
 def draw_comparison(compared: Sequence[Comparison], radius_m: float | None = None) -> Figure:
     """Draw the distributions of the miss (left) and of the impulse spent.
 
-    There is a panel per noise, with a row per strategy. Misses are on a logarithmic axis, with a
-    line at the radius of the body, m.
+    Each noise has a row of two panels, and each strategy a line in them. With several tie rules,
+    each run has the value of its worst one. Misses are on a logarithmic axis, with a line at the
+    radius of the body, m.
     """
     names = list(dict.fromkeys(each.strategy for each in compared))
     noises = {each.noise: each.noise_title for each in compared}
@@ -64,7 +69,8 @@ def draw_comparison(compared: Sequence[Comparison], radius_m: float | None = Non
 
     for axes, label in zip(grid[-1], ("miss, m", "impulse spent, m/s"), strict=True):
         axes.set_xlabel(label)
-    grid[0, 0].set(ylim=(len(names) - 0.62, -0.78), yticks=range(len(names)), yticklabels=names)
+    bottom = len(names) - 1 + _BELOW
+    grid[0, 0].set(ylim=(bottom, -_ABOVE), yticks=range(len(names)), yticklabels=names)
     letters([*grid.flat], [title for title in noises.values() for _ in range(2)])
     legend_below(figure, 3)
     return figure

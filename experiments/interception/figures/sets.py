@@ -55,9 +55,9 @@ _ANGLES = ("mrad", "µrad")
 _SMALL = 0.1
 """Largest number of an axis up to which its second unit is used."""
 _VISIBLE = 0.3
-"""Share of common limits below which a set is too small to see.
+"""Share of common limits, in omega or alpha, below which a box is too small to see; chosen.
 
-The planes of a row then have their own limits.
+All planes of its lateral axis in the row then have their own limits.
 """
 _FAR = 1.5
 """Distance of a measured angle from its set, in heights of the set, above which it is not shown."""
@@ -242,10 +242,11 @@ def _draw_outline(axes: Axes, outline: Floats, colour: Floats, zorder: float) ->
 
 
 def level_planes(row: Sequence[Axes], planes: Sequence[Plane]) -> None:
-    """Set the limits of planes, and draw the measurements within them.
+    """Set the limits of planes, then name their units and draw the measurements.
 
-    The planes of a lateral axis have the same limits, or their own if a set would then be too small
-    to see.
+    The planes of a lateral axis have the same limits, or their own if a box (`Plane.box`: the set,
+    the true state and a near measurement) would then be too small to see. A measurement far from
+    its set is beyond the limits. The units follow from the limits, which are set first.
     """
     for axis in {plane.axis for plane in planes}:
         same = [

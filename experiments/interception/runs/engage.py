@@ -102,6 +102,7 @@ def _summary(record: Record, elapsed_s: float) -> dict[str, object]:
     if is_of_paper(record.scenario):
         is_game = record.noise_name == NoiseKind.GAME.value
         has_range_sensor = record.scenario.range_sensor is not None
+        # Curves of the paper: 1 random, 2 random with range sensor, 3 game, 4 game with the sensor.
         keys["published_curve"] = 1 + has_range_sensor + 2 * is_game
     keys["noise"] = record.noise_name
     keys["strategy"] = record.strategy

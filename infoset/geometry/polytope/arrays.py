@@ -186,14 +186,14 @@ def half_spaces(one: PolytopeArrays, origin: Floats | float = 0.0) -> tuple[Floa
 
 
 def own_and_others(equations: Floats) -> tuple[Integers, Integers]:
-    """Return the numbers of d own coordinates of a flat set, and of the others.
+    """Return the indices of the own coordinates of a flat set, and of the others.
 
-    The others, in the order of their equations, are functions of the own coordinates: in
-    `equations`, shape (n - d, n + 1), their columns are the columns of the identity.
+    A set of dimension d has d own coordinates. The others, in the order of their equations, are
+    functions of them: in `equations`, shape (n - d, n + 1), their columns are the columns of the
+    identity. These columns are exact: they are compared without tolerance.
     """
-    bound = equations[:, :-1]
-    others = np.array(
-        [(unit == bound.T).all(axis=1).argmax() for unit in np.eye(len(bound))], np.int64
-    )
-    own = np.delete(np.arange(bound.shape[1]), others)
+    coefficients = equations[:, :-1]
+    units = np.eye(len(coefficients))
+    others = np.array([(unit == coefficients.T).all(axis=1).argmax() for unit in units], np.int64)
+    own = np.delete(np.arange(coefficients.shape[1]), others)
     return own, others

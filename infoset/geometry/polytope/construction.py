@@ -370,7 +370,8 @@ def _in_coordinates_of(
     """Return half-spaces rows (x - origin) <= limits as rows (a, b) in the coordinates of a set.
 
     For a flat set these are its own coordinates: the others are functions of them. Entries that are
-    the rounding of a difference are zero; a row without other entries holds to this rounding.
+    the rounding of a difference are zero. A row without a direction gets the limit 0 if the set
+    satisfies it to ON of its terms; otherwise its limit stays negative, and the set is outside.
     """
     facets = _scaled(rows, limits, origin, whole.centre, whole.scale)
     if not len(whole.equations):

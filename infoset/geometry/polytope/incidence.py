@@ -166,6 +166,7 @@ def is_closed(on: Flags, dimension: int) -> bool:
 def _is_closed(bits: Bits, dimension: Any) -> bool:
     """Whether vertices are all vertices of a polytope of two or more dimensions; see `is_closed`.
 
+    `bits` are the vertices, or the facets in their place. `dimension` is an integer of any type.
     The vertices are visited along the edges, from the first one.
     """
     k, words = bits.shape
