@@ -38,6 +38,11 @@ _IMPULSES: tuple[tuple[float, str, dict[str, Any]], ...] = (
     (0.9, "impulse: 90 %", {"color": "#d9a39e", "linewidth": 0.9}),
     (0.5, "impulse: median", {"color": IMPULSE, "linewidth": 1.3}),
 )
+_OF_ONE_RUN: tuple[float, str, dict[str, Any]] = (
+    1.0,
+    "impulses of the run",
+    {"color": IMPULSE, "linewidth": 1.3},
+)
 
 
 @style()
@@ -46,7 +51,8 @@ def draw_corridor(curves: Sequence[Curve], courses: Sequence[Courses]) -> Figure
 
     The possible miss is the maximum without further impulses. Its quantiles are taken over the
     runs that still have a complete set (see `Courses`), and end when these are less than half of
-    the runs. Quantiles for which the runs are too few are not drawn.
+    the runs. Quantiles for which the runs are too few are not drawn; of a single run its impulses
+    are drawn.
     """
     rows = -(-len(curves) // 2)
     columns = min(2, len(curves))
@@ -101,10 +107,13 @@ def _draw_impulses(axes: Axes, course: Courses) -> None:
     maximum = float(course.impulse_m_s.max()) or 1.0
     minimum = float(course.impulse_m_s[course.impulse_m_s > 0.0].min(initial=maximum))
     bottom = 0.5 * max(minimum, 10.0**-_DECADES * maximum)
-    for level, name, look in _IMPULSES:
-        if shows(len(course.impulse_m_s), level):
-            sizes = np.quantile(course.impulse_m_s, level, axis=0)
-            given = sizes > bottom
-            axes.vlines(course.before_arrival_s[given], 1e-12, sizes[given], label=name, **look)
+    runs = len(course.impulse_m_s)
+    drawn = [each for each in _IMPULSES if shows(runs, each[0])]
+    if runs == 1:
+        drawn = [_OF_ONE_RUN]
+    for level, name, look in drawn:
+        sizes = np.quantile(course.impulse_m_s, level, axis=0)
+        given = sizes > bottom
+        axes.vlines(course.before_arrival_s[given], 1e-12, sizes[given], label=name, **look)
     axes.set(yscale="log", ylim=(bottom, 2.0 * maximum))
     plain_ticks(axes.yaxis)

@@ -272,6 +272,19 @@ def test_the_corridor_has_quantiles_of_possible_misses_and_impulses() -> None:
     assert "impulse: 90 %" not in legend(figure)
 
 
+def test_the_corridor_of_one_run_has_its_impulses() -> None:
+    scenario = load_scenario("haiv-2013")
+    courses = Courses(scenario, 1)
+    curve = Curve(1, "random", False, simulate(scenario, 1, observe=courses.observe))
+
+    below = draw_corridor([curve], [courses]).axes[1]
+
+    (impulses,) = below.collections
+    assert impulses.get_label() == "impulses of the run"
+    tops = sorted(float(path.vertices[:, 1].max()) for path in impulses.get_paths())
+    assert tops == sorted(courses.impulse_m_s[courses.impulse_m_s > 0.0].tolist())
+
+
 def test_a_long_flight_shows_the_errors_of_its_angles_within_their_bound_over_the_time_to_go() -> (
     None
 ):
