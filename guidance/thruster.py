@@ -17,6 +17,7 @@ from infoset.limits import POSITIVE, Limits, NotNegative, Part, Positive, check_
 MAX_IMPULSES = 100_000
 """Maximum number of impulses that a period gives: a flight has no more steps."""
 _DELAY = Limits(minimum=0, maximum=MAX_IMPULSES, whole=True)
+"""Limits of a delay in steps: at most as many as a flight has."""
 MIN_FLOAT = float(np.finfo(np.float64).smallest_subnormal)
 """Minimum divisor of an impulse: the modulus of an impulse that is not zero is not less."""
 

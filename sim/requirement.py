@@ -31,7 +31,8 @@ _FORM = re.compile(
     rf"|(?P<quantity>\w+)(?:\s+p(?P<level>{DIGITS}))?\s*<\s*(?P<bound>{DIGITS}))\s*"
 )
 _DEFAULT_LEVEL = "99"
-"""Quantile, in percent, of a requirement that names none."""
+"""Quantile, in percent, of a requirement that names none: the largest one of the tables that usual
+numbers of runs show."""
 _BISECTIONS = 50
 """Bisections for an end of an interval: 2^-50 is near the rounding of a share."""
 _SAMPLE_SIZES = 2000

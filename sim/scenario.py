@@ -55,16 +55,23 @@ class _Speed(Limits):
 
 
 _SPEED = _Speed(above=0.0)
+"""Limits of a closing speed."""
 _DIRECTION = Limits(minimum=-2.0 * math.pi, maximum=2.0 * math.pi)
+"""Limits of an angle in a plane: any turn, counted from -180 or from 0 degrees."""
 _ELEVATION = Limits(minimum=-0.5 * math.pi, maximum=0.5 * math.pi)
+"""Limits of an angle to a plane."""
 _SIGMA = Limits(minimum=0.01, maximum=10.0)
 """Limits of a standard deviation in bounds of the error: from almost no errors to almost uniform
 ones, whose truncated density differs by 0.5 %.
 """
 MAX_STEPS = 100_000
-"""Maximum number of steps of a flight; all random numbers are drawn before it starts."""
+"""Maximum number of steps of a flight. Chosen: all random numbers are drawn before it starts, and a
+run with its history then takes 60 MB (`simulate.STEPS_AT_ONCE`)."""
 STEPS_ROUNDING = 1e-9
-"""Relative rounding error of the number of steps: a flight of exactly `MAX_STEPS` is allowed."""
+"""Relative rounding error of the number of steps: a flight of exactly `MAX_STEPS` is allowed.
+
+Chosen: far above the rounding of a quotient, and less than one step.
+"""
 MIN_SHARE_WITHIN = 0.01
 """Minimum share of the starts of a covariance within the dispersion; a start is drawn again at most
 some 1000 times.

@@ -7,9 +7,10 @@ import difflib
 from collections.abc import Iterator, Sequence
 
 LONGEST_SHOWN = 60
-"""Maximum length of a value in a message."""
+"""Maximum length of a value in a message; chosen: a message stays a few lines long."""
 _LONGEST_WORD = 100
-"""Number of letters of a word that are compared: the time grows as their square."""
+"""Number of letters of a word that are compared: the time grows as their square. No name of a key
+or an option has as many."""
 
 
 def on_a_screen(message: str) -> str:

@@ -17,6 +17,7 @@ FORMAT = "infoset-results-1"
 """Value of the key ``format`` of a file of results; another number means other keys."""
 MAX_FILE_BYTES = 1 << 28
 """Maximum size of a file that `load_results` reads, about 500 000 runs; `save` does not check it.
+Chosen.
 
 Larger samples are campaigns, which have files of their own.
 """

@@ -35,6 +35,7 @@ _TRACK_POINTS = 241
 _MAX_NAMED = 12
 """Largest number of visits with names in a figure: more names overlap."""
 _SUN_M3_S2 = 1.32712440018e20
+"""Gravitational parameter of the Sun, m^3/s^2: DE405, as in the scenarios about it."""
 _TARGET: dict[str, Any] = {
     "color": LIMIT,
     "linewidth": 0.7,

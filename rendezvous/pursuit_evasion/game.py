@@ -20,7 +20,8 @@ Vector = tuple[float, float, float]
 STANDARD_GRAVITY_M_S2 = 9.80665
 """Standard acceleration of gravity, exact by definition: CGPM, 1901."""
 LONGEST_REVOLUTIONS = 15.0
-"""Default of the longest duration of a game, in revolutions of the pursuer."""
+"""Default of the longest duration of a game, in revolutions of the pursuer; chosen: a day or so in
+low orbits."""
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,8 @@ _PRESSED = 1e-7
 thrust is the same in every optimal control: the error of multipliers in a program with cones
 (`CONE_TOLERANCE`)."""
 _MIN_PRESSURE = 1e-300
-"""Pressure up to which a bound holds nothing, also if all multipliers are zero."""
+"""Pressure up to which a bound holds nothing, also if all multipliers are zero: near the smallest
+double, so that it decides in no other case."""
 _CLOSE = 1e-12
 """Relative gap between the norm and its lower bound at which the search stops: the maximum gap of a
 small norm (`_ABSOLUTE`)."""
@@ -49,13 +50,14 @@ _RANK = 1e-13
 """Relative singular value below which equations count as dependent. Chosen: optimal controls do not
 change from 1e-14 to 1e-11 in published and random problems."""
 _ROUNDS = (*ATTEMPTS, *ATTEMPTS[:2])
-"""Settings of the solver in the rounds of the search; most searches end after the first."""
+"""Settings of the solver in the rounds of the search; most searches end after the first. The first
+two are tried again, because each round starts from the norm found by the one before."""
 _REACH = 1e4
 """Maximum change of a control in a round, in units of the norm found. Constraints that are farther
 away are left out of the program. Chosen: from 1e3 to 1e5 results change by 1e-7 at most, the
 tolerance of the programs."""
 _MAX_NAMES = 4
-"""Maximum number of conflicting constraints that a message names."""
+"""Maximum number of conflicting constraints that a message names; chosen: they fit two lines."""
 
 
 class EmptyTubeError(ValueError):

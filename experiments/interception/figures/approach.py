@@ -57,7 +57,8 @@ _END: dict[str, Any] = {
     "linestyle": "none",
 }
 _MIN_SHOWN = 1e-3
-"""Minimum miss of a logarithmic axis, as a multiple of the minimum possible miss."""
+"""Minimum miss of a logarithmic axis, as a multiple of the minimum possible miss; chosen: smaller
+misses are the rounding of a curve that passes zero."""
 
 
 @style()

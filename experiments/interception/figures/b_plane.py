@@ -33,14 +33,14 @@ from infoset.sim import Results
 from infoset.sim.statistics import shows
 
 _MAX_COLUMNS = 3
-"""Maximum number of panels in a row of the sheet."""
+"""Maximum number of panels in a row of the sheet; chosen: three fit the width of a page."""
 _FLAT = 1e-12
 """Ratio of the variances at which points are on a line: the square of a rounding error of 1e-6."""
 _OWN_LIMITS_FROM = 3.0
-"""Ratio of the maximum and the minimum median above which each panel has its own limits."""
+"""Ratio of the maximum and the minimum median above which each panel has its own limits; chosen."""
 RADIUS_SHOWN = 2.0
 """The axes extend to the radius of the body if it is at most this multiple of the maximum miss
-shown.
+shown; chosen: the points then still fill half of the panel.
 """
 _PANEL_MM = (56.0, 68.0)
 _BESIDE_MM = (22.0, 40.0)
@@ -54,18 +54,20 @@ limits. Chosen; with this size the total area of the markers stays the same.
 """
 _AT_BODY_SCALE = "at the scale of the body"
 _BODY_FROM = 4.0
-"""Ratio of the axes to the radius of the body above which a second panel shows the body."""
+"""Ratio of the axes to the radius of the body above which a second panel shows the body; chosen."""
 _BODY_SCALE = 2.0
-"""Length of half the axes of this panel, in radii of the body."""
+"""Length of half the axes of this panel, in radii of the body; chosen."""
 
 _CIRCLES: tuple[tuple[float, str, Any], ...] = (
     (0.5, "circle: median of the miss", "-"),
     (0.9, "circle: 90 % of the misses", (0, (4, 1.5))),
 )
+"""Share of the runs, name and line of circles: the quantiles of the miss that tables print."""
 _ELLIPSES: tuple[tuple[float, str, Any], ...] = (
     (0.5, "ellipse: 50 % of the runs", "-"),
     (0.99, "ellipse: 99 % of the runs", (0, (4, 1.5))),
 )
+"""Share of the runs, name and line of the ellipses of a normal distribution; chosen."""
 
 
 @dataclass(frozen=True, eq=False)

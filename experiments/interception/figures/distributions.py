@@ -44,7 +44,7 @@ _LOGARITHMIC_FROM = 50.0
 The radius of the body counts as a median.
 """
 _MIN_SHOWN = 0.01
-"""Quantile at which a logarithmic axis starts: misses can be arbitrarily small."""
+"""Quantile at which a logarithmic axis starts: misses can be arbitrarily small. Chosen."""
 
 
 @dataclass(frozen=True, eq=False)

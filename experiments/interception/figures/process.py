@@ -37,10 +37,14 @@ from infoset.sim import Record
 RANGE_SHARE = 0.1
 """Share of the first range below which values do not set the limits.
 
-Angle and rate grow as 1/x and 1/x^2 there.
+Angle and rate grow as 1/x and 1/x^2 there. Chosen: the limits then contain ten times the first
+angle.
 """
 _MIN_RATE = 0.02
-"""Quantile of the moduli of the rates at which their logarithmic axis starts: a rate can be 0."""
+"""Quantile of the moduli of the rates at which their logarithmic axis starts: a rate can be 0.
+
+Chosen.
+"""
 _IMPULSE_ROOM = 1.2
 """Limit of the axes in units of the greatest impulse; chosen."""
 _ZERO: dict[str, Any] = {"color": LIMIT, "linewidth": 0.6}

@@ -53,14 +53,17 @@ _RATES = ("µrad/s", "nrad/s")
 _ANGLES = ("mrad", "µrad")
 """Units of angles; the second one is for small numbers."""
 _SMALL = 0.1
-"""Largest number of an axis up to which its second unit is used."""
+"""Largest number of an axis up to which its second unit is used: there it is at most 100."""
 _VISIBLE = 0.3
 """Share of common limits, in omega or alpha, below which a box is too small to see; chosen.
 
 All planes of its lateral axis in the row then have their own limits.
 """
 _FAR = 1.5
-"""Distance of a measured angle from its set, in heights of the set, above which it is not shown."""
+"""Distance of a measured angle from its set, in heights of the set, above which it is not shown.
+
+Chosen: nearer ones leave the set at least two fifths of the panel.
+"""
 
 
 @style()

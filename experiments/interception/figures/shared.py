@@ -19,7 +19,7 @@ RADIUS: dict[str, Any] = {"color": INK, "linestyle": (0, (6, 1.5, 1, 1.5)), "lin
 GUARANTEE: dict[str, Any] = {"color": GUARANTEED, "linestyle": (0, (7, 1.5)), "linewidth": 1.4}
 """Line of the guaranteed miss."""
 MAX_VECTORS = 2000
-"""Number of points above which they are pixels in the PDF file."""
+"""Number of points above which they are pixels in the PDF file; chosen: more are slow to show."""
 
 _TICKS_S = (0.01, *SECONDS.values())
 """Ticks of the time before the arrival."""

@@ -16,17 +16,18 @@ DEFAULT_DEGREE = 7
 """Degree for tables that name none; tables of orbits have degrees of 5 to 9."""
 MAX_DEGREE = 20
 """Largest degree: near the ends of a table an error of the states grows by about two to the power
-of the degree.
+of the degree. Chosen: a rounding of 1 mm then becomes 1 km.
 """
 SPACING = Fraction(1, 2)
 """Smallest distance of two states of a polynomial in units of the interval that contains the epoch.
 
 Where a step of 600 s changes to one of a day, eight consecutive states amplify a rounding of 1 mm
-to 10 000 km.
+to 10 000 km. Chosen: equal steps have the distance 1, so that states near a small change of
+the step are not left out.
 """
 GAP = 20
 """An interval of more than this number of neighbouring steps is a gap, and the states in it are not
-known.
+known. Chosen: steps that adapt to the motion change less from one to the next.
 """
 
 

@@ -67,7 +67,7 @@ their roundings are flat.
 """
 _PIVOT_GROWTH = 64.0
 """Growth of distances from a plane in the pivots of a flat set. For complete pivoting in R^6 it is
-at most 11 (Wilkinson's bound).
+at most 11 (Wilkinson's bound); chosen: several times this.
 """
 _MEETING = 16.0 * SNAP
 """Distance from a vertex of computed facets that meet in it; up to 6 SNAP were measured in

@@ -32,7 +32,10 @@ PARALLEL = SNAP
 relative to them.
 """
 _NEARLY_PARALLEL = 1.0 - 1e-6
-"""Cosine from which the angle is computed: a cosine of 1 - 5e-23 is rounded to 1."""
+"""Cosine from which the angle is computed: a cosine of 1 - 5e-23 is rounded to 1.
+
+Chosen: the sine is 1.4e-3 there, and generators with a smaller cosine are certainly not parallel.
+"""
 COPLANAR = 128.0 * UNSURE
 """Determinant of three generators of length one that count as coplanar: 500 roundings.
 
