@@ -25,13 +25,23 @@ HIT_M = 100.0
 
 _OUTPUT_TIMES = 65
 """Number of times in a leg at which the distance is computed, before its minimum or the first time
-within the radius is refined; chosen. A capture between two of them is not seen."""
+within the radius is refined. A capture between two of them is not seen. Chosen: `leo-pursuit` and
+`geo-pursuit` end alike from 17 to 257, with and without errors of observation (measured)."""
 _PAST = 1.05
-"""Length of the last leg by the time to the predicted capture, to include the closest approach."""
+"""Length of the last leg by the time to the predicted capture, to include the closest approach.
+
+Chosen: the pursuits of `_OUTPUT_TIMES` end alike from 1.0125 to 1.2 (measured).
+"""
 _WIDE = 2.0
-"""Factor of the drift of a leg within which a capture is looked for: thrust adds to the drift."""
+"""Factor of the drift of a leg within which a capture is looked for: thrust adds to the drift.
+
+Chosen: the pursuits of `_OUTPUT_TIMES` end alike from 0.5 to 8 (measured); a large one costs time.
+"""
 _PATIENCE = 1.0
-"""Delay of a capture, by the time to it, up to which a plan from scratch replaces the last one."""
+"""Delay of a capture, by the time to it, up to which a plan from scratch replaces the last one.
+
+Chosen: the pursuits of `_OUTPUT_TIMES` end alike from 0.25 to 4 (measured).
+"""
 _MAX_PLANS = 10_000
 """Largest number of plans: five times the default of the command, `MAX_PLANS`."""
 _LONGEST = 1e3
@@ -320,6 +330,7 @@ class _Pursuit:
         near = int(np.argmin(values))
         low = times[max(0, near - 1)]
         high = times[min(_OUTPUT_TIMES - 1, near + 1)]
+        # A tolerance far below the times that are printed.
         at = float(
             minimize_scalar(
                 distance, bounds=(low, high), method="bounded", options={"xatol": 1e-12}
@@ -348,7 +359,7 @@ class _Pursuit:
 def _lasts(craft: ExtremalCraft, dry: float) -> float:
     """Return the duration of the propellant.
 
-    It is a little less for a craft without dry mass, whose acceleration diverges.
+    It is 0.1 % less for a craft without dry mass, whose acceleration diverges; chosen.
     """
     if not craft.flow > 0.0:
         return np.inf

@@ -14,16 +14,16 @@ from infoset.sim.scenario import Scenario, need_scenario
 
 LABELS_A_PERIOD = 8
 """Number of labels in a period of the bound, which oscillates with the label; the period is the
-distance travelled between two measurements. Chosen: the time is in proportion to it, and the bound of
-dart-2022 is the same from 2 to 32 (measured); of asteroid-1997-single it is 0.02 % smaller with 2 and
-0.005 % greater with 32.
-"""
+distance travelled between two measurements. Chosen: the time is in proportion to it, and the bound
+of dart-2022 is the same from 2 to 32 (measured); of asteroid-1997-single it is 0.02 % smaller with
+2 and 0.005 % greater with 32."""
 PERIODS_LOOKED_AT = 7
-"""Maximum number of examined periods. Chosen: the bounds of dart-2022 and asteroid-1997-single are the
-same from 2 to 28 (measured)."""
+"""Maximum number of examined periods. Chosen: the bounds of dart-2022 and asteroid-1997-single are
+the same from 2 to 28 (measured)."""
 REFINEMENTS = 5
-"""Number of times that the distance between labels is halved around the best one: to 1/32. Chosen: the
-bound of asteroid-1997-single is 0.1 % smaller without, and 0.005 % greater with ten (measured)."""
+"""Number of times that the distance between labels is halved around the best one: to 1/32. Chosen:
+the bound of asteroid-1997-single is 0.1 % smaller without, and 0.005 % greater with ten (measured).
+"""
 _BOUND = attrgetter("bound_m")
 
 
