@@ -15,7 +15,8 @@ from infoset.limits import Checked, Limits
 
 LAST_SECONDS_S = 3.0
 """Time before the arrival or the last impulse in which the strategy acts as U_s
-(`symmetric_impulse`). Chosen for the scenario of 1997, where it is six steps.
+(`symmetric_impulse`). Chosen for the scenario of 1997, where it is six steps: from 0.75
+to 12 s the 95 % quantile of the miss differs by 2 mm, and the impulses are 80 to 77 m/s (measured).
 """
 
 

@@ -162,7 +162,8 @@ class SetSettings:
         Number of x-sections at the start, on a uniform grid over the possible ranges, ends
         included.
     fewest_sections : int
-        If fewer sections are left, replay makes a new grid of 2 fewest_sections + 1.
+        If fewer sections are left, replay makes a new grid of 2 fewest_sections + 1: more than half
+        of them can become empty before the next grid is needed.
     recovery : Recovery
         Treatment of a set that a measurement leaves empty.
     wrong_images : int

@@ -83,7 +83,9 @@ class SetState:
         self.table = law_table(self.laws)
 
         minimum, maximum = model.label_limits_m
-        # A new grid has one label more than twice the fewest sections.
+        # Labels of a new grid of `refine`, for which the slots have room. Chosen: more than half of
+        # them can become empty before the next one is needed. With k + 1 to 8 k + 1 labels the
+        # medians of the miss in asteroid-1997 differ by 3 %, and as many sets become empty.
         self._grid = 2 * model.fewest_sections + 1
         labels = np.full((batch, max(model.sections, self._grid)), maximum)
         if model.sections > 1:

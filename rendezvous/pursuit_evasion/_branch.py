@@ -19,11 +19,13 @@ from infoset.rendezvous._arrays import Floats
 from infoset.rendezvous.pursuit_evasion._pair import FINE, MAX_RESIDUAL, ROUGH, Node, Pair
 
 _LONGEST_STEP = 0.3
-"""Longest step of the duration: 20 in a revolution."""
+"""Longest step of the duration: 20 in a revolution. Chosen: capture times of `leo-pursuit` and
+`geo-pursuit` are the same to 1e-6 s from 0.075 to 1.2 (measured)."""
 _SHORTEST_STEP = 1e-6
 """Shortest step of the duration: a branch that needs a shorter one has a fold."""
 _PREDICTED_WITHIN = 3e-3
-"""Error of a predicted extremal for which steps are chosen: two or three iterations correct it."""
+"""Error of a predicted extremal for which steps are chosen: two or three iterations correct it. The
+capture times of `_LONGEST_STEP` are the same from 7.5e-4 to 1.2e-2 (measured)."""
 _TRACKED = 1e-7
 """Tolerance of the propagation of extremals before the capture: a thousandth of the corrections
 that are accepted (`ROUGH`). Captures, and their times, are polished with `FINE`, and do not depend
