@@ -13,7 +13,11 @@ from infoset.guidance.situation import Situation
 from infoset.guidance.symmetric_impulse import range_at_impulse
 
 PARTS = 4
-"""Parts of the labels between two sections: the deciding time to go is often between sections."""
+"""Parts of the labels between two sections: the deciding time to go is often between sections.
+
+Chosen: the misses of asteroid-1997, with 29 sections, are the same from 1 to 16, in 0.6 to 1.6
+times the time (measured).
+"""
 MIN_AUTHORITY_M = 1e-9
 """Minimum divisor of an effort: after the last impulse the authority is zero. Chosen: far below all
 misses, so that the effort is then far above 1.

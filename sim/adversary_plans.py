@@ -21,9 +21,9 @@ from infoset.sim.scenario import Manoeuvre, Scenario, corners
 from infoset.sim.target import amplitudes_m_s2
 
 MAX_CHANGES = 3
-"""Maximum number of changes from a plan to the next."""
+"""Maximum number of changes from a plan to the next; chosen: see the numbers of `adversary`."""
 LATE_STEPS = 12.0
-"""Mean distance from the end, in steps, of the changes near the end."""
+"""Mean distance from the end, in steps, of the changes near the end; chosen: see `adversary`."""
 ANGLE = 0
 """Row of the errors of the angles."""
 

@@ -27,7 +27,7 @@ UNIT = np.eye(3)
 """Unit matrix of space."""
 SEARCH = 3.0
 """Limit of the time of the closest approach, in units of its time along straight lines. Chosen;
-gravity changes the time of an approach that fits a scenario little.
+gravity changes the time of an approach that fits a scenario little, and a later one is refused.
 """
 WIDEST = 0.1
 """Maximum miss of an approach in units of its range at the start: the paths of wider ones are not

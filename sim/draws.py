@@ -27,11 +27,12 @@ streams of the z axis are used.
 """
 MIN_SLOWDOWN = 1.01
 """Minimum factor of the time of a flight at the lowest closing speed. Chosen; a flight ends at its
-arrival, so results do not depend on it.
+arrival, so results do not depend on it: misses have the same bits from 1.001 to 2 (measured).
 """
 MAX_SPEED_CHANGE = 0.75
 """Maximum share of the closing speed that gravity can take away in the time of a flight. Chosen; it
-limits the memory of the random numbers to four times the memory in free space.
+limits the memory of the random numbers to four times the memory in free space. The misses of
+dart-2022 and comet-fast have the same bits from 0.2 to 0.9 (measured).
 """
 
 
