@@ -91,7 +91,8 @@ class PossibleMiss:
     """Half the maximum width of the interval of misses at the last decision, m.
 
     Both values are for errors of images at their bounds, no lost image, and a known range and
-    closing speed; in space they are for both axes at once.
+    closing speed; in space they are for both axes at once. If q images may be wrong
+    (`SetModel.wrong_images`), the last 2q images before this decision are left out.
 
     Parameters
     ----------
@@ -110,9 +111,9 @@ class PossibleMiss:
 def possible_miss(scenario: Scenario) -> PossibleMiss | None:
     """Return the misses that are possible at the last decision.
 
-    None means fewer than two images before it.
+    None means that fewer than two images limit them.
     """
-    images_s = np.array(image_times_s(scenario))
+    images_s = _limiting_images_s(scenario)
     if images_s.size < 2:
         return None
 
@@ -120,6 +121,18 @@ def possible_miss(scenario: Scenario) -> PossibleMiss | None:
     has_closed_form = isinstance(camera, Camera) and camera.miss_probability == 0.0
     images_m = possible_miss_of(scenario) if has_closed_form else None
     return PossibleMiss(images_m, _images_and_speeds_m(scenario, images_s))
+
+
+def _limiting_images_s(scenario: Scenario) -> Floats:
+    """Return the times before the arrival, s, of the images that limit the miss after the last
+    decision: all before it except the last 2q.
+
+    If q images may be wrong, two motions agree with the same measurements although they differ at
+    2q images; it is worst if these are the last ones (Lemma 20b of docs/guarantee-bound.md).
+    """
+    images_s = np.array(image_times_s(scenario))
+    left_out = 2 * scenario.set_model.wrong_images
+    return images_s[: max(0, len(images_s) - left_out)]
 
 
 def _images_and_speeds_m(scenario: Scenario, images_s: Floats) -> float:
@@ -200,9 +213,9 @@ def possible_miss_of(scenario: Scenario, *, constant_bias: bool = False) -> floa
     """Return `possible_miss_m` of the camera and the last impulse of a scenario, m.
 
     In space it is the miss across both axes. It uses the images until the last decision
-    (`image_times_s`), and nothing about the start: the set on board is smaller if the speeds across
-    are known well from the start (`PossibleMiss.images_and_speeds_m`, which ``infoset scenarios
-    check`` prints too).
+    (`image_times_s`), without the last 2q if q images may be wrong, and nothing about the start:
+    the set on board is smaller if the speeds across are known well from the start
+    (`PossibleMiss.images_and_speeds_m`, which ``infoset scenarios check`` prints too).
 
     The disturbance is `set_model.disturbance_m_s2` of each axis; `constant_bias` is an argument of
     `possible_miss_m`.
@@ -224,19 +237,19 @@ def possible_miss_of(scenario: Scenario, *, constant_bias: bool = False) -> floa
             "the closed form is that of a camera that loses no image: set camera.miss_probability "
             "= 0"
         )
-    images_s = image_times_s(scenario)
-    if len(images_s) < 2:
+    images_s = _limiting_images_s(scenario)
+    if images_s.size < 2:
         raise ValueError(
-            "a bound of the miss needs two images until the decision of the last impulse: take "
-            "more images, or earlier"
+            f"a bound of the miss needs at least {2 + 2 * model.wrong_images} images until the "
+            "decision of the last impulse: take more images, or earlier"
         )
     along = (
         possible_miss_m(
             model.closing_speed_m_s,
             camera.constant_error_rad,
             camera.centroid_error_m,
-            images_s[0],
-            images_s[-1],
+            float(images_s[0]),
+            float(images_s[-1]),
             disturbance_m_s2=model.axis(axis).disturbance_m_s2,
             constant_bias=constant_bias,
         )

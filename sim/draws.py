@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from infoset.arrays import Floats, Integers
+from infoset.arrays import Flags, Floats, Integers
 from infoset.guidance import NoiseKind, TieRule
 from infoset.sim.covariance import Covariance
 from infoset.sim.gravity import max_impulses_m_s, with_gravity
@@ -62,6 +62,8 @@ class Draws:
     wrong : ndarray, shape (C, B, steps), or None
         Errors of wrong images in units of their bounds, zero for other images; None has no wrong
         image.
+    wrong_by_noise : ndarray of bool, shape (B, steps), or None
+        Other images that are wrong: the measurement noise of the batch makes these errors.
     redraws : ndarray of int, shape (B,), or None
         Normal starts outside the dispersion that were drawn again; None for uniform starts.
     """
@@ -76,12 +78,20 @@ class Draws:
     bias: Floats | None = None
     images: Floats | None = None
     wrong: Floats | None = None
+    wrong_by_noise: Flags | None = None
     redraws: Integers | None = None
 
     @property
     def steps(self) -> int:
         """Number of steps for which numbers are drawn."""
         return int(self.tie.shape[-1])
+
+    @property
+    def is_wrong(self) -> Flags | None:
+        """Whether each image is wrong, shape (B, steps); None if none is."""
+        if self.wrong is None:
+            return self.wrong_by_noise
+        return np.asarray((self.wrong != 0.0).any(axis=0))
 
 
 class Starts(NamedTuple):

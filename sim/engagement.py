@@ -236,11 +236,10 @@ class Engagements:
         A wrong image does not: the section is that of the set that uses no wrong image. There is no
         such set if more images are wrong than the model allows for.
         """
-        wrong = self._draws.wrong
+        is_wrong = self._draws.is_wrong
         everywhere = np.ones(self._information.batch, dtype=bool)
-        if wrong is None or sensor != BearingSensor.name:
+        if is_wrong is None or sensor != BearingSensor.name:
             return everywhere
-        is_wrong = (wrong != 0.0).any(axis=0)
         has_sound_set = is_wrong.sum(axis=1) <= self._model.wrong_images
         return np.asarray(~(is_wrong[:, self.step] & has_sound_set))
 

@@ -188,9 +188,11 @@ class Bound(FileOptions):
     It holds for all strategies: two true states whose measurements are equal until some step
     receive equal impulses until that step, so at least one of them misses. The bound is the maximum
     miss that such pairs prove; in space, they differ along both axes. Each strategy is simulated
-    with these pairs, and in the searches of infoset adversary. Where range and closing speed are
-    known and there is no gravity, the bound is the value of the game up to a reserve, which is
-    printed. Without --out or --json no file is written.
+    with these pairs, and in the searches of infoset adversary. With information_set.wrong_images
+    some images of each pair are wrong for one of the two states, and the bound without wrong images
+    is printed too. Where range and closing speed are known and there is no gravity, the bound is
+    the value of the game up to a reserve, which is printed. Without --out or --json no file is
+    written.
     """
 
     scenario: ScenarioName = "asteroid-1997"

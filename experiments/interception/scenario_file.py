@@ -12,7 +12,7 @@ from infoset.experiments.common.input_file import read_file
 from infoset.experiments.common.options import choice
 from infoset.experiments.common.units import duration_text, length_text
 from infoset.experiments.interception.strategies import is_own
-from infoset.experiments.interception.study import percent
+from infoset.experiments.interception.study import percent, wrong_images_text
 from infoset.guidance import strategy_names
 from infoset.model import Model, SetModel
 from infoset.sim.closed_form import PossibleMiss
@@ -235,14 +235,18 @@ def flight_facts(scenario: Scenario) -> list[str]:
     if possible is None:
         return lines
 
+    errors = "errors at their bounds"
+    wrong_images = scenario.set_model.wrong_images
+    if wrong_images:
+        errors += f" and {wrong_images_text(wrong_images)}"
     if possible.images_m is not None:
         lines.append(
-            "miss that the images alone leave possible, with errors at their bounds (closed "
-            f"form): up to {length_text(possible.images_m)}"
+            f"miss that the images alone leave possible, with {errors} (closed form): up to "
+            f"{length_text(possible.images_m)}"
         )
     lines.append(
-        "miss that the images and the speeds of [uncertainty] leave possible, with errors at "
-        f"their bounds: up to {length_text(possible.images_and_speeds_m)}"
+        f"miss that the images and the speeds of [uncertainty] leave possible, with {errors}: up "
+        f"to {length_text(possible.images_and_speeds_m)}"
     )
     return lines
 

@@ -397,6 +397,13 @@ def max_guarantee_m(results: Results) -> float | None:
     return float(bounds.max())
 
 
+def wrong_images_text(count: int) -> str:
+    """Return a number of wrong images as text: 1 wrong image, 2 wrong images."""
+    if count == 1:
+        return "1 wrong image"
+    return f"{count} wrong images"
+
+
 def percent(share: float) -> str:
     """Return a share as a percentage with four digits, for example ``99.95 %``.
 

@@ -1,6 +1,6 @@
 """Difference of the lower bound from the value of the game, where Theorem 7 holds.
 
-Theorem 7 and Lemma 22 are in docs/guarantee-bound.md.
+Theorem 7 and Lemma 22 are in docs/guarantee-bound.md, and Theorem 7a for images that may be wrong.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from infoset.arrays import Flags, Floats
+from infoset.covered_set import classes_left_out
 from infoset.information_set import InformationSet
 from infoset.model import CENTROID_ERRORS_AT_THRESHOLD, SetModel, StateBox
 from infoset.sensors import BearingSensor
@@ -39,7 +40,8 @@ class ValueReserve:
     ----------
     lower_bound_m : float
         Reserve of the lower bound itself: the minimum distance in place of the distance at x = 0,
-        Lemma 20, the accelerations and the steps that the search for pairs examines.
+        Lemma 20, the accelerations and the steps that the search for pairs examines. If images may
+        be wrong, also the images that two sets leave out beyond 2q.
     tangent_m : float
         Angles that are not small.
     dead_zone_m : float
@@ -99,7 +101,8 @@ def value_reserve(scenario: Scenario, lower: LowerBound) -> ValueReserve | str:
 
     Notes
     -----
-    docs/guarantee-bound.md, Lemma 22, has the proof. Cost: one information set.
+    docs/guarantee-bound.md, Lemma 22, has the proof. Cost: one information set; with q wrong
+    images and G classes, C(G, 2q).
     """
     course = _course(scenario)
     minimum_m_s = scenario.thruster.min_impulse_m_s
@@ -188,23 +191,32 @@ def _half_widths_m(model: SetModel, nearest_m: float, measured: Flags) -> Floats
     """Return the maximum half-width of the possible misses at each step, m.
 
     Half of the difference of two members of a set is a member of the set from a centred box after
-    measurements of 0.
+    measurements of 0. If images may be wrong, the two can be members of two sets of the cover; both
+    agree with the images that neither of these sets leaves out, those outside up to 2q classes.
     """
     box = model.bounds
     z_m = 0.5 * float(np.ptp(box.z_m))
     vz_m_s = 0.5 * float(np.ptp(box.vz_m_s))
     centred = StateBox((-z_m, z_m), box.x_m, (-vz_m_s, vz_m_s), box.vx_m_s)
-    widest = InformationSet(
-        replace(model, bounds=centred, range_threshold_m=nearest_m), guarantee=False
+    classes = model.classes
+    left_out = classes_left_out(min(2 * model.wrong_images, classes), classes)
+    every = model.steps_in(model.angle_sensor.period_s)
+    ordinary = replace(
+        model,
+        bounds=centred,
+        range_threshold_m=nearest_m,
+        wrong_images=0,
+        image_classes=None,
     )
+    widest = InformationSet(ordinary, len(left_out), guarantee=False)
     half_width_m = np.full(len(measured), np.inf)
     for i in range(len(measured)):
         # Below the minimum range of a camera the set has no label, and impulses are not counted.
         if not widest.tracking.all():
             break
         if measured[i]:
-            widest.measure_angle(0.0)
-        half_width_m[i] = widest.predicted_miss().upper_m[0, 0]
+            widest.measure_angle(0.0, ~left_out[:, i // every % classes])
+        half_width_m[i] = widest.predicted_miss().upper_m[0].max()
         widest.drop_below_threshold()
         widest.predict()
     return half_width_m

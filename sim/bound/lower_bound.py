@@ -88,8 +88,6 @@ def lower_bound(
     ------
     TypeError
         If `scenario` is not a `Scenario`.
-    ValueError
-        If its set allows for wrong images.
 
     Notes
     -----
@@ -108,13 +106,11 @@ def lower_bound(
     In space, each axis has its own sets of differences, and the impulses limit the modulus. The two
     motions of a pair differ along both axes, each by as much as possible, so the bound is not below
     the bound of one axis.
+
+    If q images may be wrong (`wrong_images` of the set), the two need not agree at the last 2q
+    images: q of them are wrong in one motion, and q in the other.
     """
     need_scenario(scenario)
-    if scenario.set_model.wrong_images:
-        raise ValueError(
-            "information_set.wrong_images must be 0: the bound does not allow for wrong images; "
-            f"got {scenario.set_model.wrong_images}"
-        )
     speeds = _examined_speeds(scenario)
     grids = [label_grid(scenario, speed) for speed in speeds]
     total = sum(len(grid) + _refinements(grid) for grid in grids)

@@ -52,6 +52,9 @@ class TruthPair:
     acceleration_m_s2 : ndarray, shape (2, steps) or (2, 2, steps)
         Accelerations of the two motions along z over each step; x = 0 is in the last step. In
         space, those along y and z: axis, motion, step.
+    wrong_steps : tuple of two ndarray of int
+        Steps of the wrong images of each motion, at most q, ascending. They do not limit the
+        difference of the two (Theorem 5b of docs/guarantee-bound.md). Empty for a single motion.
     """
 
     label_m: float
@@ -66,6 +69,7 @@ class TruthPair:
     position_m: Floats
     velocity_m_s: Floats
     acceleration_m_s2: Floats
+    wrong_steps: tuple[Integers, Integers]
 
     @property
     def bound_m(self) -> float:
@@ -201,6 +205,7 @@ class PairApproach:
         self.vx_m_s = vx_m_s
         self._models = [model.axis(name) for name in model.axes]
         self.lateral = len(self._models)
+        self._wrong_in_both = 2 * model.wrong_images
 
         # Rows: position and velocity; columns: lateral axes; the last axis has both ends.
         ends = np.stack(
@@ -243,6 +248,35 @@ class PairApproach:
         before_s = (self.scenario.nominal_arrival_s - self.motion.times_s[steps]).tolist()
         return steps[[sensor.measures_at(each_s) for each_s in before_s]]
 
+    def _equal_steps(self, name: str, last_common_step: int) -> Integers:
+        """Return the steps until a common one in which a sensor must measure equal values.
+
+        The last 2q images may be wrong in one of the two motions. With equally spaced images of a
+        camera no other 2q images give a greater bound (docs/guarantee-bound.md).
+        """
+        due = self._due[name]
+        equal = due[due <= last_common_step]
+        if name != BearingSensor.name:
+            return equal
+        return equal[: max(0, len(equal) - self._wrong_in_both)]
+
+    def _wrong_steps(self, last_common_step: int) -> Integers:
+        """Return the steps of the images until a common one that are wrong in one motion."""
+        images = self._due[BearingSensor.name]
+        equal = self._equal_steps(BearingSensor.name, last_common_step)
+        return images[len(equal) : np.searchsorted(images, last_common_step, side="right")]
+
+    def _limiting_steps(self) -> Integers:
+        """Return in how many first steps the images limit the difference, shape (steps + 1,).
+
+        The measurements are equal in the first 0, 1, ..., all steps, up to the wrong images.
+        """
+        common_steps = np.arange(self.steps + 1)
+        images = self._due[BearingSensor.name]
+        equal = np.searchsorted(images, common_steps) - self._wrong_in_both
+        first_wrong = np.append(images, self.steps)[np.maximum(equal, 0)]
+        return np.asarray(np.minimum(common_steps, first_wrong))
+
     def best_pair(self) -> TruthPair:
         """Return the best pair over the last common step.
 
@@ -251,8 +285,9 @@ class PairApproach:
         not greater than the best pair.
         """
         correction_m = self._corrections_m()
+        limiting = self._limiting_steps()
         half_m = 0.5 * np.hypot.reduce(
-            [differences.farthest_m() for differences in self._differences]
+            [differences.farthest_m()[limiting] for differences in self._differences]
         )
         # Between two decisions, more common measurements only bring the motions nearer to each
         # other.
@@ -308,7 +343,9 @@ class PairApproach:
         steps, and all of it is reduced until none does. A second one has narrower limits at these
         steps instead, and is reduced by less.
         """
-        limits_m = [differences.limits_m for differences in self._differences]
+        limits_m = [differences.limits_m.copy() for differences in self._differences]
+        for limits in limits_m:
+            limits[self._wrong_steps(last_common_step), POSITION] = np.inf
         pair, excess = self._admissible_pair(last_common_step, limits_m)
         if not excess.any():
             return pair
@@ -447,12 +484,15 @@ class PairApproach:
     ) -> TruthPair:
         """Return two motions with a start relative to the middle of the box, times `sides`."""
         signs = np.array(sides)
+        is_single = sides[0] == sides[1]
+        wrong = self._wrong_steps(-1 if is_single else last_common_step)
+        half = len(wrong) // 2
         positions = self._middle[0] + np.outer(signs, start.offset_m)
         velocities = self._middle[1] + np.outer(signs, start.velocity_m_s)
         return TruthPair(
             label_m=self.label_m,
             vx_m_s=self.vx_m_s,
-            is_single=sides[0] == sides[1],
+            is_single=is_single,
             last_common_step=last_common_step,
             times_s=self.motion.times_s,
             track_m=track[: self.lateral],
@@ -462,6 +502,7 @@ class PairApproach:
             position_m=np.column_stack([positions, np.full(2, self.label_m)]),
             velocity_m_s=np.column_stack([velocities, np.full(2, self.vx_m_s)]),
             acceleration_m_s2=signs[:, None] * start.acceleration_m_s2[:, None, :],
+            wrong_steps=(wrong[half:], wrong[:half]),
         )
 
     def _shares(
@@ -479,7 +520,7 @@ class PairApproach:
         largest = 0.0
         excess = np.zeros((self.steps, 2))
         for name, sensor in self.scenario.sensors.items():
-            due = self._due[name][self._due[name] <= last_common_step]
+            due = self._equal_steps(name, last_common_step)
             sighting = self._sighting(due, difference, reserve, slope, left_m)
             if sighting is None:
                 return _Shares(math.inf, excess)

@@ -130,6 +130,20 @@ def test_search_reports_its_evaluations_and_history(worst: WorstEngagement) -> N
     assert 0 < worst.sets_emptied < BUDGET
 
 
+def test_search_against_a_set_with_wrong_images_finds_no_state_beyond_phi(
+    coarse: Scenario,
+) -> None:
+    model = replace(guaranteed(coarse).set_model, wrong_images=1)
+    scenario = replace(coarse, **of_model(model))
+
+    found = find_worst(scenario, budget=20, seed=1)
+
+    assert_possible(found, scenario)
+    assert_flies_again(found)
+    guaranteed_m = found.record().result.guaranteed_miss_m
+    assert found.miss_m <= found.any_state_miss_m <= guaranteed_m[0]
+
+
 @pytest.mark.thorough
 def test_search_with_the_same_seed_is_the_same_for_any_threads(
     worst: WorstEngagement, coarse: Scenario

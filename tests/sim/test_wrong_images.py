@@ -10,7 +10,7 @@ import pytest
 from infoset import Model
 from infoset.experiments.interception.scenario_file import load_scenario
 from infoset.guidance import NoiseKind
-from infoset.sim import Results, Scenario, lower_bound
+from infoset.sim import Results, Scenario
 from infoset.sim.draws import draw
 from infoset.sim.simulate import simulate_runs
 from infoset.sim.wrong_images import WrongImages, draw_wrong_images
@@ -96,11 +96,6 @@ def test_wrong_images_of_a_run_do_not_depend_on_the_batch() -> None:
     assert together is not None
     assert alone is not None
     np.testing.assert_array_equal(together[:, 2], alone[:, 0])
-
-
-def test_bound_is_refused_if_the_set_allows_for_wrong_images() -> None:
-    with pytest.raises(ValueError, match="the bound does not allow for wrong images"):
-        lower_bound(scenario_of("asteroid-1997", 1, 0, NoiseKind.RANDOM))
 
 
 def test_wrong_images_with_a_rate_sensor_are_refused() -> None:

@@ -22,6 +22,7 @@ from infoset.experiments.common.figure_style import (
     subplots,
 )
 from infoset.experiments.common.screen import number
+from infoset.experiments.interception.study import wrong_images_text
 from infoset.sim import Scenario
 from infoset.sim.bound.lower_bound import LowerBound
 from infoset.sim.bound.pair_of_motions import TruthPair, later_impulses
@@ -68,7 +69,11 @@ def draw_bound(
     if worst_m:
         _draw_strategies(panels[2], lower.bound_m, worst_m)
     proof = "state that proves" if lower.pair.is_single else "states that prove"
-    letters(panels, ["bound for all strategies", f"{proof} the bound", "strategies and bound"])
+    title = "bound for all strategies"
+    wrong_images = scenario.set_model.wrong_images
+    if wrong_images:
+        title += f", {wrong_images_text(wrong_images)}"
+    letters(panels, [title, f"{proof} the bound", "strategies and bound"])
     return figure
 
 
@@ -192,9 +197,16 @@ def _draw_equal_measurements(
     ranges = -pair.vx_m_s * fine
     bounds = np.array([model.angle_sensor.axis(name).error_bound(ranges) for name in model.axes])
     corridor = np.abs(_direction(pair)) @ bounds * ranges
-    seen = fine >= pair.arrival_s - pair.last_common_step * model.step_s
+    wrong_steps = np.concatenate(pair.wrong_steps)
+    # Wrong images do not limit the offset.
+    last_limited = min([pair.last_common_step, *(wrong_steps - 1)])
+    seen = fine >= pair.arrival_s - last_limited * model.step_s
     band: dict[str, Any] = {"facecolor": SET_FILL, "linewidth": 0.0, "label": "equal measurements"}
     axes.fill_between(fine[seen], -corridor[seen], corridor[seen], **band)
     for sign in (-1.0, 1.0):
         axes.plot(fine, sign * corridor, color=SET_EDGE, linewidth=0.7, linestyle=":")
+    if len(wrong_steps):
+        wrong_s = pair.arrival_s - wrong_steps * model.step_s
+        cross: dict[str, Any] = {"marker": "x", "markersize": 4.0, "linestyle": "none"}
+        axes.plot(wrong_s, np.zeros(len(wrong_s)), color=INK, label="image wrong in one", **cross)
     return float(corridor[-1])

@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset.experiments.common.errors import InputError
 from infoset.experiments.common.screen import (
     Part,
     RowByRow,
@@ -30,7 +29,7 @@ from infoset.experiments.interception.runs.shared import (
 )
 from infoset.experiments.interception.scenario_file import study_scenario
 from infoset.experiments.interception.strategies import chosen_strategies
-from infoset.experiments.interception.study import max_guarantee_m
+from infoset.experiments.interception.study import max_guarantee_m, wrong_images_text
 from infoset.guidance import Strategy
 from infoset.sim import Record, Results, Scenario
 from infoset.sim.bound.game_value import ValueReserve, value_reserve, why_no_value
@@ -94,11 +93,6 @@ class WorstOfStrategy:
 def run(options: Bound) -> None:
     """Compute the bound, simulate the strategies, write the files and print the tables."""
     scenario, notes = study_scenario(options)
-    if scenario.set_model.wrong_images:
-        raise InputError(
-            "information_set.wrong_images must be 0: the bound does not allow for wrong images; "
-            "add --set information_set.wrong_images=0"
-        )
     strategies: Mapping[str, Strategy | None] = {}
     if options.budget > 0 or options.strategies is not None:
         strategies = chosen_strategies(scenario, options.strategies)
@@ -107,14 +101,18 @@ def run(options: Bound) -> None:
         # The bound is printed at once, before the strategies are simulated.
         lower = lower_bound(scenario, progress=work.begin("lower bound"))
         nominal = _nominal(scenario)
+        exact_m = lower.bound_m
+        if scenario.set_model.wrong_images:
+            begun = work.begin("lower bound without wrong images")
+            exact_m = lower_bound(_without_wrong_images(scenario), progress=begun).bound_m
         quiet = options.quiet or work.written.stdout_taken
-        show(_bound_parts(scenario, lower, nominal), quiet)
+        show(_bound_parts(scenario, lower, exact_m, nominal), quiet)
 
         progress = work.begin("strategies")
         worst = _worst_of_strategies(scenario, lower, strategies, options, progress, quiet)
         value = _value(scenario, lower)
         best = _best(worst)
-        summary = _summary(scenario, lower, nominal, worst)
+        summary = _summary(scenario, lower, exact_m, nominal, worst)
         work.save({**summary, "value": _value_json(lower, value, best)})
         if options.out is not None:
             from infoset.experiments.interception.figures.bound import draw_bound
@@ -187,6 +185,11 @@ def _simulate(
     return WorstOfStrategy(name, tuple(flights), searched, records)
 
 
+def _without_wrong_images(scenario: Scenario) -> Scenario:
+    settings = replace(scenario.information_set, wrong_images=0, image_classes=None)
+    return replace(scenario, information_set=settings)
+
+
 def _nominal(scenario: Scenario) -> TruthPair:
     """Return the best pair at the nominal range and closing speed.
 
@@ -199,13 +202,22 @@ def _nominal(scenario: Scenario) -> TruthPair:
 
 
 def _summary(
-    scenario: Scenario, lower: LowerBound, nominal: TruthPair, worst: Sequence[WorstOfStrategy]
+    scenario: Scenario,
+    lower: LowerBound,
+    exact_m: float,
+    nominal: TruthPair,
+    worst: Sequence[WorstOfStrategy],
 ) -> dict[str, object]:
-    """Return the bound, its pairs and the strategies in JSON."""
+    """Return the bound, its pairs and the strategies in JSON.
+
+    `exact_m` is the bound without wrong images.
+    """
     model = scenario.set_model
     keys: dict[str, object] = {
         "disturbance_m_s2": {axis: model.axis(axis).disturbance_m_s2 for axis in model.axes},
+        "wrong_images": model.wrong_images,
         "lower_bound_m": lower.bound_m,
+        "lower_bound_without_wrong_images_m": exact_m,
     }
     if scenario.radius_m is not None:
         keys["hit_cannot_be_guaranteed"] = lower.bound_m > scenario.radius_m
@@ -261,6 +273,9 @@ def _where(pair: TruthPair, scenario: Scenario) -> dict[str, object]:
         "motions": 1 if pair.is_single else 2,
         "last_common_step": pair.last_common_step,
         "alike_until_before_arrival_s": _equal_until_s(pair, scenario),
+        "wrong_images_before_arrival_s": [
+            _before_arrival_s(pair, steps, scenario).tolist() for steps in pair.wrong_steps
+        ],
         **_by_axis("apart", np.abs(pair.difference_m[:, -1]), scenario),
     }
 
@@ -276,6 +291,12 @@ def _by_axis(quantity: str, values_m: NDArray[np.float64], scenario: Scenario) -
 def _equal_until_s(pair: TruthPair, scenario: Scenario) -> float:
     """Return the time from the last equal measurement to arrival, s."""
     return pair.arrival_s - pair.last_common_step * scenario.set_model.step_s
+
+
+def _before_arrival_s(
+    pair: TruthPair, steps: NDArray[np.int64], scenario: Scenario
+) -> NDArray[np.float64]:
+    return np.asarray(pair.arrival_s - steps * scenario.set_model.step_s)
 
 
 class _GameValue(NamedTuple):
@@ -343,14 +364,22 @@ def _value_lines(lower_m: float, value: _GameValue, best: WorstOfStrategy | None
     yield f"no upper end is proved, because of: {', '.join(value.reasons)}"
 
 
-def _bound_parts(scenario: Scenario, lower: LowerBound, nominal: TruthPair) -> Iterator[Part]:
+def _bound_parts(
+    scenario: Scenario, lower: LowerBound, exact_m: float, nominal: TruthPair
+) -> Iterator[Part]:
     """Yield the bound, its pairs by closing speed, and the bound at the nominal range."""
     model = scenario.set_model
     bound_m = number(lower.bound_m)
-    yield (
+    line = (
         f"{scenario.name}, model {model.model.value}: no strategy can guarantee a miss below "
         f"{bound_m} m"
     )
+    if model.wrong_images:
+        line += (
+            f" with {wrong_images_text(model.wrong_images)} in a flight ({number(exact_m)} m "
+            "without wrong images)"
+        )
+    yield line
     if scenario.radius_m is not None:
         body = f"the body of radius {scenario.radius_m:g} m"
         if lower.bound_m > scenario.radius_m:
@@ -384,7 +413,20 @@ def _bound_parts(scenario: Scenario, lower: LowerBound, nominal: TruthPair) -> I
         )
 
     yield bounds
+    yield from _wrong_image_lines(scenario, lower.pair)
     yield ""
+
+
+def _wrong_image_lines(scenario: Scenario, pair: TruthPair) -> Iterator[str]:
+    """Yield a line about the images that are wrong in one of the two motions of a pair."""
+    first, second = (_before_arrival_s(pair, steps, scenario) for steps in pair.wrong_steps)
+    if not len(first):
+        return
+    in_first, in_second = (", ".join(f"{time:.2f}" for time in each) for each in (first, second))
+    yield (
+        f"wrong images of the first pair, s before arrival: {in_first} in one motion, "
+        f"{in_second} in the other"
+    )
 
 
 def _notes(

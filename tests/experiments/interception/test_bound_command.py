@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from infoset import StateBox
+from infoset import Model, StateBox
 from infoset.experiments.common.errors import InputError
 from infoset.experiments.common.input_file import to_toml
 from infoset.experiments.interception.figures.bound import draw_bound
@@ -35,7 +35,8 @@ KEYS = [
         "elapsed_s",
         "disturbance_m_s2",
     ),
-    *("lower_bound_m", "reached_at", "at_nominal_range", "by_label", "strategies", "value"),
+    *("wrong_images", "lower_bound_m", "lower_bound_without_wrong_images_m"),
+    *("reached_at", "at_nominal_range", "by_label", "strategies", "value"),
 ]
 IS_VALUE = "the bound is the value of the game up to a reserve of "
 
@@ -95,7 +96,10 @@ def test_bound_into_a_folder(
     assert (found["scenario"], found["model"]) == ("short", "guaranteed")
     assert found["scenario_hash"] == fingerprint(flown)
     expected = planar
+    assert found["wrong_images"] == 0
     assert found["lower_bound_m"] == expected.bound_m
+    assert found["lower_bound_without_wrong_images_m"] == expected.bound_m
+    assert found["reached_at"]["wrong_images_before_arrival_s"] == [[], []]
     assert [each["bound_m"] for each in found["by_label"]] == [
         each.bound_m for each in expected.by_label
     ]
@@ -135,6 +139,40 @@ def test_bound_into_a_folder(
         "best_strategy_worst_found_m": best["worst_found_m"],
     }
     assert IS_VALUE not in out
+
+
+def test_bound_with_wrong_images_names_them_and_the_bound_without(
+    infoset: Command, short: Scenario, planar: LowerBound, tmp_path: Path
+) -> None:
+    settings = replace(short.information_set, model=Model.GUARANTEED, wrong_images=1)
+    file = tmp_path / "wrong.toml"
+    file.write_text(to_toml(replace(short, information_set=settings)))
+
+    code, out, _ = infoset(
+        "bound", file, "--budget", 0, "--strategies", "symmetric-miss", "--json", "bound.json"
+    )
+
+    assert code == 0
+    found = json.loads(Path("bound.json").read_text())
+    assert found["wrong_images"] == 1
+    assert found["lower_bound_without_wrong_images_m"] == planar.bound_m
+    bound_m = found["lower_bound_m"]
+    heading, *_ = out.splitlines()
+    assert heading.endswith(
+        f"below {bound_m:.3g} m with 1 wrong image in a flight ({planar.bound_m:.3g} m without "
+        "wrong images)"
+    )
+    ((last_s,), (before_s,)) = found["reached_at"]["wrong_images_before_arrival_s"]
+    assert last_s == found["reached_at"]["alike_until_before_arrival_s"]
+    assert before_s == pytest.approx(last_s + short.bearing_sensor.period_s)
+    assert (
+        f"wrong images of the first pair, s before arrival: {last_s:.2f} in one motion, "
+        f"{before_s:.2f} in the other\n"
+    ) in out
+    (strategy,) = found["strategies"]
+    for flight in strategy["flights"]:
+        assert max(flight["miss_m"]) >= flight["bound_m"]
+        assert flight["truth_kept"] == [True, True]
 
 
 @pytest.mark.usefixtures("known")

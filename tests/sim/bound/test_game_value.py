@@ -12,8 +12,9 @@ from infoset import AngleSensor, Camera, InitialSet, Model, StateBox
 from infoset.experiments.interception.scenario_file import load_scenario, with_model
 from infoset.guidance import NoiseKind, Thruster
 from infoset.sensors import RateSensor
-from infoset.sim import Scenario, Sun, lower_bound, simulate
+from infoset.sim import Scenario, Sun, WrongImages, lower_bound, simulate
 from infoset.sim.bound.game_value import ValueReserve, value_reserve, why_no_value
+from infoset.sim.bound.pair_flight import fly_pair
 from infoset.sim.scenario import of_model
 from tests.sensors import linear
 from tests.space import in_space
@@ -165,6 +166,30 @@ def test_reserve_of_one_impulse_equals_its_formula() -> None:
     assert reserve.tangent_m == pytest.approx(
         exact_m * (np.cos(np.arctan(slope) + 2e-4) ** -2 - 1.0), rel=1e-3
     )
+
+
+@pytest.mark.parametrize(("wrong_images", "image_classes"), [(1, 3), (1, 4)])
+def test_pair_and_flights_with_wrong_images_miss_by_at_most_bound_and_reserve(
+    wrong_images: int, image_classes: int
+) -> None:
+    """The pair of the bound almost attains the value: the reserve is 2 % of it."""
+    scenario = replace(known(), strategy="symmetric-miss", noise=NoiseKind.GAME)
+    settings = replace(
+        scenario.information_set, wrong_images=wrong_images, image_classes=image_classes
+    )
+    scenario = replace(scenario, information_set=settings)
+
+    bound_m, reserve = reserve_of(scenario)
+
+    assert min(vars(reserve).values()) >= 0.0
+    at_most_m = bound_m + reserve.total_m
+    assert at_most_m < 1.02 * bound_m
+    pair = fly_pair(scenario, lower_bound(scenario).pair)
+    assert bound_m <= pair.results.miss_m.max() <= at_most_m
+    wrong = WrongImages(wrong_images, size=(1.05, 100.0), when_s=(0.0, 5.0))
+    flights = simulate(replace(scenario, wrong_images=wrong), 10, seed=3)
+    assert flights.truth_kept.all()
+    assert flights.miss_m.max() <= at_most_m
 
 
 CAMERA = Camera(0.5, 5e-5, 20.0, first_image_s=20.0, last_image_s=1.0)

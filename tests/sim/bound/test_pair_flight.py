@@ -75,6 +75,25 @@ def test_pairs_are_measured_in_the_middle_to_the_last_common_step(
     assert np.array_equal(honest["rate"], sight(4).omega_rad_s)
 
 
+def test_wrong_image_is_exact_in_the_other_motion_and_no_error_within_the_bounds(
+    nothing_known: InformationSetView,
+) -> None:
+    noise = PairNoise(4, ([4], [3]))
+
+    first = noise.measure(sight(3, SENSOR, METER), nothing_known)
+    second = noise.measure(sight(4, SENSOR, METER), nothing_known)
+
+    assert first["angle"][0].tolist() == [0.010, 0.010, -0.5, -0.5]
+    assert second["angle"][0].tolist() == [0.012, 0.012, -0.501, -0.501]
+    # The bound is 1 mrad at 1000 m, and 1.5 mrad at 500 m.
+    of_first, of_second = noise.wrong_errors
+    assert of_first == pytest.approx([0.0, 2.0, 0.0, 1.0 / 1.498])
+    assert of_second == pytest.approx([2.0, 0.0, 1.0 / 1.5, 0.0])
+    assert first["range"] == pytest.approx([1000.0, 1000.0, 501.0, 501.0])
+    # The ranges of the second pair differ by 2 m, and may have errors of 50 m.
+    assert noise.max_share == pytest.approx(1.0 / 50.0, rel=1e-2)
+
+
 def test_pairs_in_space_have_one_measurement_with_equal_errors(
     nothing_known: InformationSetView,
 ) -> None:
