@@ -18,13 +18,14 @@ import sys
 import time
 from collections.abc import Sequence
 from typing import NamedTuple
+from unittest.mock import patch
 
 import numpy as np
 from numpy.typing import NDArray
 
 from infoset import LinearObserver, Zonotope
 from infoset.observer import linear_observer
-from infoset.observer.linear_observer import Estimate
+from infoset.observer.estimate import Estimate
 from infoset.observer.window import Windows
 from tests.infoset.observer.test_random_observers import System
 from tests.infoset.observer.test_window import WideSystem
@@ -92,16 +93,12 @@ def print_system(name: str, system: WideSystem) -> None:
 
 def windows_of_few_states(system: System) -> LinearObserver:
     """Return an observer of three or four states with windows in place of polytopes."""
-    most = linear_observer.MAX_POLYTOPE_STATES
-    linear_observer.MAX_POLYTOPE_STATES = 2
-    try:
-        start = Zonotope.box(-np.ones(system.size), np.ones(system.size))
-        disturbance = Zonotope(np.zeros(system.size), system.generators)
+    start = Zonotope.box(-np.ones(system.size), np.ones(system.size))
+    disturbance = Zonotope(np.zeros(system.size), system.generators)
+    with patch.object(linear_observer, "MAX_POLYTOPE_STATES", 2):
         return LinearObserver(
             system.a, system.c, start, noise=system.noise, disturbance=disturbance
         )
-    finally:
-        linear_observer.MAX_POLYTOPE_STATES = most
 
 
 def print_small(states: int) -> None:

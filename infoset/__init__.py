@@ -36,7 +36,8 @@ if TYPE_CHECKING:
     from infoset.geometry.zonotope import Zonotope
     from infoset.information_set import InformationSet, InformationSetView
     from infoset.model import InitialSet, Model, Recovery, SetModel, SetSettings, StateBox
-    from infoset.observer.linear_observer import Estimate, Inconsistency, LinearObserver
+    from infoset.observer.estimate import Estimate, Inconsistency
+    from infoset.observer.linear_observer import LinearObserver
     from infoset.sensors import (
         AngleSensor,
         BearingSensor,
@@ -71,7 +72,8 @@ _MODULES = {
     "infoset.geometry.zonotope": ("Zonotope",),
     "infoset.information_set": ("InformationSet", "InformationSetView"),
     "infoset.model": ("InitialSet", "Model", "Recovery", "SetModel", "SetSettings", "StateBox"),
-    "infoset.observer.linear_observer": ("Estimate", "Inconsistency", "LinearObserver"),
+    "infoset.observer.estimate": ("Estimate", "Inconsistency"),
+    "infoset.observer.linear_observer": ("LinearObserver",),
     "infoset.sensors": (
         "AngleSensor",
         "BearingSensor",

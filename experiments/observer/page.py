@@ -9,7 +9,7 @@ import numpy as np
 from infoset.arrays import Floats
 from infoset.experiments.common.page_document import page
 from infoset.experiments.observer.report import ObserverReport, shown_bounds, times
-from infoset.observer.linear_observer import MAX_POLYTOPE_STATES, Estimate
+from infoset.observer.estimate import MAX_POLYTOPE_STATES, Estimate
 
 
 def _centre(estimate: Estimate) -> Floats | None:

@@ -13,7 +13,7 @@ from infoset.arrays import Floats
 from infoset.experiments.common.screen import Part, number_table
 from infoset.experiments.observer.data import Data
 from infoset.experiments.observer.file import ObserverProblem
-from infoset.observer.linear_observer import MAX_POLYTOPE_STATES, Estimate, Inconsistency
+from infoset.observer.estimate import MAX_POLYTOPE_STATES, Estimate, Inconsistency
 from infoset.sim.columns import Cell, csv_text
 
 _SHOWN_STEPS = 12

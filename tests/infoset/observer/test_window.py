@@ -15,7 +15,7 @@ from scipy.linalg import expm
 from infoset import LinearObserver, Polytope, Zonotope
 from infoset.arrays import Floats
 from infoset.observer import programs
-from infoset.observer.linear_observer import Estimate
+from infoset.observer.estimate import Estimate
 from infoset.observer.window import Windows
 from tests.infoset.observer.test_linear_observer import Programs, chain
 
