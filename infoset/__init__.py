@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from infoset.geometry.zonotope import Zonotope
     from infoset.information_set import InformationSet, InformationSetView
     from infoset.model import InitialSet, Model, Recovery, SetModel, SetSettings, StateBox
+    from infoset.observer.cover import Detection
     from infoset.observer.estimate import Estimate, Inconsistency
     from infoset.observer.linear_observer import LinearObserver
     from infoset.sensors import (
@@ -72,6 +73,7 @@ _MODULES = {
     "infoset.geometry.zonotope": ("Zonotope",),
     "infoset.information_set": ("InformationSet", "InformationSetView"),
     "infoset.model": ("InitialSet", "Model", "Recovery", "SetModel", "SetSettings", "StateBox"),
+    "infoset.observer.cover": ("Detection",),
     "infoset.observer.estimate": ("Estimate", "Inconsistency"),
     "infoset.observer.linear_observer": ("LinearObserver",),
     "infoset.sensors": (
@@ -94,6 +96,7 @@ __all__ = [
     "Bias",
     "Camera",
     "ConvexPolygons",
+    "Detection",
     "Estimate",
     "ExtremePoints",
     "GuaranteeWarning",

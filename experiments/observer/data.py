@@ -14,15 +14,21 @@ from infoset.arrays import Floats
 from infoset.experiments.common.errors import InputError, shown
 from infoset.experiments.common.input_file import read_input
 from infoset.experiments.observer.command import MAX_STEPS, Errors, Observe
-from infoset.experiments.observer.file import ObserverProblem
+from infoset.experiments.observer.file import ObserverProblem, WrongMeasurementsTable
 from infoset.geometry.zonotope import Zonotope
 from infoset.limits import MAXIMUM
 from infoset.observer.sets import Set, polytope_of
+from infoset.sim import WrongImages
+from infoset.sim.wrong_images import draw_wrong_images
 
 MAX_CSV_BYTES = 10_000_000
 """Largest size of a file of measurements: 1000 bytes for each of `MAX_STEPS` steps."""
 SEPARATORS = (",", ";", "\t")
 """Separators of a CSV file, the default first."""
+_SHOWN_STEPS = 10
+"""Maximum number of steps in a text: a line of the screen."""
+_WRONG_STREAM = 1
+"""Number of the stream of random numbers of the wrong measurements; the others have none."""
 MAX_STATE = 1e40
 """Largest state of which sets are computed: products of seven such numbers are finite."""
 
@@ -70,8 +76,42 @@ def simulate(problem: ObserverProblem, errors: Errors, seed: int) -> Data:
     true = np.array(states)
     noise = _signs(errors, (len(true), len(c)), generator) * problem.noise.half_width
     measured = true @ c.T + noise
-    measured[[step for step in problem.simulation.missing if step < len(measured)]] = np.nan
-    return Data(measured, inputs, true, f"simulated, {errors.value} errors, seed {seed}")
+    origin = f"simulated, {errors.value} errors, seed {seed}"
+    missing = [step for step in problem.simulation.missing if step < len(measured)]
+    if problem.wrong_measurements is not None:
+        sizes = _wrong_errors(problem.wrong_measurements, missing, measured.shape, seed)
+        is_wrong = (sizes != 0.0).any(axis=1)
+        measured[is_wrong] = (true @ c.T + sizes * problem.noise.half_width)[is_wrong]
+        steps = np.flatnonzero(is_wrong).tolist()
+        origin += f", wrong measurements at {steps_text(steps)}"
+    measured[missing] = np.nan
+    return Data(measured, inputs, true, origin)
+
+
+def _wrong_errors(
+    wrong: WrongMeasurementsTable, missing: list[int], shape: tuple[int, ...], seed: int
+) -> Floats:
+    """Return the errors of the wrong measurements, shape (N, q), in units of the bounds.
+
+    They are zero for the others. Their random numbers are a stream of their own, so that the motion
+    and the other errors do not depend on the table.
+    """
+    first, last = (0, shape[0] - 1) if wrong.steps is None else wrong.steps
+    places = np.full(shape[0], np.nan)
+    places[first : last + 1] = 0.0
+    places[missing] = np.nan
+    generator = np.random.default_rng([seed, _WRONG_STREAM])
+    images = WrongImages(wrong.number, wrong.size)
+    return draw_wrong_images(images, places, shape[1], generator).T
+
+
+def steps_text(steps: list[int]) -> str:
+    """Return steps as text; of many steps, the first ones and their number."""
+    if not steps:
+        return "no step"
+    shown_steps = ", ".join(map(str, steps[:_SHOWN_STEPS]))
+    more = f", .. ({len(steps)} steps)" if len(steps) > _SHOWN_STEPS else ""
+    return f"step{'s' if len(steps) > 1 else ''} {shown_steps}{more}"
 
 
 def need_size(where: str, *values: Floats) -> None:

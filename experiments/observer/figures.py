@@ -7,10 +7,12 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from infoset.arrays import Floats
 from infoset.experiments.common.figure_style import (
     IMPULSE,
     INK,
@@ -23,7 +25,7 @@ from infoset.experiments.common.figure_style import (
     style,
     subplots,
 )
-from infoset.experiments.observer.report import ObserverReport, bounds_of, times
+from infoset.experiments.observer.report import ObserverReport, bounds_of, outlines, times
 
 _MAX_OUTLINES = 60
 """Largest number of sets in a figure: more outlines cannot be told apart."""
@@ -75,18 +77,7 @@ def draw_bounds(report: ObserverReport) -> Figure:
             }
             low = np.full(missing.sum(), 0.02)
             panel.plot(time[missing], low, transform=panel.get_xaxis_transform(), **mark)
-        if report.contradicted:
-            empty = time[[estimate.is_empty for estimate in report.estimates]]
-            hatched: dict[str, Any] = {
-                "facecolor": "none",
-                "edgecolor": IMPULSE,
-                "hatch": "////",
-                "alpha": 0.35,
-            }
-            for axes in (panel, width):
-                axes.axvspan(empty[0], time[-1], linewidth=0.0, **hatched)
-                label = f"no state from step {int(report.inconsistency.step)} on"
-                axes.axvline(empty[0], color=IMPULSE, label=label)
+        _mark_findings(report, time, (panel, width))
         panel.set_ylabel(name)
         width.set_ylabel(f"width of {name}")
         width.set_ylim(bottom=0.0)
@@ -99,19 +90,50 @@ def draw_bounds(report: ObserverReport) -> Figure:
     return figure
 
 
+def _mark_findings(report: ObserverReport, time: Floats, panels: tuple[Axes, Axes]) -> None:
+    """Mark where a wrong measurement is proved, and from where on no state is possible."""
+    for axes in panels:
+        if report.proved:
+            axes.axvline(
+                time[int(report.detection.step)],
+                color=IMPULSE,
+                linewidth=0.8,
+                linestyle=(0, (2, 2)),
+                label="a wrong measurement is proved",
+            )
+        if report.contradicted:
+            first = time[int(np.argmax([estimate.is_empty for estimate in report.estimates]))]
+            axes.axvspan(
+                first,
+                time[-1],
+                linewidth=0.0,
+                facecolor="none",
+                edgecolor=IMPULSE,
+                hatch="////",
+                alpha=0.35,
+            )
+            label = f"no state from step {int(report.inconsistency.step)} on"
+            axes.axvline(first, color=IMPULSE, label=label)
+
+
 @style()
 def draw_sets(report: ObserverReport) -> Figure:
     """Draw the sets of two states, the first ones light and the last ones dark, at most 60."""
     figure, ((panel,),) = subplots(115.0)
     shown = [estimate for estimate in report.estimates if not estimate.is_empty]
     shown = shown[:: -(-len(shown) // _MAX_OUTLINES)] if shown else []
-    outlines = [estimate.polygons.polygon() for estimate in shown]
-    edges = mpl.colormaps["Greys"](np.linspace(0.3, 0.9, len(outlines)))
+    shades = mpl.colormaps["Greys"](np.linspace(0.3, 0.9, len(shown)))
+    polygons = []
+    edges = []
+    for estimate, shade in zip(shown, shades, strict=True):
+        for polygon in outlines(estimate):
+            polygons.append(polygon)
+            edges.append(shade)
     panel.add_collection(
-        PolyCollection(outlines, facecolors=SET_FILL, edgecolors=edges, linewidths=0.8, alpha=0.55)
+        PolyCollection(polygons, facecolors=SET_FILL, edgecolors=edges, linewidths=0.8, alpha=0.55)
     )
-    if outlines:
-        panel.update_datalim(np.vstack(outlines))
+    if polygons:
+        panel.update_datalim(np.vstack(polygons))
         panel.set_title(
             f"possible states, from step {shown[0].step} (light) to step {shown[-1].step} (dark)"
         )

@@ -26,6 +26,7 @@ from infoset.limits import (
     Positive,
     real_values,
 )
+from infoset.observer.cover import Cover
 from infoset.observer.linear_observer import LinearObserver
 from infoset.observer.sets import Set
 
@@ -92,9 +93,19 @@ class SetTable:
 
 @dataclass(frozen=True)
 class NoiseTable:
-    """[noise]: the bound of the error v of each output."""
+    """[noise]: the bound of the error v of each output.
+
+    At most `wrong_measurements` of a run have errors beyond it; they are dealt into
+    `measurement_classes` as in `LinearObserver`.
+    """
 
     half_width: Annotated[tuple[float, ...], NOT_NEGATIVE]
+    wrong_measurements: int = 0
+    measurement_classes: int | None = None
+
+    def __post_init__(self) -> None:
+        # Raises ValueError if a number is not possible.
+        _ = Cover.of(self.wrong_measurements, self.measurement_classes)
 
 
 @dataclass(frozen=True)
@@ -119,6 +130,25 @@ class SimulationTable:
     missing: tuple[Annotated[int, WHOLE], ...] = ()
 
 
+@dataclass(frozen=True)
+class WrongMeasurementsTable:
+    """[wrong_measurements]: measurements of a simulation with errors beyond their bounds.
+
+    They are simulated whatever the observer allows for: `noise.wrong_measurements` is what it
+    allows for. `size` are the minimum and the maximum error in units of its bound: the logarithm is
+    uniform, and the sign of each output random. `steps` are the first and the last step at which
+    they may be; None is all steps.
+    """
+
+    number: Annotated[int, Limits(minimum=0, maximum=MAX_STEPS, whole=True)]
+    size: Annotated[tuple[float, float], Limits(minimum=1.0, maximum=1e6)] = (2.0, 100.0)
+    steps: tuple[Annotated[int, WHOLE], Annotated[int, WHOLE]] | None = None
+
+    def __post_init__(self) -> None:
+        if self.steps is not None and self.steps[0] > self.steps[1]:
+            raise ValueError(f"steps must be [first, last], and is reversed: got {self.steps}")
+
+
 @dataclass(frozen=True, kw_only=True)
 class ObserverProblem:
     """A problem file of kind `observer`.
@@ -137,6 +167,8 @@ class ObserverProblem:
         Bounds of v.
     measurements, simulation : MeasurementTable, SimulationTable
         Measurements and inputs of the file, and the simulation if it has no measurements.
+    wrong_measurements : WrongMeasurementsTable or None
+        Wrong measurements of the simulation; None is none.
     """
 
     kind: ClassVar[str] = "observer"
@@ -148,6 +180,7 @@ class ObserverProblem:
     noise: NoiseTable
     measurements: MeasurementTable = MeasurementTable()
     simulation: SimulationTable = SimulationTable()
+    wrong_measurements: WrongMeasurementsTable | None = None
 
     def __post_init__(self) -> None:
         states = self.observer().states  # raises ValueError if a matrix or a set is wrong
@@ -197,6 +230,8 @@ class ObserverProblem:
             input_matrix=self.system.B or None,
             offset=self.system.c or None,
             runs=runs,
+            wrong_measurements=self.noise.wrong_measurements,
+            measurement_classes=self.noise.measurement_classes,
         )
 
 

@@ -8,7 +8,7 @@ main.append(top_, graphs);
 let frame = 0;
 
 const centres = DATA.steps.some((step) => step.centre);
-const points = (step) => [...step.vertices, ...(step.state ? [step.state] : [])];
+const points = (step) => [...step.sets.flat(), ...(step.state ? [step.state] : [])];
 
 /** Limits of a state over all steps. */
 function stateLimits(index) {
@@ -39,7 +39,7 @@ if (plane) {
     ["previous step", (context) => drawPath(context, [[1, 1], [21, 1], [21, 11], [1, 11]],
       { stroke: theme.colours.quiet, width: 1, dash: [3, 3], closed: true })],
   ];
-  if (DATA.steps[0].smoothed.length) {
+  if (DATA.steps.some((step) => step.smoothed.length)) {
     legend.push(["with later measurements", (context) => drawPath(context, [[1, 1], [21, 1], [21, 11], [1, 11]],
       { stroke: theme.colours.measured, width: 1.5, closed: true })]);
   }
@@ -55,9 +55,15 @@ if (plane) {
       const near = [...points(step), ...points(before)];
       const [x, y] = [0, 1].map((axis) => limitsOf(near.map((point) => point[axis]), 0.15));
       chart.begin({ x, y, xTitle: DATA.names[0], yTitle: DATA.names[1] });
-      if (frame) chart.curve(before.vertices, { stroke: theme.colours.quiet, width: 1, dash: [3, 3], closed: true });
-      chart.curve(step.vertices, { fill: theme.colours.set, opacity: 0.35, stroke: theme.colours.line, closed: true });
-      chart.curve(step.smoothed, { stroke: theme.colours.measured, width: 1.5, closed: true });
+      for (const set of frame ? before.sets : []) {
+        chart.curve(set, { stroke: theme.colours.quiet, width: 1, dash: [3, 3], closed: true });
+      }
+      for (const set of step.sets) {
+        chart.curve(set, { fill: theme.colours.set, opacity: 0.35, stroke: theme.colours.line, closed: true });
+      }
+      for (const set of step.smoothed) {
+        chart.curve(set, { stroke: theme.colours.measured, width: 1.5, closed: true });
+      }
       if (step.state) chart.point(...step.state, "cross", theme.colours.ink);
       chart.end();
       chart.describe(rows(step).map((row) => row.join(" ")).join(", "));
@@ -77,6 +83,8 @@ const boundsLegend = [
   ...(DATA.steps[0].state ? [["true state", stroke({ stroke: theme.colours.ink, width: 1.5 })]] : []),
   ...(DATA.empty_from !== null
     ? [["no state is possible from this step on", stroke({ stroke: theme.colours.impulse, width: 2 })]] : []),
+  ...(DATA.proved_at !== null
+    ? [["a wrong measurement is proved", stroke({ stroke: theme.colours.impulse, width: 1, dash: [2, 2] })]] : []),
   ["present step", stroke({ stroke: theme.colours.quiet, width: 1.5 })],
 ];
 const numbers = element("table", { "aria-label": "Numbers of this step", "aria-live": "polite" });
@@ -102,6 +110,10 @@ DATA.names.forEach((name, index) => {
       if (DATA.empty_from !== null) {
         const empty = DATA.time[DATA.empty_from];
         drawn.upright(empty, empty, { stroke: theme.colours.impulse, width: 2 });
+      }
+      if (DATA.proved_at !== null) {
+        const proved = DATA.time[DATA.proved_at];
+        drawn.upright(proved, proved, { stroke: theme.colours.impulse, width: 1, dash: [2, 2] });
       }
       drawn.curve(states.map(([at, state]) => [at, state[index]]), { stroke: theme.colours.ink, width: 1.5 });
       const now = DATA.time[frame];

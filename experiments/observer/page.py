@@ -8,13 +8,21 @@ import numpy as np
 
 from infoset.arrays import Floats
 from infoset.experiments.common.page_document import page
-from infoset.experiments.observer.report import ObserverReport, shown_bounds, times
+from infoset.experiments.observer.report import (
+    ObserverReport,
+    outlines,
+    shown_bounds,
+    times,
+    wrong_text,
+)
 from infoset.observer.estimate import MAX_POLYTOPE_STATES, Estimate
 
 
 def _centre(estimate: Estimate) -> Floats | None:
-    """Return the centre of a largest ball in a set; None if it is empty or has no known facets."""
-    if estimate.is_empty or estimate.states > MAX_POLYTOPE_STATES:
+    """Return the centre of a largest ball in a set; None if it is empty or has no known facets, or
+    if the possible states are in several sets.
+    """
+    if estimate.is_empty or estimate.states > MAX_POLYTOPE_STATES or estimate.members > 1:
         return None
     return estimate.chebyshev_centre()
 
@@ -34,6 +42,10 @@ def observer_page(report: ObserverReport) -> str:
             f"The measurements contradict the model at step {int(report.inconsistency.step)}."
         )
 
+    if report.allows_wrong:
+        text = wrong_text(report)
+        about.append(f"{text[0].upper()}{text[1:]}.")
+
     time, title = times(report)
     content = {
         "heading": f"Possible states of {problem.name}",
@@ -42,6 +54,7 @@ def observer_page(report: ObserverReport) -> str:
         "time": time,
         "time_title": title,
         "empty_from": empty_from,
+        "proved_at": int(report.detection.step) if report.proved else None,
         "steps": _steps(report),
     }
     script = (resources.files("infoset.experiments.observer") / "page.js").read_text(
@@ -63,7 +76,7 @@ def _steps(report: ObserverReport) -> list[dict[str, object]]:
             "upper": None,
             "later": None,
             "centre": _centre(estimate),
-            "vertices": [],
+            "sets": [],
             "smoothed": [],
             "measured": [
                 None if np.isnan(value) else value for value in data.measured[index].tolist()
@@ -76,8 +89,8 @@ def _steps(report: ObserverReport) -> list[dict[str, object]]:
         if smoothed_bounds is not None and not np.isnan(smoothed_bounds[index]).any():
             values["later"] = smoothed_bounds[index]
         if estimate.states == 2:
-            values["vertices"] = estimate.polygons.polygon()
+            values["sets"] = outlines(estimate)
             if report.smoothed is not None:
-                values["smoothed"] = report.smoothed[index].polygons.polygon()
+                values["smoothed"] = outlines(report.smoothed[index])
         steps.append(values)
     return steps

@@ -11,8 +11,9 @@ from rich.table import Table
 
 from infoset.arrays import Floats
 from infoset.experiments.common.screen import Part, number_table
-from infoset.experiments.observer.data import Data
+from infoset.experiments.observer.data import Data, steps_text
 from infoset.experiments.observer.file import ObserverProblem
+from infoset.observer.cover import Detection
 from infoset.observer.estimate import MAX_POLYTOPE_STATES, Estimate, Inconsistency
 from infoset.sim.columns import Cell, csv_text
 
@@ -34,6 +35,7 @@ class ObserverReport:
     estimates: Sequence[Estimate]
     smoothed: Sequence[Estimate] | None
     inconsistency: Inconsistency
+    detection: Detection
 
     @cached_property
     def excess_widths(self) -> Floats | None:
@@ -48,13 +50,40 @@ class ObserverReport:
         """Whether the measurements contradict the model."""
         return bool(self.inconsistency.step >= 0)
 
+    @property
+    def allows_wrong(self) -> bool:
+        """Whether the observer allows for wrong measurements."""
+        return self.problem.noise.wrong_measurements > 0
+
+    @property
+    def proved(self) -> bool:
+        """Whether a wrong measurement is proved."""
+        return self.allows_wrong and bool(self.detection.step >= 0)
+
+    @property
+    def suspected_steps(self) -> list[int]:
+        """Steps of the measurements one of which is proved to be wrong; none without a proof."""
+        suspected = self.detection.suspected
+        is_measured = ~np.isnan(self.data.measured).all(axis=1)
+        numbers = np.cumsum(is_measured) - 1
+        is_suspected = is_measured & suspected[numbers % len(suspected)]
+        return np.flatnonzero(is_suspected[: int(self.detection.step) + 1]).tolist()
+
 
 def contains(estimate: Estimate, state: Floats) -> bool:
     """Return whether a state is in a set, or within its bounds if it has five or more states."""
     if estimate.states > MAX_POLYTOPE_STATES:
         return bool((estimate.lower <= state).all() and (state <= estimate.upper).all())
-    shape = estimate.polygons if estimate.states == 2 else estimate.polytopes[0]
-    return bool(shape.contains(state))
+    if estimate.states == 2:
+        return bool(np.any(estimate.polygons.contains(state)))
+    return any(polytope.contains(state) for polytope in estimate.polytopes)
+
+
+def outlines(estimate: Estimate) -> list[Floats]:
+    """Return the vertices of the sets of two states that are not empty, shape (v, 2) each."""
+    polygons = estimate.polygons
+    each = polygons if polygons.shape else [polygons]
+    return [polygon.polygon() for polygon in each if not polygon.is_empty]
 
 
 def report_json(report: ObserverReport) -> dict[str, object]:
@@ -65,7 +94,7 @@ def report_json(report: ObserverReport) -> dict[str, object]:
     ]
     for index, step in enumerate(steps):
         if report.estimates[index].states == 2:
-            step["vertices"] = report.estimates[index].polygons.polygon()
+            step["vertices"] = report.estimates[index].to_dict()["vertices"]
         if report.smoothed is not None:
             step["smoothed"] = _bounds(report.smoothed[index])
         if report.data.states is not None:
@@ -79,6 +108,15 @@ def report_json(report: ObserverReport) -> dict[str, object]:
             "output": int(where.output) + 1,
             "excess": float(where.excess),
         }
+    wrong: dict[str, object] | None = None
+    if report.allows_wrong:
+        detection = report.detection
+        wrong = {
+            "assumed": report.problem.noise.wrong_measurements,
+            "classes": len(detection.suspected),
+            "proved_k": int(detection.step) if report.proved else None,
+            "suspected_k": report.suspected_steps,
+        }
     return {
         "data": report.data.origin,
         "states": report.problem.names,
@@ -86,6 +124,7 @@ def report_json(report: ObserverReport) -> dict[str, object]:
         "final": _bounds(report.estimates[-1]),
         "excess_widths": report.excess_widths,
         "inconsistency": inconsistency,
+        "wrong_measurements": wrong,
     }
 
 
@@ -180,6 +219,8 @@ def report_lines(report: ObserverReport) -> Iterator[Part]:
         if len(problem.names) > MAX_POLYTOPE_STATES:
             reason = "the bounds are those of the last measurements"
         yield f"{reason}; the last one is wider than the exact one by {excess}"
+    if report.allows_wrong:
+        yield wrong_text(report)
     if report.contradicted:
         where = report.inconsistency
         yield (
@@ -187,3 +228,20 @@ def report_lines(report: ObserverReport) -> Iterator[Part]:
             f"possible; the bound of output {int(where.output) + 1} is exceeded by at least "
             f"{float(where.excess):.6g}"
         )
+
+
+def wrong_text(report: ObserverReport) -> str:
+    """Return what is assumed and proved about wrong measurements."""
+    assumed = report.problem.noise.wrong_measurements
+    text = f"at most {assumed} wrong measurement{'s' if assumed > 1 else ''} assumed"
+    if not report.proved:
+        return f"{text}; none is proved"
+    if report.contradicted:
+        verb = "are" if assumed > 1 else "is"
+        return f"{text}; more than {assumed} {verb} wrong, or the model is"
+
+    step = int(report.detection.step)
+    step_s = report.problem.system.step_s
+    time = "" if step_s is None else f" ({step * step_s:g} s)"
+    suspected = steps_text(report.suspected_steps)
+    return f"{text}; a wrong one is proved at step {step}{time}; suspected: {suspected}"

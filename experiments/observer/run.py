@@ -34,7 +34,9 @@ def solve(problem: ObserverProblem, options: Observe, begin: BeginProgress) -> O
         smoothed = observer.smooth(estimates, data.inputs) if options.smooth else None
     except (ArithmeticError, ValueError) as error:
         raise InputError(f"{problem.name}: step {observer.step}: {error}") from None
-    return ObserverReport(problem, data, estimates, smoothed, observer.inconsistency)
+    return ObserverReport(
+        problem, data, estimates, smoothed, observer.inconsistency, observer.detection
+    )
 
 
 COMMAND = ProblemCommand(

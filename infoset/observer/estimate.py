@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from infoset.arrays import Flags, Floats, Integers
 from infoset.geometry._set_arguments import finite_values
@@ -61,11 +61,17 @@ class Estimate:
 
     They result from the `initial` set and the first `count` of the `events`, steps and
     measurements. With `single` there is one run, without an axis of runs.
+
+    With `wrong_measurements` a run has R sets, the `members`, and its possible states are in one of
+    them: bounds are the minimum and the maximum over those that are not empty. Results for each set
+    have an axis R after the axis of runs; other observers have one set for each run, without this
+    axis.
     """
 
     step: int
     sets: Sets
     single: bool
+    members: int
     states: int
     initial: Set
     events: list[Motion | Strips]
@@ -85,23 +91,23 @@ class Estimate:
     @property
     def is_empty(self) -> Flags:
         """Whether no state is possible, shape () or (B,)."""
-        return np.asarray(self._runs(self.sets.is_empty))
+        return np.asarray(~self._runs(self._maximum(~self.sets.is_empty)))
 
     @property
     def reduced(self) -> Flags:
-        """Whether the set is larger than the exact one, shape () or (B,).
+        """Whether the set, or one of the members, is larger than the exact one, shape () or (B,).
 
         It has a bounded number of facets, or uses the last steps only. Polygons of two states are
         exact up to 512 vertices, and not counted here.
         """
-        return np.asarray(self._runs(self.sets.reduced))
+        return np.asarray(self._runs(self._maximum(self.sets.reduced)))
 
     def excess_widths(self) -> Floats:
         """Return the excess of the widths of the set over the exact ones, shape (n,) or (B, n).
 
-        2 n linear programs over the whole record are solved for each reduced run; the exact widths
+        2 n linear programs over the whole record are solved for each reduced set; the exact widths
         are at most 1e-7 of a state smaller than the widths that they find. The excess is 0 for
-        other runs, and NaN for the empty set and where a program has no solution.
+        other sets, and NaN for the empty set and where a program has no solution.
 
         Raises
         ------
@@ -109,24 +115,32 @@ class Estimate:
             If a run is reduced and the estimate follows more than 20 000 steps and measurements:
             the record is no longer kept.
         """
-        lower, upper = (np.atleast_2d(end) for end in self._hull)
-        excess = np.where(np.isnan(lower), np.nan, 0.0)
-        is_larger = np.atleast_1d(self.reduced) & ~np.atleast_1d(self.is_empty)
+        below, above = self._heights(np.eye(self.states))
+        is_larger = self.sets.reduced & ~self.sets.is_empty
         if is_larger.any() and len(self.events) < self.count:
             raise ValueError(
                 f"exact widths are known for {MAX_RECORD} steps and measurements, not more"
             )
 
-        for run in np.flatnonzero(is_larger):
-            least, most = exact_hull(self.initial, self.events[: self.count], int(run), self.step)
-            excess[run] = np.maximum(upper[run] - lower[run] - (most - least), 0.0)
-        return self._runs(excess)
+        exact_below = below.copy()
+        exact_above = above.copy()
+        for number in np.flatnonzero(is_larger):
+            record = self.events[: self.count]
+            least, most = exact_hull(self.initial, record, int(number), self.step)
+            exact_below[number] = -least
+            exact_above[number] = most
+
+        widths = self._maximum(above) + self._maximum(below)
+        exact = self._maximum(exact_above) + self._maximum(exact_below)
+        with np.errstate(invalid="ignore"):  # the heights of the empty set are -inf
+            return self._runs(np.maximum(widths - exact, 0.0))
 
     @property
     def polygons(self) -> ConvexPolygons:
         """The sets of two states as polygons.
 
-        In a batch, rows of `vertices` after the `counts` of a run are NaN.
+        Their shape is (), or (B,), and (R,) or (B, R) with wrong measurements. In a batch, rows of
+        `vertices` after the `counts` of a polygon are NaN.
 
         Raises
         ------
@@ -142,12 +156,14 @@ class Estimate:
         counts = self.sets.counts
         used = np.arange(counts.max(initial=0)) < counts[:, None]
         vertices = np.where(used[..., None], self.sets.vertices[:, : used.shape[1]], np.nan)
-        polygons = ConvexPolygons.unchecked(vertices, counts)
+        polygons = ConvexPolygons.unchecked(self._by_member(vertices), self._by_member(counts))
         return polygons[0] if self.single else polygons
 
     @property
     def polytopes(self) -> tuple[Polytope, ...]:
         """The set of each run; a tuple of one set for a single run.
+
+        With wrong measurements they are R sets for each run, one run after the other.
 
         Raises
         ------
@@ -177,16 +193,16 @@ class Estimate:
         return self._hull[1]
 
     def chebyshev_centre(self) -> Floats:
-        """Return the centre of a largest ball in the set, shape (n,) or (B, n).
+        """Return the centre of a largest ball in each set, shape (n,) or (B, n).
 
-        It is NaN for the empty set.
+        The shape is (R, n) or (B, R, n) with wrong measurements. It is NaN for the empty set.
 
         Raises
         ------
         ValueError
             If the system has more than four states: their facets are not known.
         """
-        return self._runs(self.sets.chebyshev_centres())
+        return self._runs(self._by_member(self.sets.chebyshev_centres()))
 
     def output_hull(self, matrix: ArrayLike) -> tuple[Floats, Floats]:
         """Return the minimum and the maximum values of matrix x, each of shape (m,) or (B, m).
@@ -199,8 +215,7 @@ class Estimate:
             If the matrix does not have the shape (m, n), m at least 1, or is not finite.
         """
         rows = finite_values("matrix", matrix, "m", self.states)
-        below = np.array([self.sets.support(-row) for row in rows]).T
-        above = np.array([self.sets.support(row) for row in rows]).T
+        below, above = map(self._maximum, self._heights(rows))
         lower = 0.0 - np.where(np.isinf(below), np.nan, below)
         upper = np.where(np.isinf(above), np.nan, above)
         return self._runs(lower), self._runs(upper)
@@ -210,7 +225,8 @@ class Estimate:
 
         The keys are `step`, `is_empty`, `lower`, `upper` and `vertices`. The bounds of the empty
         set are None, and its vertices are an empty list. In a batch all values but the step are
-        lists with a member for each run.
+        lists with a member for each run. With wrong measurements, the vertices of a run are a list
+        for each set.
         """
         lower = np.atleast_2d(self.lower)
         is_empty: Flags = np.asarray(np.isnan(lower).any(axis=1))
@@ -220,7 +236,11 @@ class Estimate:
                 None if empty else row.tolist() for row, empty in zip(ends, is_empty, strict=True)
             ]
         if not isinstance(self.sets, Windows):
-            columns["vertices"] = [points.tolist() for points in self._vertices()]
+            vertices = [points.tolist() for points in self._vertices()]
+            if self.members > 1:
+                firsts = range(0, len(vertices), self.members)
+                vertices = [vertices[first : first + self.members] for first in firsts]
+            columns["vertices"] = vertices
         if self.single:
             return {"step": self.step, **{name: values[0] for name, values in columns.items()}}
         return {"step": self.step, **columns}
@@ -254,14 +274,14 @@ class Estimate:
         return draw_polygons(ax, self._outlines(numbers), style)
 
     def _vertices(self) -> list[Floats]:
-        """Return the vertices of each run, shape (v, n)."""
+        """Return the vertices of each set, shape (v, n)."""
         if isinstance(self.sets, Polygons):
             pairs = zip(self.sets.vertices, self.sets.counts, strict=True)
             return [points[:count] for points, count in pairs]
         return [polytope.vertices for polytope in self.polytopes]
 
     def _outlines(self, numbers: list[int]) -> list[Floats]:
-        """Return the polygon of each run in the plane of two states, shape (m, 2)."""
+        """Return the polygon of each set in the plane of two states, shape (m, 2)."""
         if isinstance(self.sets, Windows):
             return self._outlines_by_programs(numbers)
         outlines = []
@@ -296,6 +316,25 @@ class Estimate:
         """The minimum and the maximum of each state."""
         return self.output_hull(np.eye(self.states))
 
-    def _runs(self, values: Floats | Flags) -> Floats:
+    def _heights(self, rows: Floats) -> tuple[Floats, Floats]:
+        """Return the maxima of -row . x and of row . x of each set, shape (B R, m)."""
+        below = np.array([self.sets.support(-row) for row in rows]).T
+        above = np.array([self.sets.support(row) for row in rows]).T
+        return below, above
+
+    def _by_member(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return an array of all sets, shape (B R, ...), as (B, R, ...); (B, ...) if R is 1."""
+        if self.members == 1:
+            return values
+        runs = len(values) // self.members
+        return values.reshape(runs, self.members, *values.shape[1:])
+
+    def _maximum(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return the maximum over the sets of each run, shape (B, ...)."""
+        if self.members == 1:
+            return values
+        return np.asarray(self._by_member(values).max(axis=1))
+
+    def _runs(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return an array with an axis of runs without this axis for a single run."""
         return np.asarray(values[0] if self.single else values)

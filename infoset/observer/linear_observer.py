@@ -8,14 +8,15 @@ from itertools import pairwise
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from infoset.arrays import Flags, Floats, Integers
+from infoset.arrays import Flags, Floats, Integers, some
 from infoset.geometry._set_arguments import bound_values, finite_values
 from infoset.geometry.convex_polygons import ConvexPolygons
 from infoset.geometry.polytope import Polytope
 from infoset.geometry.zonotope import Zonotope
 from infoset.limits import COUNT, Limits, real_values, shown
+from infoset.observer.cover import Cover, Detection
 from infoset.observer.estimate import MAX_POLYTOPE_STATES, MAX_RECORD, Estimate, Inconsistency
 from infoset.observer.sets import Motion, Polygons, Polytopes, Set, Sets, polytope_of, sizes_of
 from infoset.observer.steps import Strips
@@ -61,6 +62,12 @@ class LinearObserver:
     window : int or None, optional
         Number of steps of the linear programs of five and more states. None is the whole record:
         bounds are then exact, and their time grows with the record. Not used for fewer states.
+    wrong_measurements : int, optional
+        Maximum number q of wrong measurements of a run, at most 3: their errors are arbitrary. A
+        measurement is all that one call of `update` gives; the default is that all errors are in V.
+    measurement_classes : int or None, optional
+        Number G of classes into which the measurements of a run are dealt, at least q + 2. Each run
+        then has R = C(G, q) sets, at most 64, which leave q classes out. None is 2 q + 2.
 
     Raises
     ------
@@ -109,6 +116,8 @@ class LinearObserver:
         runs: int | None = None,
         max_facets: int | None = 36,
         window: int | None = WINDOW,
+        wrong_measurements: int = 0,
+        measurement_classes: int | None = None,
     ) -> None:
         shape = real_values("state_matrix", state_matrix).shape
         self.states = n = shape[-1] if shape else 0
@@ -134,6 +143,8 @@ class LinearObserver:
         self.window = window
         self._single = runs is None
         self._runs = runs or 1
+        self._cover = Cover.of(wrong_measurements, measurement_classes)
+        self._measured = np.zeros(self._runs, dtype=np.int64)
         self._disturbance = _disturbances(disturbance, n)
         self._replaced = dict[int, Set]()
         _need_set("initial", initial, n, (self._runs,) if runs else ())
@@ -144,20 +155,27 @@ class LinearObserver:
         self._sets = self._first_sets()
         self._events = list[Motion | Strips]()
         self._count = 0
+        sets = self._runs * self._cover.members
         self._empty = _Emptied(
-            np.full(self._runs, -1),
-            np.zeros(self._runs, dtype=np.int64),
-            np.zeros(self._runs),
+            np.full(sets, -1),
+            np.zeros(sets, dtype=np.int64),
+            np.zeros(sets),
         )
 
     def _first_sets(self) -> Sets:
         """Return the sets of step 0, before its measurement."""
+        initial = self._initial
+        sets = self._runs * self._cover.members
         if self.states == 2:
-            return Polygons.of(self._initial, self._runs)
+            if isinstance(initial, ConvexPolygons) and initial.shape:
+                initial = ConvexPolygons.unchecked(
+                    self._cover.repeated(initial.vertices), self._cover.repeated(initial.counts)
+                )
+            return Polygons.of(initial, sets)
         if self.states > MAX_POLYTOPE_STATES:
-            return Windows.of(self._initial, self._runs, self.window)
+            return Windows.of(initial, sets, self.window)
         sizes = np.max([sizes_of(each) for each in self._disturbance.values], axis=0)
-        return Polytopes.of(self._initial, self._runs, self.max_facets, sizes)
+        return Polytopes.of(initial, sets, self.max_facets, sizes)
 
     @property
     def _may_be_reduced(self) -> bool:
@@ -199,7 +217,8 @@ class LinearObserver:
         ----------
         measurement : array_like, shape (q,) or (B, q), or a number for one output
             y; NaN or None is a missing measurement. None in place of the array means that all are
-            missing.
+            missing. With `wrong_measurements` all of y counts as one measurement, whose number is
+            the number of measurements of this run before it, without those that are missing.
 
         Raises
         ------
@@ -209,8 +228,13 @@ class LinearObserver:
         values = np.full(self.outputs, np.nan) if measurement is None else _with_nan(measurement)
         y = self._rows("measurement", values, self.outputs, missing=True)
         matrix = self._at(self._c, "output_matrix", self.step)
-        for runs, strips in self._noise.at("noise", self.step).strips(matrix, y):
-            self._cut(runs, strips)
+        noise = self._noise.at("noise", self.step)
+        if self._cover.members > 1:
+            is_missing = np.isnan(y)
+            y = self._cover.used(y, self._measured)
+            self._measured += ~is_missing.all(axis=1) if some(is_missing) else 1
+        for sets, strips in noise.strips(matrix, y):
+            self._cut(sets, strips)
 
     def cut(
         self, normals: ArrayLike, lower: ArrayLike = -np.inf, upper: ArrayLike = np.inf
@@ -242,19 +266,20 @@ class LinearObserver:
         ends = []
         for name, values in (("lower", lower), ("upper", upper)):
             end = bound_values(name, values, *shapes)
-            ends.append(np.array(np.broadcast_to(end, (self._runs, len(rows)))))
+            of_runs = np.array(np.broadcast_to(end, (self._runs, len(rows))))
+            ends.append(self._cover.repeated(of_runs))
         sizes = [np.where(np.isinf(end), 0.0, np.abs(end)) for end in ends]
         strips = Strips(rows, ends[0], ends[1], np.maximum(*sizes))
-        self._cut(np.ones(self._runs, dtype=bool), strips)
+        self._cut(np.ones(len(ends[0]), dtype=bool), strips)
 
-    def _cut(self, runs: Flags, strips: Strips) -> None:
-        """Cut the sets of some runs by strips, of which those with NaN ends do not exist."""
-        exists = runs[:, None] & ~np.isnan(strips.lower)
+    def _cut(self, sets: Flags, strips: Strips) -> None:
+        """Cut some of the sets by strips, of which those with NaN ends do not exist."""
+        exists = sets[:, None] & ~np.isnan(strips.lower)
         lower = np.where(exists, strips.lower, -np.inf)
         upper = np.where(exists, strips.upper, np.inf)
         strips = Strips(strips.normals, lower, upper, np.where(exists, strips.terms, 0.0))
 
-        excess = np.zeros((self._runs, len(strips.normals)))
+        excess = np.zeros(strips.lower.shape)
         before = self._sets.is_known_empty
         self._sets = self._sets.cut(strips, excess)
         self._note(strips)
@@ -278,6 +303,7 @@ class LinearObserver:
             self.step,
             self._sets,
             self._single,
+            self._cover.members,
             self.states,
             self._initial,
             self._events,
@@ -286,20 +312,43 @@ class LinearObserver:
 
     @property
     def inconsistency(self) -> Inconsistency:
-        """Where the measurements contradict the model.
+        """Where the measurements contradict the model; with `wrong_measurements`, where the last
+        set of a run became empty: more than q measurements are wrong, or the model is.
 
         For five and more states, programs over the last steps are solved.
         """
+        empty = self._located()
+        last = self._cover.last_emptied(empty.step, empty.excess)
+        return Inconsistency(*(np.asarray(self._of_runs(part[last])) for part in empty))
+
+    @property
+    def detection(self) -> Detection:
+        """What is proved about wrong measurements, with `wrong_measurements`.
+
+        For five and more states, programs over the last steps are solved.
+        """
+        found = self._cover.detection(self._located().step)
+        return Detection(
+            np.asarray(self._of_runs(found.step)),
+            self._of_runs(found.refuted),
+            self._of_runs(found.suspected),
+        )
+
+    def _located(self) -> _Emptied:
+        """Return where each set became empty."""
         empty = self._empty
         if isinstance(self._sets, Windows):
-            for run in np.flatnonzero(empty.step == -1):
-                where = self._sets.members[run].located()
+            for number in np.flatnonzero(empty.step == -1):
+                where = self._sets.members[number].located()
                 if where is not None:
-                    empty.step[run] = where.step
-                    empty.output[run] = where.output
-                    empty.excess[run] = where.excess
-        parts = [part[0] if self._single else part.copy() for part in empty]
-        return Inconsistency(*(np.asarray(part) for part in parts))
+                    empty.step[number] = where.step
+                    empty.output[number] = where.output
+                    empty.excess[number] = where.excess
+        return empty
+
+    def _of_runs(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return an array with an axis of runs without this axis for a single run."""
+        return values[0] if self._single else values
 
     def run(
         self, measurements: ArrayLike | Sequence[Any], inputs: ArrayLike | None = None
@@ -379,6 +428,8 @@ class LinearObserver:
             return Motion(matrix, offset, np.abs(offset), w)
 
         u = self._rows("inputs", inputs, self.inputs)
+        if len(u) > 1:  # one row is that of all sets
+            u = self._cover.repeated(u)
         b = self._at(self._b, "input_matrix", step)
         shifts = u @ b.T + offset
         terms = np.abs(u) @ np.abs(b).T + np.abs(offset)
@@ -409,7 +460,7 @@ class LinearObserver:
 
 
 class _Emptied(NamedTuple):
-    """The arrays of an `Inconsistency` with an axis of runs."""
+    """The arrays of an `Inconsistency` for each set, shape (B R,)."""
 
     step: Integers
     output: Integers

@@ -312,3 +312,102 @@ def test_unstable_systems_are_refused_before_numbers_overflow(
         "observe", "big.toml", *(["--data", "data.csv"] if data == "measured" else [])
     )
     assert "a state is larger than 1e+40; the system is unstable" in err
+
+
+WRONG = (
+    *("--set", "wrong_measurements={number=1, size=[20.0, 50.0], steps=[25, 30]}"),
+    *("--set", "noise.wrong_measurements=1"),
+)
+"""A wrong measurement after the tunnel of the vehicle, which has no measurements 14 to 22."""
+
+
+def test_wrong_measurement_is_proved_and_its_class_suspected(infoset: Command) -> None:
+    code, out, _ = infoset("observe", "vehicle", *WRONG, "--out", "o", "--html", "page.html")
+
+    assert code == 0
+    results = strict(Path("o/results.json").read_text())
+    wrong = int(results["data"].rpartition(" ")[2])
+    assert 25 <= wrong <= 30
+    found = results["wrong_measurements"]
+    assert found == {
+        "assumed": 1,
+        "classes": 4,
+        "proved_k": wrong,
+        "suspected_k": [*range((wrong - 9) % 4, 14, 4), *([wrong - 4] * (wrong >= 27)), wrong],
+    }
+    assert f"a wrong one is proved at step {wrong} ({wrong / 2:g} s); suspected: steps" in out
+    assert "true state inside the set: 40 of 40 steps" in out
+    assert results["inconsistency"] is None
+    for step in results["steps"]:
+        points = np.array([point for polygon in step["vertices"] for point in polygon])
+        assert len(step["vertices"]) == 4
+        np.testing.assert_allclose(points.min(axis=0), step["lower"], rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(points.max(axis=0), step["upper"], rtol=0.0, atol=1e-9)
+    page = Path("page.html").read_text(encoding="utf-8")
+    assert f'"proved_at":{wrong}' in page
+    assert "At most 1 wrong measurement assumed; a wrong one is proved" in page
+
+
+def test_more_wrong_measurements_than_assumed_are_a_contradiction(infoset: Command) -> None:
+    code, out, _ = infoset("observe", "vehicle", *WRONG, "--set", "wrong_measurements.number=4")
+
+    assert code == 0
+    assert "at most 1 wrong measurement assumed; more than 1 is wrong, or the model is" in out
+    assert "the measurements contradict the model at step" in out
+
+
+def test_simulation_without_the_table_is_the_same_but_for_wrong_measurements(
+    infoset: Command,
+) -> None:
+    ordinary = infoset.json("observe", "vehicle")
+    wrong = infoset.json("observe", "vehicle", *WRONG)
+    assert [step["state"] for step in wrong["steps"]] == [
+        step["state"] for step in ordinary["steps"]
+    ]
+    assert ordinary["wrong_measurements"] is None
+    data = simulate(load_problem("vehicle"), Errors.EXTREMAL, 0)
+    text = built_in_files()["vehicle"].text
+    Path("mine.toml").write_text(
+        f"{text}\n[wrong_measurements]\nnumber = 3\nsize = [4.0, 5.0]\nsteps = [10, 30]\n"
+    )
+    other = simulate(load_problem("mine.toml"), Errors.EXTREMAL, 0)
+    assert data.states is not None
+    changed_steps = np.flatnonzero((data.measured != other.measured).any(axis=1))
+    is_wrong = [k for k in changed_steps.tolist() if not np.isnan(other.measured[k]).any()]
+    assert len(is_wrong) == 3
+    errors = np.abs(other.measured - data.states[:, :1])[is_wrong] / 3.0
+    assert ((errors >= 4.0 - 1e-9) & (errors <= 5.0 + 1e-9)).all()
+    assert all(10 <= k <= 30 and not 14 <= k <= 22 for k in is_wrong)
+
+
+def test_wrong_measurements_of_eight_states_have_bounds_and_a_page(infoset: Command) -> None:
+    Path("eight.toml").write_text(
+        EIGHT_STATES.replace(
+            "half_width", "wrong_measurements = 1\nmeasurement_classes = 3\nhalf_width"
+        )
+        + "[wrong_measurements]\nnumber = 1\nsize = [10.0, 20.0]\nsteps = [6, 8]\n"
+    )
+
+    code, out, _ = infoset("observe", "eight.toml", "--html", "page.html")
+
+    assert code == 0
+    assert "true state inside its bounds: 13 of 13 steps" in out
+    assert "at most 1 wrong measurement assumed; a wrong one is proved at step" in out
+
+
+@pytest.mark.parametrize(
+    ("setting", "told"),
+    [
+        ("noise.wrong_measurements=4", "noise: wrong_measurements must be at most 3: got 4"),
+        ("noise.measurement_classes=4", "noise: measurement_classes belongs to wrong_measurements"),
+        (
+            "wrong_measurements={number=1, steps=[5, 2]}",
+            "wrong_measurements: steps must be [first, last]",
+        ),
+        ("wrong_measurements.number=-1", "wrong_measurements.number: must be at least 0"),
+    ],
+)
+def test_senseless_wrong_measurements_are_refused(
+    setting: str, told: str, infoset: Command
+) -> None:
+    assert told in infoset.refused("observe", "vehicle", "--set", setting)
