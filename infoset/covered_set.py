@@ -23,6 +23,7 @@ from infoset.information_set import InformationSet, InformationSetView
 from infoset.limits import COUNT, flags, real_array, shown
 from infoset.model import SetModel
 from infoset.set_queries import MaskedFloats, MaskedIntegers, Section, SetQueries
+from infoset.suspects import Suspects
 
 
 def information_set(model: SetModel, batch: int = 1, *, guarantee: bool = True) -> InformationSet:
@@ -41,20 +42,24 @@ class CoveredSetView(InformationSetView):
     Attributes
     ----------
     left_out : ndarray of bool, shape (R, G)
-        Classes of images that each member leaves out.
+        Classes of images that each member leaves out until a wrong image is proved.
     """
 
-    def __init__(self, members: InformationSet, model: SetModel, left_out: Flags) -> None:
+    def __init__(
+        self, members: InformationSet, model: SetModel, left_out: Flags, suspects: Suspects
+    ) -> None:
         # Queries of the base class that are not replaced below (axes, time) read the members.
         SetQueries.__init__(self, members._state)
         self.model = model
         self.left_out = left_out
         self._members = members
+        self._suspects = suspects
 
     def copy(self) -> CoveredSet:
         """Return an independent set that starts from the state of this one."""
         twin = CoveredSet.__new__(CoveredSet)
-        CoveredSetView.__init__(twin, self._members.copy(), self.model, self.left_out)
+        members = self._members.copy()
+        CoveredSetView.__init__(twin, members, self.model, self.left_out, self._suspects.copy())
         return twin
 
     @property
@@ -76,23 +81,26 @@ class CoveredSetView(InformationSetView):
         """Whether each member became empty before a label left, shape (B, R).
 
         A wrong image outside the classes that the member leaves out is then proved, if no other
-        assumption is broken.
+        assumption is broken. After a split, members that are not in use count as refuted.
         """
         return np.asarray(self._by_member(self._members.inconsistent), dtype=bool)
 
     @property
-    def suspected(self) -> Flags:
-        """Whether each class may contain a wrong image that is proved, shape (B, G).
-
-        A wrong image is proved as soon as a member is refuted. It is then in a class that all
-        members without a refutation leave out, or more than one image is wrong; all classes that
-        any of these members leaves out are suspected. None is before the proof, or if all members
-        are refuted.
+    def proof_step(self) -> MaskedIntegers:
+        """Step at which the first member was refuted, which proves a wrong image, shape (B,);
+        masked before.
         """
-        refuted = self.refuted
-        proved = np.asarray(refuted.any(axis=1)) & ~self.inconsistent
-        suspected = (~refuted[:, :, None] & self.left_out).any(axis=1)
-        return np.asarray(suspected & proved[:, None])
+        step = self._suspects.proof_step
+        return np.ma.MaskedArray(step.copy(), mask=step < 0)
+
+    def suspected_steps(self, engagement: int = 0) -> list[int]:
+        """Return the steps of the images at least one of which is wrong.
+
+        They are the images before the last refutation that some member without one leaves out.
+        There are none before a wrong image is proved, and if all members are refuted.
+        """
+        self._need_engagement(engagement)
+        return self._suspects.steps(engagement, self._members._state)
 
     @property
     def status(self) -> list[SetStatus]:
@@ -261,8 +269,9 @@ class CoveredSet(CoveredSetView, InformationSet):
     """Information sets of a batch of engagements in which at most q images of a flight are wrong.
 
     It has the methods of `InformationSet`. A member that becomes empty before a label has left is
-    refuted, and stops if another one is not; if all are refuted, more than q images are wrong, and
-    the last ones recover as an `InformationSet` does.
+    refuted, and stops if another one is not. For q = 1 the others are then split into members that
+    leave out as few images as possible, see `Suspects`. If all are refuted, more than q images are
+    wrong, and the last ones recover as an `InformationSet` does.
 
     Parameters
     ----------
@@ -286,11 +295,11 @@ class CoveredSet(CoveredSetView, InformationSet):
         left_out = classes_left_out(model.wrong_images, model.classes)
         ordinary = replace(model, wrong_images=0, image_classes=None)
         members = InformationSet(ordinary, batch * len(left_out), guarantee=guarantee)
-        CoveredSetView.__init__(self, members, model, left_out)
+        CoveredSetView.__init__(self, members, model, left_out, Suspects(batch, left_out))
 
     def view(self) -> InformationSetView:
         """Return a read-only view of this set; it follows the set."""
-        return CoveredSetView(self._members, self.model, self.left_out)
+        return CoveredSetView(self._members, self.model, self.left_out, self._suspects)
 
     def guaranteed_miss(self) -> tuple[Floats, Flags]:
         """Return the guaranteed miss: the maximum over the members that are not refuted."""
@@ -301,10 +310,14 @@ class CoveredSet(CoveredSetView, InformationSet):
 
     def measure_angle(self, alpha_rad: ArrayLike, where: ArrayLike = True) -> None:
         """Cut the members that use this image. Its number is the number of periods so far."""
+        state = self._members._state
         every = self.model.steps_in(self.model.angle_sensor.period_s)
-        image = self._members._state.elapsed // every
-        uses = ~self.left_out[:, image % self.left_out.shape[1]]
-        active = np.outer(self._where(where), uses)
+        image_class = (state.elapsed // every) % self.left_out.shape[1]
+        wanted = self._where(where)
+        self._suspects.record_image(state, image_class, wanted & self.tracking)
+
+        uses = ~self.left_out[:, image_class] | self._suspects.is_split[:, None]
+        active = wanted[:, None] & uses
         measured = real_array("alpha_rad", alpha_rad, (len(self.axes), self.batch))
         self._members.measure_angle(self._lateral_of_members(measured), active.ravel())
         self._stop_refuted()
@@ -390,6 +403,8 @@ class CoveredSet(CoveredSetView, InformationSet):
         stopping = refuted & ~self.inconsistent[:, None]
         if some(stopping):
             self._members.stop(stopping.ravel())
+        if some(refuted):
+            self._suspects.update(self._members._state, self.model.wrong_images)
 
 
 def classes_left_out(wrong_images: int, image_classes: int) -> Flags:

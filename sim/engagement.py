@@ -37,6 +37,7 @@ from infoset.sim.scenario import Scenario
 from infoset.sim.target import constant_side
 from infoset.sim.true_flight import TrueFlight
 from infoset.sim.truth_section import TruthSection
+from infoset.sim.wrong_images import proved_columns
 
 
 @dataclass(frozen=True)
@@ -208,6 +209,8 @@ class Engagements:
             lateral_miss_m=miss.lateral_m.T,
             guarantees=self._model.is_guaranteed,
             redraws=self._draws.redraws,
+            # wrong_image_proved_s, suspected_images, wrong_image_s
+            **proved_columns(self._information),
             burns_m_s=self._impulses.burns_m_s,
             b_plane_t_rad=self.scenario.b_plane_t_rad,
         )

@@ -20,6 +20,7 @@ from infoset.sim.engagement import Engagements, Step
 from infoset.sim.results import Results, ending
 from infoset.sim.scenario import Scenario, noise_name, strategy_name, with_noise, with_strategy
 from infoset.sim.versions import versions
+from infoset.sim.wrong_images import suspected_times_s
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,8 @@ class Record:
         Name of the noise that replaced the scenario's; None if none did.
     inconsistency : RecordedInconsistency or None
         First measurement that contradicts the model; None without one.
+    suspected_s : tuple of float
+        Times of the images one of which is wrong; empty without a proof.
     versions : mapping of str to str
         Versions of the packages and of Python that simulated it.
     """
@@ -89,6 +92,7 @@ class Record:
     sections: tuple[tuple[Section, ...], ...]
     noise: str | None = None
     inconsistency: RecordedInconsistency | None = None
+    suspected_s: tuple[float, ...] = ()
     versions: Mapping[str, str] = field(default_factory=versions)
 
     @property
@@ -201,6 +205,7 @@ def fly_one(
         sections=tuple(sections),
         noise=None if own_noise is None else noise_name(own_noise),
         inconsistency=_inconsistency(flight),
+        suspected_s=suspected_times_s(steps[-1].information),
     )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset.arrays import Flags, Floats, Integers
-from infoset.set_queries import MaskedFloats
+from infoset.set_queries import MaskedFloats, MaskedIntegers
 from infoset.sim.columns import (
     Cell,
     Column,
@@ -68,9 +68,17 @@ _ENGINE = "Maximum change of the miss by all impulses of the flight, without a l
 _BUDGET = "Maximum change of the miss by impulses within the budget"
 _LAST = "Radius of the possible misses at the last decision; unknown without a decision"
 _REDRAWS = "Normal starts outside the dispersion that were drawn again; unknown for uniform starts"
+_PROVED = (
+    "Time at which a wrong image is proved; unknown without a proof, and if the set allows for none"
+)
+_SUSPECTED = (
+    "Number of images one of which is the wrong one; unknown without a proof, and if more images "
+    "are wrong than the set allows for"
+)
+_NAMED = "Time of the wrong image, if one image is suspected"
 _B_DOT_T = "B.T of the closest approach; unknown without a reference plane"
 
-_in_space = partial(Column, nullable=True, optional=True)
+_optional = partial(Column, nullable=True, optional=True)
 
 
 @documented
@@ -130,31 +138,42 @@ class Results:
     )
     position_m: Floats = field(
         metadata=columns(
-            _in_space("start_y_m", "m", "True y at the start, only in space"),
+            _optional("start_y_m", "m", "True y at the start, only in space"),
             Column("start_z_m", "m", "True z at the start"),
             Column("start_x_m", "m", "true x"),
         )
     )
     velocity_m_s: Floats = field(
         metadata=columns(
-            _in_space("start_vy_m_s", "m/s", "True V_y at the start, only in space"),
+            _optional("start_vy_m_s", "m/s", "True V_y at the start, only in space"),
             Column("start_vz_m_s", "m/s", "true V_z"),
             Column("start_vx_m_s", "m/s", "true V_x"),
         )
     )
     lateral_miss_m: Floats = field(
         metadata=columns(
-            _in_space("miss_y_m", "m", "True y at the closest approach, only in space"),
+            _optional("miss_y_m", "m", "True y at the closest approach, only in space"),
             Column("miss_z_m", "m", "true z"),
         )
     )
     b_plane_m: Floats = field(
         init=False,
-        metadata=columns(_in_space("b_dot_t_m", "m", _B_DOT_T), _in_space("b_dot_r_m", "m", "B.R")),
+        metadata=columns(_optional("b_dot_t_m", "m", _B_DOT_T), _optional("b_dot_r_m", "m", "B.R")),
     )
     redraws: Integers | None = field(
+        default=None, metadata=columns(_optional("redraws", "", _REDRAWS, int))
+    )
+    wrong_image_proved_s: MaskedFloats | None = field(
         default=None,
-        metadata=columns(Column("redraws", "", _REDRAWS, int, nullable=True, optional=True)),
+        metadata=columns(
+            Column("wrong_image_proved_s", "s", _PROVED, nullable=True, optional=True)
+        ),
+    )
+    suspected_images: MaskedIntegers | None = field(
+        default=None, metadata=columns(_optional("suspected_images", "", _SUSPECTED, int))
+    )
+    wrong_image_s: MaskedFloats | None = field(
+        default=None, metadata=columns(_optional("wrong_image_s", "s", _NAMED))
     )
     guarantees: bool = False
     burns_m_s: Floats | None = None

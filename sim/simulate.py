@@ -14,6 +14,7 @@ from infoset.arrays import Integers
 from infoset.guidance import Strategy
 from infoset.guidance.noise import NoiseSource
 from infoset.limits import WHOLE, shown
+from infoset.model import SetSettings
 from infoset.sim.draws import draw, max_number_of_steps
 from infoset.sim.engagement import Engagements, Step
 from infoset.sim.results import GuaranteeWarning, Results, join
@@ -103,11 +104,8 @@ def warn_of_failures(scenario: Scenario, results: Results) -> None:
     if not failures:
         return
     if scenario.set_model.is_guaranteed:
-        reason = (
-            "an assumption of the model does not hold: the noise exceeds the bounds of the "
-            "sensors, or the scenario exceeds those of the model; infoset scenarios check FILE "
-            "examines it"
-        )
+        broken = broken_assumption(scenario.information_set)
+        reason = f"an assumption of the model does not hold: {broken}"
     else:
         reason = (
             "the model paper does not promise to keep the true state; information_set.model = "
@@ -115,6 +113,20 @@ def warn_of_failures(scenario: Scenario, results: Results) -> None:
         )
     warnings.warn(
         f"{scenario.name}: {failures}: {reason}", GuaranteeWarning, stacklevel=_level_of_user()
+    )
+
+
+def broken_assumption(settings: SetSettings) -> str:
+    """Return why a set of the guaranteed model can fail, as text."""
+    reasons = (
+        "the noise exceeds the bounds of the sensors, or the scenario exceeds those of the model; "
+        "infoset scenarios check FILE examines it"
+    )
+    if not settings.wrong_images:
+        return reasons
+    return (
+        "a flight has more wrong images than information_set.wrong_images, "
+        f"{settings.wrong_images}, or {reasons}"
     )
 
 

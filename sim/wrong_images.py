@@ -1,14 +1,16 @@
-"""Wrong images of simulated flights: which ones, and by how much."""
+"""Wrong images of simulated flights: which ones, by how much, and which ones a set proves."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
 from infoset.arrays import Floats
+from infoset.covered_set import CoveredSetView
+from infoset.information_set import InformationSetView
 from infoset.limits import Checked, Limits, NotNegative
 from infoset.sensors import Sensor
 from infoset.sensors.sensor import Geometry
@@ -81,3 +83,28 @@ def wrong_angles(sensor: Sensor, sight: Geometry, measured: Floats, errors: Floa
     is_wrong = (errors != 0.0).any(axis=0)
     angles = np.clip(sensor.measured(sight, errors), -MAX_ANGLE_RAD, MAX_ANGLE_RAD)
     return np.where(is_wrong, angles, measured)
+
+
+def suspected_times_s(information: InformationSetView, engagement: int = 0) -> tuple[float, ...]:
+    """Return the times of the images one of which is wrong; none without a proof."""
+    if not isinstance(information, CoveredSetView):
+        return ()
+    step_s = information.model.step_s
+    return tuple(step_s * step for step in information.suspected_steps(engagement))
+
+
+def proved_columns(information: InformationSetView) -> dict[str, Any]:
+    """Return the columns of `Results` about wrong images that a set has proved.
+
+    There are none for a set that allows for no wrong image.
+    """
+    if not isinstance(information, CoveredSetView):
+        return {}
+    suspects = [suspected_times_s(information, number) for number in range(information.batch)]
+    count = np.array([len(times) for times in suspects], dtype=np.int64)
+    last_s = np.array([max(times, default=0.0) for times in suspects])
+    return {
+        "wrong_image_proved_s": information.proof_step * information.model.step_s,
+        "suspected_images": np.ma.MaskedArray(count, mask=count == 0),
+        "wrong_image_s": np.ma.MaskedArray(last_s, mask=count != 1),
+    }

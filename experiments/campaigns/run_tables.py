@@ -301,7 +301,7 @@ def summary_parts(folder: CampaignFolder, table: pd.DataFrame) -> Iterator[Part]
             yield f"{row['noise']} noise: {text}"
         sets += counts
 
-    yield from set_warnings(manifest.scenario.information_set.model, sets)
+    yield from set_warnings(manifest.scenario.information_set, sets)
     yield from campaign_notes(folder)
     if manifest.stopped_after is not None:
         yield (

@@ -140,7 +140,7 @@ class SweepReport:
         )
         yield from self._notes()
         yield f"all cells: {sets}"
-        yield from set_warnings(manifest.scenario.information_set.model, sets)
+        yield from set_warnings(manifest.scenario.information_set, sets)
 
     def _decisions(self, noise: str) -> Iterator[Part]:
         """Yield the numbers of decisions, and tables of the limits and of the decisions."""

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import os
 import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -33,6 +33,7 @@ from infoset.sim.columns import columns_of
 from infoset.sim.gravity import on_board_model
 from infoset.sim.scenario import MAX_STEPS
 from infoset.sim.storage.codec import from_json, to_json
+from infoset.sim.wrong_images import proved_columns, suspected_times_s
 
 MAX_FILE_BYTES = 1 << 28
 """Size of the largest record that is read: `MAX_STEPS` steps in space take 14 MB."""
@@ -72,9 +73,10 @@ _OF_STEPS = {
 _RESULT = {
     f"result_{each.field}": each
     for each in columns_of(Results)
-    if not each.derived and each.kind in (float, bool)
+    if not (each.derived or each.optional) and each.kind in (float, bool)
 }
-"""The last column of each field of a result that is an array of numbers or flags."""
+"""The last column of each field of a result that is an array of numbers or flags. Optional columns
+follow from the measurements, or are not stored."""
 _BY_AXIS = {"position_m": ("axes + 1",), "velocity_m_s": ("axes + 1",), "lateral_miss_m": ("axes",)}
 _OF_HEADER = ("scenario", "versions", "seed", "run", "strategy", "noise", "inconsistency")
 MEMBERS = {
@@ -233,7 +235,8 @@ def _check(arrays: Arrays, axes: int) -> None:
 def _check_size(scenario: Scenario, steps: int) -> None:
     """Raise ValueError if the sets of a record take too much memory."""
     settings = scenario.information_set
-    sections = max(settings.sections, 2 * settings.fewest_sections + 1)
+    sets = math.comb(settings.classes, settings.wrong_images)
+    sections = sets * max(settings.sections, 2 * settings.fewest_sections + 1)
     if sections * steps > MAX_SECTION_STEPS:
         raise ValueError(
             f"it has {sections} sections in {steps} steps, and their product may be at most "
@@ -297,15 +300,21 @@ def _to_record(header: Header, arrays: Arrays) -> Record:
     measured = {
         kind.name: arrays[name] for name, kind in _MEASURED.items() if kind.name in scenario.sensors
     }
-    after_measurements = islice(replayed(scenario, measured, arrays["impulse_m_s"]), 1, None, 2)
+    sections = []
+    for number, information in enumerate(replayed(scenario, measured, arrays["impulse_m_s"])):
+        if number % 2 == 1:  # after a measurement
+            sections.append(tuple(information.sections()))
+
     known: dict[str, Any] = {name: getattr(header, name) for name in _OF_HEADER}
     return Record(
         **known | {name: arrays[name] for name in _OF_STEPS},
         result=Results(
             **fields,
+            **proved_columns(information),
             guarantees=scenario.set_model.is_guaranteed,
             b_plane_t_rad=scenario.b_plane_t_rad,
         ),
         measured=measured,
-        sections=tuple(tuple(information.sections()) for information in after_measurements),
+        sections=tuple(sections),
+        suspected_s=suspected_times_s(information),
     )

@@ -14,10 +14,11 @@ from infoset.experiments.common.units import length_text
 from infoset.guidance import NoiseKind, Strategy, TieRule
 from infoset.guidance.noise import NoiseSource
 from infoset.guidance.noise_registry import noise_note
-from infoset.model import Model
+from infoset.model import Model, SetSettings
 from infoset.sim import HitEstimate, MissCause, Results, Scenario, estimate_hits
 from infoset.sim.requirement import CONFIDENCE, HitRequirement, runs_needed
 from infoset.sim.results import join
+from infoset.sim.simulate import broken_assumption
 from infoset.sim.statistics import runs_for_hits, shown_quantiles
 
 QUANTILES = {"p10": 0.1, "p50": 0.5, "p90": 0.9, "p99": 0.99, "max": 1.0}
@@ -226,8 +227,8 @@ def set_counts(truth_kept: Flags, set_emptied: Flags) -> SetCounts:
     )
 
 
-def set_warnings(model: Model, counts: SetCounts) -> list[str]:
-    """Return a warning if sets failed in some runs.
+def set_warnings(settings: SetSettings, counts: SetCounts) -> list[str]:
+    """Return a warning if sets with these settings failed in some runs.
 
     The quantiles then also describe these failures of the model.
     """
@@ -237,16 +238,15 @@ def set_warnings(model: Model, counts: SetCounts) -> list[str]:
         f"in {counts.failed} of {some_runs(counts.runs)} the set lost the true state or became "
         "empty"
     )
-    if model is Model.PAPER:
+    if settings.model is Model.PAPER:
         return [
             f"warning: model paper: {failures}; the quantiles include these failures of the model; "
             "for quantiles without them, use --model guaranteed"
         ]
 
     return [
-        f"warning: model guaranteed: {failures}, so an assumption of the model does not hold: the "
-        "noise exceeds the bounds of the sensors, or the scenario exceeds those of the model; "
-        "infoset scenarios check FILE examines it"
+        f"warning: model guaranteed: {failures}, so an assumption of the model does not hold: "
+        f"{broken_assumption(settings)}"
     ]
 
 
@@ -387,6 +387,29 @@ def redrawn_text(share: float | None) -> str:
     if share is None:
         return ""
     return f"normal starts: {percent(share)} were outside the dispersion and drawn again"
+
+
+def wrong_images_text(results: Results, scenario: Scenario) -> str:
+    """Return in how many runs a wrong image is proved, and in how many it is named; an empty text
+    if the set allows for no wrong image.
+    """
+    if results.wrong_image_proved_s is None or results.wrong_image_s is None:
+        return ""
+    text = (
+        f"at most {some_wrong_images(scenario)} assumed; proved in "
+        f"{results.wrong_image_proved_s.count()} of {some_runs(len(results))}"
+    )
+    if scenario.information_set.wrong_images == 1:
+        text += f", named in {results.wrong_image_s.count()}"
+    return text
+
+
+def some_wrong_images(scenario: Scenario) -> str:
+    """Return the number of wrong images that the set allows for as text: 1 wrong image."""
+    number = scenario.information_set.wrong_images
+    if number == 1:
+        return "1 wrong image"
+    return f"{number} wrong images"
 
 
 def max_guarantee_m(results: Results) -> float | None:

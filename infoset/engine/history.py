@@ -124,6 +124,15 @@ class History:
         """Remove an event from the history of some engagements."""
         self.applies[event, where] = False
 
+    def replace(self, row: int, source: int, applies: Flags) -> None:
+        """Give engagement `row` the events of engagement `source`, but `applies`, shape (events,),
+        says which ones apply. Only for histories without rates.
+        """
+        self.total_impulse()
+        self._fired[row] = self._fired[source]
+        self.values[: self.events, :, row] = self.values[: self.events, :, source]
+        self.applies[: self.events, row] = applies
+
     def total_impulse(self) -> Floats:
         """Return the sum of the impulses' magnitudes in each engagement, m/s, shape (B,)."""
         new = self._summed + np.flatnonzero(self.kinds[self._summed : self.events] == IMPULSE)

@@ -329,6 +329,34 @@ class SetState:
         self._spare = min(self._spare, refine_all(wanted, number, limits, past, self.sections))
         self.min_label = self._min_label()
 
+    def replace(self, row: int, source: int, applies: Flags) -> bool:
+        """Replace the set of engagement `row` by the set of other measurements of engagement
+        `source`, computed by replay; return whether it is not empty.
+
+        `applies`, shape (events,), says which events of the history apply. The new set must be a
+        part of the set of `source`, whose limits of the labels it takes over. No label of either
+        set may have left, and no rate may be measured.
+        """
+        self.history.replace(row, source, applies)
+        self.lower_label[row] = self.lower_label[source]
+        self.upper_label[row] = self.upper_label[source]
+        self.status[row] = SetStatus.TRACKING.value
+        self.lost_step[row] = -1
+
+        # The stored labels became empty with other measurements: the search does not know them.
+        self.sections.slots["feasible"][row] = False
+        self.sections.used[row] = 0
+        wanted = self._none.copy()
+        wanted[row] = True
+        self.refine(wanted, self._grid)
+        self.sections.stale[row] = True
+        return bool(self.feasible[row].any())
+
+    def refute(self, row: int) -> None:
+        """Note that the set of an engagement does not contain the true state."""
+        self.lost_step[row] = self.elapsed
+        self.lost_label[row] = 0.5 * (self.lower_label[row] + self.upper_label[row])
+
     def _min_label(self) -> float:
         return float(np.where(self.feasible, self.labels, np.inf).min())
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from infoset import InformationSet, Model, SetModel, SetStatus, StateBox
+from infoset import InformationSet, Model, SetModel, StateBox
 from infoset.arrays import Flags, Floats
 from infoset.covered_set import CoveredSet, CoveredSetView, classes_left_out, information_set
 from tests.infoset.test_information_set import SENSOR, STEP, E
@@ -126,18 +126,6 @@ def test_sections_of_members_have_an_empty_one_between_them() -> None:
     stored = covered.feasible.shape[1] // 4
     assert not covered.feasible[:, stored - 1 :: stored].any()
     assert len(covered.sections(1)) == covered.section_counts[1]
-
-
-def test_wrong_image_is_proved_and_the_class_is_suspected() -> None:
-    covered = CoveredSet(MODEL)
-    wrong = 21
-    flown(covered, wrong + 1, wrong)
-    assert covered.refuted.sum() == 3
-    assert not covered.refuted[0, wrong % 4]
-    assert covered.suspected.tolist() == [[n == wrong % 4 for n in range(4)]]
-    assert covered.tracking.all()
-    assert not covered.inconsistent.any()
-    assert covered.status == [SetStatus.TRACKING]
 
 
 def test_set_with_more_wrong_images_than_assumed_becomes_inconsistent() -> None:

@@ -172,7 +172,7 @@ def _parts(scenario: Scenario, compared: Sequence[Comparison]) -> Iterator[Part]
     yield from noise_notes(scenario, noises, TIES)
     yield from quantile_notes(runs, [*QUANTILES.values()])
     counts = sum(map(_set_counts, compared), SetCounts())
-    yield from set_warnings(scenario.information_set.model, counts)
+    yield from set_warnings(scenario.information_set, counts)
 
 
 def _quantile_table(compared: Sequence[Comparison]) -> Table:

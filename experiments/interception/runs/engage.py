@@ -118,6 +118,8 @@ def _summary(record: Record, elapsed_s: float) -> dict[str, object]:
             "time_s": float(record.time_s[first.step]),
             "label_m": first.label_m,
         }
+    if record.scenario.information_set.wrong_images:
+        keys["suspected_s"] = record.suspected_s
     keys["steps"] = _step_rows(record)
     return keys
 

@@ -8,12 +8,15 @@ from infoset.experiments.common.output import Output
 from infoset.experiments.common.screen import BeginProgress, Part, number, number_table
 from infoset.experiments.interception.published import printed_single_runs
 from infoset.experiments.interception.runs.shared import allowance, bound_name
-from infoset.experiments.interception.study import is_of_paper
+from infoset.experiments.interception.study import is_of_paper, some_wrong_images
 from infoset.sim import Record, Scenario
 
 FIGURES = ("figure-process", "figure-sets", "figure-approach")
 FIGURES_OF_PAPER = ("figure-2-process", "figure-3-sets", "figure-approach")
 """Names of the figures of engagements, and with their numbers in the paper."""
+
+MAX_LISTED_TIMES = 8
+"""Maximum number of times of suspected images in a line of the screen; chosen."""
 
 PRINTED_NOTE = (
     "the paper prints impulses of one run with each noise, from z = -8 km and without a range "
@@ -57,6 +60,37 @@ def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
     if printed:
         yield PRINTED_NOTE
     yield from dict.fromkeys(filter(None, (allowance(record.scenario) for record in records)))
+    for title, record in zip(titles, records, strict=True):
+        if record.scenario.information_set.wrong_images:
+            head = f"{title} noise: " if len(records) > 1 else ""
+            yield f"{head}{_wrong_image_line(record)}"
+
+
+def _wrong_image_line(record: Record) -> str:
+    """Return whether a wrong image is proved, and the images one of which is wrong."""
+    head = f"at most {some_wrong_images(record.scenario)} assumed"
+    proved = record.result.wrong_image_proved_s
+    if proved is None or not proved.count():
+        return f"{head}; none is proved"
+
+    text = f"{head}; a wrong image is proved at {proved[0]:g} s"
+    if record.inconsistency is not None:
+        time_s = float(record.time_s[record.inconsistency.step])
+        return (
+            f"{text}, and the set became empty at {time_s:g} s: more images are wrong, or another "
+            "assumption does not hold"
+        )
+
+    times = [f"{time_s:g}" for time_s in record.suspected_s]
+    if len(times) < 2:
+        return f"{text}: the image at {''.join(times)} s"
+    at = f"{', '.join(times[:-1])} and {times[-1]}"
+    if len(times) > MAX_LISTED_TIMES:
+        at = f"{', '.join(times[:MAX_LISTED_TIMES])} ... and {times[-1]}"
+    some = "one"
+    if record.scenario.information_set.wrong_images > 1:
+        some = "at least one"
+    return f"{text}: {some} of the {len(times)} images at {at} s"
 
 
 def _column(

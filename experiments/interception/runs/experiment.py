@@ -53,6 +53,7 @@ from infoset.experiments.interception.study import (
     set_counts,
     set_warnings,
     summary,
+    wrong_images_text,
 )
 from infoset.guidance import NoiseKind, Strategy
 from infoset.sim import Results, Scenario
@@ -255,7 +256,7 @@ def _parts(
 
     if started := redrawn_text(curves[0].results.redrawn_share):
         yield started
-    yield from set_warnings(scenario.information_set.model, counts)
+    yield from set_warnings(scenario.information_set, counts)
     yield from noise_notes(scenario, dict.fromkeys(curve.noise for curve in curves))
     if allowed := allowance(scenario):
         yield allowed
@@ -297,6 +298,8 @@ def _curve_lines(scenario: Scenario, curve: Curve) -> Iterator[str]:
         yield f"{title}: {outlook}"
     if causes := miss_text(results.missed, len(results), scenario):
         yield f"{title}: {causes}"
+    if proved := wrong_images_text(results, scenario):
+        yield f"{title}: {proved}"
 
 
 def _heading(scenario: Scenario) -> str:

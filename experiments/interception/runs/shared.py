@@ -22,7 +22,7 @@ from infoset.experiments.common.screen import (
 )
 from infoset.experiments.interception.scenario_file import all_warnings
 from infoset.experiments.interception.strategies import own_code_errors
-from infoset.experiments.interception.study import SetCounts
+from infoset.experiments.interception.study import SetCounts, some_wrong_images
 from infoset.guidance import Strategy
 from infoset.sim import Results, Scenario
 from infoset.sim.adversary import NothingCountsError, Objective, WorstEngagement, find_worst
@@ -144,7 +144,7 @@ def allowance(scenario: Scenario) -> str | None:
     if model.pointing_error_rad:
         line += f", error of their direction at most {model.pointing_error_rad:g} rad"
     if model.wrong_images:
-        line += f"; at most {model.wrong_images} wrong images in a flight"
+        line += f"; at most {some_wrong_images(scenario)} in a flight"
     return line
 
 

@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from infoset import InformationSetView, RateSensor, Section
+from infoset import InformationSetView, Model, RateSensor, Section
 from infoset.experiments.common.errors import InputError
 from infoset.experiments.interception import record_file
 from infoset.experiments.interception.record_file import load_record, write_record
 from infoset.experiments.interception.scenario_file import load_scenario
 from infoset.guidance import LineOfSight, NoiseKind, Situation
-from infoset.sim import Record, fly_one
+from infoset.sim import Record, Scenario, WrongImages, fly_one
 from infoset.sim.versions import versions
 from tests.long_steps import with_long_steps
 from tests.records import first_steps
@@ -129,6 +129,16 @@ def with_rates(name: str) -> Any:
     )
 
 
+def with_wrong_image(scenario: Scenario) -> Scenario:
+    """A scenario whose set allows for one wrong image, and has one."""
+    settings = dataclasses.replace(
+        scenario.information_set, model=Model.GUARANTEED, initial_set=None, wrong_images=1
+    )
+    return dataclasses.replace(
+        scenario, information_set=settings, wrong_images=WrongImages(1, size=(20.0, 20.0))
+    )
+
+
 RECORDS: dict[str, Callable[[], Record]] = {
     "plane": lambda: fly_one(with_long_steps(load_scenario("asteroid-1997")), 1, seed=2**70),
     "game": lambda: fly_one(
@@ -138,6 +148,7 @@ RECORDS: dict[str, Callable[[], Record]] = {
     "own strategy": lambda: fly_one(
         with_long_steps(load_scenario("asteroid-1997")), strategy=Idle()
     ),
+    "wrong image": lambda: fly_one(with_wrong_image(load_scenario("asteroid-1997"))),
     "contradiction": lambda: fly_one(
         dataclasses.replace(
             load_scenario("asteroid-1997-single"), rate_sensor=RateSensor(1.0, 1e-6)
@@ -159,6 +170,10 @@ def test_a_record_comes_back_bit_for_bit(name: str, tmp_path: Path) -> None:
         assert found.inconsistency is not None
         assert found.inconsistency.step == OUTLIER_AT
         assert found.noise == "Outlier"
+    if name == "wrong image":
+        assert len(found.suspected_s) == 1
+        assert found.suspected_s == flown.suspected_s
+        assert found.result.to_dict() == flown.result.to_dict()
     if name == "own strategy":
         assert found.strategy == f"{Idle.__module__}.Idle"
 

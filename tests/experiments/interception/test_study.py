@@ -22,6 +22,7 @@ from infoset.experiments.interception.study import (
     set_counts,
     set_warnings,
 )
+from infoset.model import SetSettings
 from infoset.sim import Body, Scenario, estimate_hits, simulate
 
 pytestmark = pytest.mark.usefixtures("unrendered")
@@ -120,10 +121,14 @@ def test_set_counts_add_up() -> None:
     counts = set_counts(kept, emptied)
     assert counts == SetCounts(4, 2, 2, 3)
     assert counts + SetCounts(6, 6, 0, 0) == SetCounts(10, 8, 2, 3)
-    assert set_warnings(Model.PAPER, SetCounts(5, 5, 0, 0)) == []
-    assert (
-        len(set_warnings(Model.PAPER, counts)) == len(set_warnings(Model.GUARANTEED, counts)) == 1
-    )
+    paper = SetSettings(model=Model.PAPER)
+    assert set_warnings(paper, SetCounts(5, 5, 0, 0)) == []
+    assert len(set_warnings(paper, counts)) == len(set_warnings(SetSettings(), counts)) == 1
+
+
+def test_warning_of_a_set_that_allows_for_wrong_images_says_that_more_can_be_wrong() -> None:
+    (line,) = set_warnings(SetSettings(wrong_images=2), SetCounts(5, 4, 1, 1))
+    assert "more wrong images than information_set.wrong_images, 2, or the noise exceeds" in line
 
 
 def test_percent_rounds_only_the_share_one_to_100(brief: Scenario) -> None:
