@@ -102,6 +102,13 @@ class CoveredSetView(InformationSetView):
         self._need_engagement(engagement)
         return self._suspects.steps(engagement, self._members._state)
 
+    def groups(self, engagement: int = 0) -> dict[int, tuple[int, ...]] | None:
+        """Return the steps of the images that each member leaves out that is not refuted, after a
+        split; None before, when members leave out the classes in `left_out`.
+        """
+        self._need_engagement(engagement)
+        return self._suspects.groups(engagement, self._members._state)
+
     @property
     def status(self) -> list[SetStatus]:
         """Status of each set: that of its members if they agree."""

@@ -88,6 +88,18 @@ class Suspects:
         steps = [self._steps[image] for image in sorted(images)]
         return [step for step in steps if step <= self._last_step[engagement]]
 
+    def groups(self, engagement: int, state: SetState) -> dict[int, tuple[int, ...]] | None:
+        """Return the steps of the images that each member leaves out that is not refuted; None
+        before the split.
+        """
+        if not self.is_split[engagement]:
+            return None
+        return {
+            member: tuple(self._steps[image] for image in self._groups[engagement][member])
+            for member in self._living(engagement, state)
+            if member in self._groups[engagement]
+        }
+
     def _living(self, engagement: int, state: SetState) -> list[int]:
         """Return the members that are not refuted."""
         first = engagement * len(self._left_out)

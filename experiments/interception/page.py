@@ -23,6 +23,7 @@ from infoset.experiments.interception.course import (
     record_titles,
     true_predicted_misses,
 )
+from infoset.experiments.interception.member_course import MemberCourse, member_courses
 from infoset.experiments.interception.record_file import replayed
 from infoset.experiments.interception.study import max_guarantee_m
 from infoset.guidance.thruster import modulus
@@ -77,8 +78,10 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
     """Return the data of one engagement: its facts, its steps `kept`, their sets and its axes."""
     before, misses_m = computed_again(record, kept)
     sets = _sets_of(record, kept, before)
+    courses = member_courses(record)
     axes = [
         _axis_data(record, number, kept)
+        | {"members": _member_data(courses, number, kept)}
         | {"outlines": _outline_data(record, number, kept, sets, misses_m)}
         for number in range(len(record.scenario.set_model.axes))
     ]
@@ -159,10 +162,19 @@ def _facts(record: Record, kept: Sequence[int]) -> dict[str, object]:
         "closing_speed_m_s": model.closing_speed_m_s,
         "range_error_relative": range_sensor and range_sensor.relative_error,
         "rate_error_rad_s": rate_sensor and rate_sensor.error_rad_s,
+        "wrong_image_proved_s": _proved_s(record),
         "max_impulse_m_s": scenario.thruster.max_impulse_m_s,
         "budget_m_s": scenario.thruster.budget_m_s,
         "radius_m": scenario.radius_m,
     }
+
+
+def _proved_s(record: Record) -> float | None:
+    """Return the time at which a wrong image is proved, s; None without a proof."""
+    proved = record.result.wrong_image_proved_s
+    if proved is None or not proved.count():
+        return None
+    return float(proved[0])
 
 
 def _step_data(record: Record, kept: Sequence[int]) -> dict[str, object]:
@@ -242,6 +254,30 @@ def _outline_data(
         "predicted_miss_m": _packed(intervals_m, "<f8"),
         **packed_outlines(polygons, tolerance),
     }
+
+
+def _member_data(
+    courses: Sequence[MemberCourse], axis: int, kept: Sequence[int]
+) -> list[dict[str, object]]:
+    """Return the predicted misses of the members of a set that allows for wrong images along an
+    axis, at the steps `kept`; `steps` are their indices there.
+    """
+    data: list[dict[str, object]] = []
+    for course in courses:
+        shown = [number for number, step in enumerate(kept) if step in course.steps]
+        if not shown:
+            continue
+        intervals_m = np.array(course.intervals_m)[:, axis]
+        places = [kept[number] - course.first for number in shown]
+        data.append(
+            {
+                "steps": shown,
+                "predicted_miss_m": intervals_m[places].tolist(),
+                "leaves_out_class": course.group is None,
+                "refuted": course.is_refuted,
+            }
+        )
+    return data
 
 
 def _known(values: Floats) -> list[Any]:

@@ -123,6 +123,11 @@ class Column {
       legend: [
         ["interval over the set", fill("set", 0.35)],
         ["true predicted miss", stroke("ink", { dash: [6, 3] })],
+        ...(record.members.length ? [
+          ["without a class of images", stroke("quiet", { width: 1 })],
+          ["without suspected images", stroke("extra", { width: 1.6 })],
+          ["refuted by the next image", mark("cross", "impulse")],
+        ] : []),
       ],
       draw: () => this.drawMiss(),
       tell: (x) => stepUnder(this.miss, record, x, (step) => this.missLines(step)),
@@ -244,11 +249,27 @@ class Column {
       miss.area(lower, upper, { fill: theme.colours.set, opacity });
       if (opacity > 0.2) [lower, upper].forEach((bound) => miss.curve(bound, { stroke: theme.colours.set, width: 1.3 }));
     }
+    this.drawMembers();
     miss.level(0, { stroke: theme.colours.line, width: 1 });
     miss.curve(record.places.map((place, index) => [place, record.true_predicted_miss_m[index]]).slice(0, this.step + 1),
       { stroke: theme.colours.ink, width: 1.4, dash: [6, 3] });
     markNow(miss, record.places[this.step]);
     miss.describe(this.missLines(this.step).join(", "));
+  }
+
+  /** The intervals of the members of a set that allows for wrong images, up to the present step. */
+  drawMembers() {
+    const { miss, record, step: now } = this;
+    const { quiet, extra, impulse } = theme.colours;
+    for (const { steps, predicted_miss_m: ends, leaves_out_class: ofClass, refuted } of record.members) {
+      const look = ofClass ? { stroke: quiet, width: 1 } : { stroke: extra, width: 1.6 };
+      const shownSteps = steps.filter((step) => step <= now);
+      for (const end of [0, 1]) {
+        miss.curve(shownSteps.map((step, index) => [record.places[step], ends[index][end]]), look);
+        const last = steps.length - 1;
+        if (refuted && steps[last] < now) miss.point(record.places[steps[last]], ends[last][end], "cross", impulse, 4);
+      }
+    }
   }
 
   drawImpulses() {
@@ -269,6 +290,8 @@ class Column {
     return [
       timeText(record, record.time_s[step]),
       this.missText(record.predicted_miss_m[step]),
+      ...(record.wrong_image_proved_s !== null && record.time_s[step] >= record.wrong_image_proved_s
+        ? [`a wrong image is proved at ${shown(record.wrong_image_proved_s, "s")}`] : []),
       `true predicted miss${this.along} ${shown(record.true_predicted_miss_m[step], "m")}`,
     ];
   }

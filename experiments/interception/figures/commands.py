@@ -22,6 +22,7 @@ from infoset.experiments.interception.figures.distributions import (
     draw_distributions,
     draw_samples,
 )
+from infoset.experiments.interception.figures.members import draw_members
 from infoset.experiments.interception.figures.process import draw_process
 from infoset.experiments.interception.figures.sets import draw_sets
 from infoset.experiments.interception.published import printed_single_runs
@@ -70,13 +71,16 @@ def draw_compared(scenario: Scenario, compared: Sequence[Comparison]) -> Iterato
 
 
 def draw_flights(records: Sequence[Record], times_s: Sequence[float]) -> Iterator[Figure]:
-    """Draw one or two engagements: over time, their sets at some times, their approach.
+    """Draw one or two engagements: over time, their sets at some times, their approach, and the
+    members of sets that allow for wrong images.
 
     Without times, the default times are shown.
     """
     yield draw_process(records)
     yield draw_sets(records, times_s or _default_times(records))
     yield draw_approach(records)
+    if any(record.scenario.information_set.wrong_images for record in records):
+        yield draw_members(records)
 
 
 def _default_times(records: Sequence[Record]) -> tuple[float, ...]:

@@ -14,6 +14,8 @@ from infoset.sim import Record, Scenario
 FIGURES = ("figure-process", "figure-sets", "figure-approach")
 FIGURES_OF_PAPER = ("figure-2-process", "figure-3-sets", "figure-approach")
 """Names of the figures of engagements, and with their numbers in the paper."""
+FIGURE_OF_MEMBERS = "figure-wrong-images"
+"""Name of the figure of engagements whose set allows for wrong images."""
 
 MAX_LISTED_TIMES = 8
 """Maximum number of times of suspected images in a line of the screen; chosen."""
@@ -25,11 +27,14 @@ PRINTED_NOTE = (
 )
 
 
-def engagement_figures(scenario: Scenario) -> Sequence[str]:
-    """Return the names of the figures of engagements of a scenario."""
-    if is_of_paper(scenario):
-        return FIGURES_OF_PAPER
-    return FIGURES
+def engagement_figures(*scenarios: Scenario) -> Sequence[str]:
+    """Return the names of the figures of engagements of scenarios; the first one names them."""
+    names = FIGURES
+    if is_of_paper(scenarios[0]):
+        names = FIGURES_OF_PAPER
+    if any(scenario.information_set.wrong_images for scenario in scenarios):
+        return (*names, FIGURE_OF_MEMBERS)
+    return names
 
 
 def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
@@ -148,5 +153,5 @@ def draw_engagements(
     if written.folder is not None:
         from infoset.experiments.interception.figures.commands import draw_flights
 
-        names = engagement_figures(records[0].scenario)
+        names = engagement_figures(*(record.scenario for record in records))
         written.draw(names, draw_flights(records, times_s), begin("figures"))

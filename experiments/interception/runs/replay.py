@@ -11,6 +11,7 @@ from infoset.experiments.interception.command import Replay
 from infoset.experiments.interception.page import MAX_RECORDS, interception_page
 from infoset.experiments.interception.record_file import load_record
 from infoset.experiments.interception.runs.engagement_table import (
+    FIGURE_OF_MEMBERS,
     FIGURES,
     FIGURES_OF_PAPER,
     draw_engagements,
@@ -32,7 +33,8 @@ def run(options: Replay) -> None:
 
     # The scenario, on which the names of the figures depend, is known after the records are read,
     # which can take long.
-    figures = figure_files(*dict.fromkeys([*FIGURES, *FIGURES_OF_PAPER]))
+    names = dict.fromkeys([*FIGURES, *FIGURES_OF_PAPER, FIGURE_OF_MEMBERS])
+    figures = figure_files(*names)
     with (
         output_of(options, figures, {"--gif": options.gif}) as written,
         progress_bar(options.quiet) as begin,
