@@ -39,8 +39,8 @@ engagements (measured): with 250 it is small, and some batches remain for thread
 """
 # The numbers below are chosen: they decide how fast a search finds a miss, and not whether it is
 # possible. In the tests' scenario of ten seconds, eight searches of 600 engagements find 25.1 m on
-# average, with a standard deviation of 0.5 m. From a quarter to four times of each number the average
-# changes by 0.1 m; with 0.06 or 0.9 for FIRST_SHARE it is 0.5 m smaller (measured).
+# average, with a standard deviation of 0.5 m. From a quarter to four times of each number the
+# average changes by 0.1 m; with 0.06 or 0.9 for FIRST_SHARE it is 0.5 m smaller (measured).
 GENERATION = 100
 """Engagements between two selections: a few times `ELITE`."""
 ELITE = 24

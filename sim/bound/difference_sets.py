@@ -26,7 +26,8 @@ from infoset.sim.bound.coasting import Coasting
 
 MARGIN = 1e-6
 """Reserve as a share of each limit, for rounding in flights of the two motions. Chosen: it lowers a
-bound by a millionth, and the errors in simulated pairs stay within their bounds (test_pair_flight).
+bound by less than a millionth (measured), and the errors in simulated pairs stay within their
+bounds (test_pair_flight).
 """
 POSITION, PREDICTED_MISS = 0, 1
 """Columns of the strips of a step: limits of the differences of the positions w, and of the
