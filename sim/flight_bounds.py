@@ -14,11 +14,13 @@ from infoset.sim.scenario import Sun
 
 INSTANTS = 500
 """Number of times at which a flight is bounded. Chosen: between two of them a bound is greater by
-the motion in half a step, 0.1 % of the flight.
-"""
+the motion in half a step, 0.1 % of the flight. With 125 the bounds of gravity of comet-fast and
+asteroid-1997 are 0.6 % greater, and with 2000 they are 0.2 % smaller, in four times the time
+(measured)."""
 STRETCHES = (1.001, 1.02, 1.2, 4.0)
 """Lengths of the flight that are tried, in units of the longest one without gravity: a weak
-attraction needs the first only, and a short flight has narrow bounds.
+attraction needs the first only, and a short flight has narrow bounds. With the last one alone the
+bounds of `INSTANTS` are 0.6 % greater (measured).
 """
 NEAREST_SHARE = 0.1
 """Minimum share of the nominal distance from the attracting body that the deviations must leave: at
@@ -26,10 +28,12 @@ a tenth, the gradient is a thousand times the nominal one, and a bound would be 
 """
 INFLATION = 1.001
 """Factor between a trial and the deviations that follow from the one before: a bound is greater
-than necessary by at most this.
+than necessary by at most this. Chosen: the bounds of `INSTANTS` are the same from 1.0001 to 1.1
+(measured).
 """
 TRIALS = 100
-"""Maximum number of trials. Chosen: deviations that still grow are refused, which is safe."""
+"""Maximum number of trials. Chosen: deviations that still grow are refused, which is safe. For the
+bounds of `INSTANTS` 5 are enough (measured)."""
 MODULUS = 0
 """Row of a deviation."""
 TOO_NEAR = "the motions may come too near the attracting body"
