@@ -43,7 +43,8 @@ _ABSOLUTE = 1e-12
 """Maximum gap between a small norm and its lower bound, relative to the effect of the controls; the
 thorough tests compare with forty digits at this precision."""
 _ROUNDINGS = 8.0
-"""Roundings of the sum of absolute terms that the error of a lower bound may have."""
+"""Roundings of the sum of absolute terms that the error of a lower bound may have. Chosen: controls
+of published problems are the same from 2 to 32 (measured)."""
 _ULP = float(np.finfo(float).eps)
 """Relative rounding of a double."""
 _RANK = 1e-13
