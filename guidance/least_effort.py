@@ -20,7 +20,7 @@ times the time (measured).
 """
 MIN_AUTHORITY_M = 1e-9
 """Minimum divisor of an effort: after the last impulse the authority is zero. Chosen: far below all
-misses, so that the effort is then far above 1.
+misses, so that the effort is then far above 1. Misses are the same from 1e-12 to 1e-3 (measured).
 """
 NO_DEMAND_M = 1e200
 """An excluded label has the interval from this to minus this: it never decides. Its product with a
@@ -29,7 +29,8 @@ share, at most 1e9, is finite.
 TRIALS = 60
 """Maximum number of trials of an impulse. Bisections alone need 43 for `IMPULSE_TOLERANCE`."""
 IMPULSE_TOLERANCE = 1e-13
-"""Change of a trial, in units of the maximum impulse, at which the search ends: some roundings."""
+"""Change of a trial, in units of the maximum impulse, at which the search ends: some roundings.
+The miss of a flight of ten seconds is the same to 1e-8 from 1e-15 to 1e-8 (measured)."""
 
 
 class LeastEffort:

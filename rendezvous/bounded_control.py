@@ -62,8 +62,8 @@ decreases, and with so small a reserve no digit of the control is exact."""
 _ROUNDED = 1e-11
 """Decrease of the value by a Newton step, relative, below which values are no longer compared."""
 _ARMIJO = 0.1
-"""Part of the decrease of the linear model that a Newton step must attain (Armijo's rule). Chosen: 12
-random arcs have the same energy from 1e-4 to 0.4 (measured)."""
+"""Part of the decrease of the linear model that a Newton step must attain (Armijo's rule). Chosen:
+12 random arcs have the same energy from 1e-4 to 0.4 (measured)."""
 _DAMPING = 1e-13
 """Added to the curvature, relative: the curvature is singular if all of a control is at the bound
 and keeps its direction."""

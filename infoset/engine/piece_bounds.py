@@ -56,8 +56,8 @@ PIECES = LABELS + 1
 """Maximum number of pieces into which a piece is divided."""
 NEAREST_OUTSIDE = 0.005
 """Minimum distance of a label below the others, in their spacing: a nearer one amplifies the
-rounding errors of supports 200 times. Chosen.
-"""
+rounding errors of supports 200 times. Chosen: Phi of flights of ten seconds is the same from
+0.00125 to 0.08 (measured)."""
 SLACK = 1e-9
 """Relative enlargement of a bound; the rounding errors of supports and lines are far smaller."""
 PIECE = np.dtype(

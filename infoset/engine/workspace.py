@@ -15,8 +15,8 @@ from infoset.engine.section_law import Laws
 
 MAX_HALVED_WINDOWS = 1000
 """Maximum number of windows of labels that a search halves. If more are needed, the set counts as
-empty. Chosen as a limit of time; Phi does not depend on this search (docs/guarantee-miss.md).
-"""
+empty. Chosen as a limit of time; Phi does not depend on this search (docs/guarantee-miss.md), and
+the misses and sets of flights of ten seconds are the same from 4 to 4000 (measured)."""
 
 LAST_REPLAY, LOWER, UPPER = constants(3)
 """Rows of the workspace: the section of the last replay, and the sections at the lower and at the

@@ -30,8 +30,8 @@ _MIN_DECREMENT = 1e-22
 """Square of the Newton decrement at which a point is the analytic centre: its distance from it, in
 the norm of the Hessian, is 1e-11."""
 _ARMIJO = 1e-4
-"""Part of the decrease of the linear model that a step must attain (Armijo's rule). Chosen: analytic
-centres of published problems are the same from 2.5e-5 to 0.1 (measured)."""
+"""Part of the decrease of the linear model that a step must attain (Armijo's rule). Chosen:
+analytic centres of published problems are the same from 2.5e-5 to 0.1 (measured)."""
 _ROUNDED_DECREASE = 1e-15
 """Decrease of the barrier, relative to its value, below which it is rounding. Analytic centres of
 published problems are the same from 1e-16 to 1e-11 (measured)."""
