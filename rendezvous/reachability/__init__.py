@@ -4,15 +4,33 @@ A problem is built from a motion. Its solution contains the sets of states and t
 controls. Controls are selected from this set and simulated.
 """
 
+from infoset.rendezvous.reachability.answer import (
+    AnsweredPlan,
+    MirrorBound,
+    Multipliers,
+    answered_plan,
+    information_radius,
+    lower_bound,
+    multipliers,
+)
 from infoset.rendezvous.reachability.closed_loop import ClosedLoopFlight, replan
+from infoset.rendezvous.reachability.guaranteed import affine_plan
 from infoset.rendezvous.reachability.motion import (
     MotionModel,
     NonlinearMotion,
     between_periods,
     discretised,
     motion_of,
+    with_impulses,
 )
 from infoset.rendezvous.reachability.optimum import EmptyTubeError
+from infoset.rendezvous.reachability.outputs import (
+    AffinePlan,
+    ErrorSet,
+    OutputProblem,
+    PathRows,
+    Ranges,
+)
 from infoset.rendezvous.reachability.problem import (
     MAX_PERIODS,
     InadmissibleStartError,
@@ -56,15 +74,23 @@ from infoset.rendezvous.reachability.solve import (
 
 __all__ = [
     "MAX_PERIODS",
+    "AffinePlan",
+    "AnsweredPlan",
     "ClosedLoopFlight",
     "ControlEffort",
     "EmptyTubeError",
+    "ErrorSet",
     "FeedbackPlan",
     "InadmissibleStartError",
+    "MirrorBound",
     "MotionModel",
+    "Multipliers",
     "NoRobustPlanError",
     "NonlinearMotion",
     "OptimalControls",
+    "OutputProblem",
+    "PathRows",
+    "Ranges",
     "ReachabilityProblem",
     "ReachableSets",
     "Route",
@@ -74,18 +100,23 @@ __all__ = [
     "ThrustShape",
     "TooManyVerticesError",
     "VertexCounts",
+    "affine_plan",
     "analytic_centre",
+    "answered_plan",
     "between_periods",
     "chebyshev_centre",
     "discretised",
     "effort",
     "feedback_plan",
+    "information_radius",
+    "lower_bound",
     "min_periods",
     "minimum_energy",
     "minimum_l1",
     "minimum_norms",
     "minimum_peak",
     "motion_of",
+    "multipliers",
     "nearest",
     "optimal_controls",
     "replan",
@@ -93,4 +124,5 @@ __all__ = [
     "solve",
     "tightened",
     "vertices",
+    "with_impulses",
 ]

@@ -92,12 +92,12 @@ class ConeProgram:
         self._whole: tuple[Floats, Floats] | None = None
 
     def keep(self, rows: Floats, limits: Floats) -> ConeProgram:
-        """Add rows v <= limits; rows may be a sparse array if the program is only checked."""
+        """Add rows v <= limits; rows may be a sparse array, with all columns."""
         return self._add("rows", rows, limits, clarabel.NonnegativeConeT(len(limits)))
 
     def meet(self, rows: Floats, levels: Floats) -> ConeProgram:
-        """Add rows v = levels."""
-        return self._add("equations", rows, levels, clarabel.ZeroConeT(len(rows)))
+        """Add rows v = levels; rows may be a sparse array, with all columns."""
+        return self._add("equations", rows, levels, clarabel.ZeroConeT(len(levels)))
 
     def bound(
         self, response: Floats, free: Floats, top: Floats, height: float = 0.0

@@ -13,6 +13,7 @@ from infoset.rendezvous._arrays import Floats
 from infoset.rendezvous.relative_motion import (
     EllipticOrbit,
     HeldMotion,
+    LinearMotion,
     TimeVaryingMotion,
     TschaunerHempel,
 )
@@ -56,6 +57,17 @@ def discretised(
     starts = period_s * np.arange(periods)
     segment = motion.segment(starts, starts + period_s)
     return segment.transition, acceleration_m_s2 * segment.held
+
+
+def with_impulses(motion: LinearMotion, periods: int, period_s: float) -> tuple[Floats, Floats]:
+    """Return A(t) and B(t) of x(t + 1) = A(t) x(t) + B(t) u(t) with impulses.
+
+    The impulse u(t), in m/s, acts at the start of the period t. States are in m and m/s; A(t) has
+    the shape (periods, 6, 6), and B(t), the last columns of A(t), (periods, 6, 3).
+    """
+    starts = period_s * np.arange(periods)
+    transition = motion.transition(starts, starts + period_s)
+    return transition, transition[:, :, 3:]
 
 
 def between_periods(
