@@ -6,7 +6,6 @@ outputs, and a lower bound of the guarantee of every strategy.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -112,10 +111,14 @@ def _basic_solutions(columns: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class _Vertex:
-    """A vertex of M: a_i of its positive multipliers times them, shape (r, n), and its cost."""
+    """A vertex of M: a_i of its positive multipliers times them, shape (r, n), and its cost.
+
+    `weights`, shape (k,), are the sums of the multipliers of a row of the goal and its opposite.
+    """
 
     normals: Floats
     cost: float
+    weights: Floats
 
     @property
     def direction(self) -> Floats:
@@ -137,7 +140,8 @@ def _vertices(problem: OutputProblem, *, one_of_two: bool) -> list[_Vertex]:
             continue
         kept = np.vstack([kept, weights])
         positive = np.flatnonzero(weights)
-        vertices.append(_Vertex(weights[positive, None] * rows[positive], float(cost)))
+        normals = weights[positive, None] * rows[positive]
+        vertices.append(_Vertex(normals, float(cost), weights[:half] + weights[half:]))
     return vertices
 
 
@@ -287,20 +291,32 @@ def information_radius(problem: OutputProblem) -> MirrorBound:
     `lower_bound`.
     """
     certain = _certain(problem)
-    vertices = (_Vertex(row[None, :], 0.0) for row in problem.goal)
-    return _best_bound(certain, vertices, problem.periods - 1)
+    bounds = _bounds_of_rows(certain, problem.periods - 1)
+    return max(bounds, key=lambda bound: bound.value)
 
 
 def lower_bound(problem: OutputProblem) -> MirrorBound:
     """Return the best bound (3) for k = T - 2: the last control sees one more output.
 
-    One linear program for each vertex of M (a few dozen). Errors proportional to the controls are
-    left out, because a strategy may avoid them. For a start that is a polytope, the bound is for
-    its part that is symmetric about the centre.
+    At most one linear program for each vertex of M (a few dozen). Errors proportional to the
+    controls are left out, because a strategy may avoid them. For a start that is a polytope, the
+    bound is for its part that is symmetric about the centre.
     """
     certain = _certain(problem)
+    last = problem.periods - 2
+    # Without the equations after `last` each normal has errors of its own: an upper bound.
+    tops = np.array([bound.value for bound in _bounds_of_rows(certain, last)])
     vertices = _vertices(certain, one_of_two=True)
-    return _best_bound(certain, iter(vertices), problem.periods - 2)
+    uppers = np.array([vertex.weights @ tops - vertex.cost for vertex in vertices])
+
+    best = MirrorBound(0.0, np.zeros((0, problem.errors.size)), np.zeros((0, problem.states)), last)
+    for number in np.argsort(-uppers):
+        if uppers[number] <= best.value:
+            break
+        bound = _bound_of_vertex(certain, vertices[number], last)
+        if bound.value > best.value:
+            best = bound
+    return best
 
 
 def _certain(problem: OutputProblem) -> OutputProblem:
@@ -308,15 +324,18 @@ def _certain(problem: OutputProblem) -> OutputProblem:
     return replace(problem, caps=None)
 
 
-def _best_bound(problem: OutputProblem, vertices: Iterator[_Vertex], last: int) -> MirrorBound:
-    best = MirrorBound(0.0, np.zeros((0, problem.errors.size)), np.zeros((0, problem.states)), last)
-    for vertex in vertices:
-        points = _certified(problem, vertex, _hidden_errors(problem, vertex, last), last)
-        along = np.einsum("in,nz,iz->", vertex.normals, problem.free_states[-1], points)
-        value = float(along) - vertex.cost
-        if value > best.value:
-            best = MirrorBound(value, points, vertex.normals, last)
-    return best
+def _bounds_of_rows(problem: OutputProblem, last: int) -> list[MirrorBound]:
+    """Return the bounds of single rows of the goal, without later controls."""
+    bounds = []
+    for row, weights in zip(problem.goal, np.eye(len(problem.goal)), strict=True):
+        bounds.append(_bound_of_vertex(problem, _Vertex(row[None, :], 0.0, weights), last))
+    return bounds
+
+
+def _bound_of_vertex(problem: OutputProblem, vertex: _Vertex, last: int) -> MirrorBound:
+    points = _certified(problem, vertex, _hidden_errors(problem, vertex, last), last)
+    along = np.einsum("in,nz,iz->", vertex.normals, problem.free_states[-1], points)
+    return MirrorBound(float(along) - vertex.cost, points, vertex.normals, last)
 
 
 def _hidden_errors(problem: OutputProblem, vertex: _Vertex, last: int) -> Floats:

@@ -24,7 +24,9 @@ from infoset.rendezvous.reachability import (
     information_radius,
     lower_bound,
     multipliers,
+    with_impulses,
 )
+from infoset.rendezvous.relative_motion import EllipticOrbit, TschaunerHempel
 from tests.rendezvous.reachability.arch_rendezvous import (
     START,
     START_ERROR,
@@ -202,6 +204,33 @@ def test_noise_changes_the_guarantee_as_known(noise_m: float, affine: float, val
     assert limited.guarantee == pytest.approx(affine, abs=digits)
     assert bound == pytest.approx(value, abs=PRINTED)
     assert bound <= answered_plan(free, 4).guarantee <= bound + 2.0 * PRINTED
+
+
+@pytest.mark.parametrize("eccentricity", [0.0, 0.5])
+def test_bound_is_attained_in_low_orbit_and_on_an_elliptic_orbit(eccentricity: float) -> None:
+    # n = 6 = 2 m, position known to 1 m, impulses of 1 mm/s error, a start known to 20 m, 5 cm/s.
+    orbit = EllipticOrbit.of_size(6778137.0, eccentricity, 3.986004418e14)
+    transition, control = with_impulses(TschaunerHempel(orbit), 6, 60.0)
+    start = np.array([0.0, -1000.0, 0.0, 0.0, 0.0, 0.0])
+    error = np.repeat([20.0, 0.05], 3)
+    problem = OutputProblem(
+        transition,
+        control,
+        np.repeat(np.eye(3, 6)[None], 6, axis=0),
+        np.repeat(np.eye(3)[None], 6, axis=0),
+        Zonotope.box(start - error, start + error),
+        np.diag(np.repeat([1.0, 50.0], 3)),
+        execution_error=np.full(3, 1e-3),
+        control_limits=np.full((6, 3), 10.0),
+    )
+
+    bound = lower_bound(problem).value
+    answered = answered_plan(problem, 3)
+
+    assert information_radius(problem).value <= bound * (1.0 + SOLVED)
+    assert bound <= answered.guarantee <= bound * (1.0 + SOLVED)
+    assert answered.plan.excess <= 0.0
+    assert answered.guarantee <= affine_plan(problem, 3).guarantee * (1.0 + SOLVED)
 
 
 def test_multipliers_with_limits_have_44_vertices() -> None:
