@@ -281,7 +281,7 @@ def test_the_corridor_of_one_run_has_its_impulses() -> None:
 
     (impulses,) = below.collections
     assert impulses.get_label() == "impulses of the run"
-    tops = sorted(float(path.vertices[:, 1].max()) for path in impulses.get_paths())
+    tops = sorted(float(np.asarray(path.vertices)[:, 1].max()) for path in impulses.get_paths())
     assert tops == sorted(courses.impulse_m_s[courses.impulse_m_s > 0.0].tolist())
 
 
