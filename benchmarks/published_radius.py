@@ -43,7 +43,7 @@ def main() -> None:
 
     def residuals(curvature_1_mm: Floats) -> Floats:
         motion = published_motion(rendezvous.truth.orbit, 1e6 / float(curvature_1_mm[0]))
-        pushes = rendezvous.acceleration_m_s2 * controls
+        pushes = rendezvous.unit_m_s2 * controls
         nonlinear = to_paper(motion.fly(problem.initial, pushes, rendezvous.period_s))[:, 1:]
         return np.asarray((nonlinear - linear - printed) / ROUNDING).ravel()
 

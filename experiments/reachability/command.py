@@ -27,16 +27,18 @@ class Reach(FileOptions):
     problem: ProblemName = "rendezvous-2021"
     settings: Settings = None
     select: Annotated[
-        str,
+        str | None,
         typer.Option(
             metavar="A,B,C",
             help=(
                 "Optimal controls to simulate: energy, l1, norms (minimum sum of squares, of "
-                "absolute values, of Euclidean norms), peak (minimum peak), chebyshev, analytic "
-                "(centres of the set), vertices, samples:N (N random ones)."
+                "absolute values, of Euclidean norms), delta-v (minimum Delta-v), peak (minimum "
+                "peak), chebyshev, analytic (centres of the set), vertices, samples:N (N random "
+                "ones). Default: energy,l1,norms,peak,chebyshev,analytic; with impulses "
+                "delta-v,energy,peak,chebyshev,analytic."
             ),
         ),
-    ] = "energy,l1,norms,peak,chebyshev,analytic"
+    ] = None
     replan: Annotated[
         bool,
         typer.Option(

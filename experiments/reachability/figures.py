@@ -48,6 +48,7 @@ _NAMES = {
     "energy": "minimum energy",
     "l1": "minimum L1",
     "norms": "minimum norms",
+    "delta-v": "minimum Delta-v",
     "peak": "minimum peak",
     "chebyshev": "Chebyshev centre",
     "analytic": "analytic centre",
@@ -59,6 +60,9 @@ _START: dict[str, Any] = {
     "label": "start",
 }
 _END: dict[str, Any] = {"marker": "*", "markersize": 9.0, "label": "terminal state of minimum norm"}
+_STEM_STEP = 0.08
+"""Distance between the stems of two controls, periods: equal impulses do not cover each other."""
+_STEM_END: dict[str, Any] = {"marker": "o", "markersize": 2.5}
 _AXES = (*AXIS_TITLES, *component_titles("v"))
 _PLANES = ((1, 0), (1, 2), (4, 3), (4, 5))
 
@@ -167,7 +171,7 @@ def _draw_set(axes: Any, points: Floats, colour: Any, label: str) -> None:
     A hull without area or volume is drawn as its points on a line.
     """
     try:
-        hull = ConvexHull(points / np.ptp(points, axis=0).max())
+        hull = ConvexHull(points / (np.ptp(points, axis=0).max() or 1.0))
     except QhullError:
         axes.plot(*points.T, color=colour, label=label)
         return
@@ -194,32 +198,43 @@ def _draw_set(axes: Any, points: Floats, colour: Any, label: str) -> None:
 
 @style()
 def draw_controls(report: ReachabilityReport) -> Figure:
-    """Draw the components of the controls, and the ranges of all optimal controls."""
+    """Draw the components of the controls, and the ranges of all optimal controls.
+
+    Thrust is drawn as steps, impulses as stems at the starts of the periods.
+    """
     figure, (row,) = subplots(78.0, 1, 3)
+    rendezvous = report.rendezvous
     periods = report.solution.problem.periods
     bounds = report.solution.problem.control_bounds
+    unit = ", m/s"
+    first = -0.5
+    if not rendezvous.has_impulses:
+        unit = f" / ({rendezvous.unit_m_s2:g} m/s²)"
+        first = 0.0
     for j, axes in enumerate(row):
         low, high = report.ranges[:, j].T
         bars = {**SET, "width": 1.0, "label": "all optimal controls"}
-        axes.bar(np.arange(periods) + 0.5, high - low, bottom=low, **bars)
-        for look, member, _ in _shown(report):
+        axes.bar(first + np.arange(periods) + 0.5, high - low, bottom=low, **bars)
+        for place, (look, member, _) in enumerate(_shown(report)):
             line: dict[str, Any] = {
                 "color": look["color"],
                 "linestyle": look["linestyle"],
                 "linewidth": 1.3,
             }
             name = _NAMES.get(member.name, member.name)
-            axes.stairs(
-                member.controls[:, j], np.arange(periods + 1), baseline=None, label=name, **line
-            )
+            values = member.controls[:, j]
+            if rendezvous.has_impulses:
+                times = np.arange(periods) + _STEM_STEP * place
+                axes.vlines(times, 0.0, values, label=name, **line)
+                axes.plot(times, values, linestyle="none", **_STEM_END, color=look["color"])
+            else:
+                axes.stairs(values, np.arange(periods + 1), baseline=None, label=name, **line)
         if max(float(np.abs(report.ranges[:, j]).max()), 1e-9) > 0.7 * bounds[j]:
             for sign in (-1.0, 1.0):
                 axes.axhline(sign * bounds[j], label="bound", **BOUND)
-        axes.set_xlabel(f"time, periods of {report.rendezvous.period_s:g} s")
-        axes.set_ylabel(
-            f"{component_titles('u')[j]} / ({report.rendezvous.acceleration_m_s2:g} m/s²)"
-        )
-        axes.set_xlim(0, periods)
+        axes.set_xlabel(f"time, periods of {rendezvous.period_s:g} s")
+        axes.set_ylabel(f"{component_titles('u')[j]}{unit}")
+        axes.set_xlim(first, periods + first)
         axes.use_sticky_edges = False
         axes.margins(y=0.08)
         axes.xaxis.set_major_locator(MaxNLocator(8, integer=True))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from enum import Enum
 from functools import cached_property
 from typing import Annotated, Any, ClassVar
 
@@ -14,13 +15,16 @@ from infoset.arrays import Floats
 from infoset.experiments.common.orbit_checks import check_angle, check_orbit
 from infoset.limits import POSITIVE, Description, Limits, Name, Part, Positive
 from infoset.rendezvous.reachability import (
+    IMPULSE,
     MAX_PERIODS,
     MotionModel,
     NonlinearMotion,
     ReachabilityProblem,
     ThrustShape,
+    between_impulses,
     between_periods,
     discretised,
+    impulsive,
     motion_of,
 )
 from infoset.rendezvous.relative_motion import EllipticOrbit, HeldMotion
@@ -28,13 +32,20 @@ from infoset.rendezvous.two_body import OrbitalElements
 
 STATE_NAMES = ("x", "y", "z", "vx", "vy", "vz")
 _MAX_REACH = 1e4
-"""Largest change of a state by full thrust over a period, as a multiple of its bound."""
+"""Largest change of a state by full control over a period, as a multiple of its bound."""
 _INSTANTS = 12
 """Instants within a period at which selected controls are checked."""
 
 
 def _for_each_axis(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else (value,) * 3
+
+
+class Engine(Enum):
+    """Shape of the control: thrust held over each period, or an impulse at its start."""
+
+    HELD = "held"
+    IMPULSES = "impulses"
 
 
 Vector = tuple[float, float, float]
@@ -71,22 +82,27 @@ class Start:
 
 @dataclass(frozen=True, kw_only=True)
 class Bounds:
-    """Bounds of position and velocity at t = 0..T, and of the control.
+    """Bounds of position and velocity at t = 0..T, and of held thrust.
 
-    The unit of the control is `acceleration_m_s2`.
+    The unit of the thrust, `control`, is `acceleration_m_s2`; its default is 1.
     """
 
     position_m: Bound
     velocity_m_s: Bound
-    control: Bound
+    control: Bound | None = None
+
+
+def _check_times(first: int, last: int) -> None:
+    if first > last:
+        raise ValueError(f"until_period: must be at least from_period, {first}")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Cone:
     """An approach cone, replaced by a pyramid inside it.
 
-    It holds from the period `from_period` on. The axis may have any length; the half-angle is that
-    between axis and cone.
+    It holds from t = `from_period` to t = `until_period`. The axis may have any length; the
+    half-angle is that between axis and cone.
     """
 
     apex_m: Vector
@@ -94,14 +110,16 @@ class Cone:
     half_angle_rad: Annotated[float, Limits(above=0.0, below=0.5 * math.pi)]
     faces: Annotated[int, Limits(minimum=3, maximum=24, whole=True)] = 8
     from_period: Period = 0
+    until_period: Period = MAX_PERIODS
 
     def __post_init__(self) -> None:
+        _check_times(self.from_period, self.until_period)
         if not any(self.axis):
             raise ValueError("axis: must have a direction, not only zeros")
 
     @property
     def half_spaces(self) -> tuple[Floats, Floats]:
-        """Outward unit normals and offsets of the pyramid, whose edges lie on the cone."""
+        """Outward normals, (faces, 6), and offsets of the pyramid, whose edges lie on the cone."""
         along = np.array(self.axis) / np.linalg.norm(self.axis)
         across = np.linalg.svd(along[None, :])[2][1:]
         turns = 2.0 * np.pi * np.arange(self.faces) / self.faces
@@ -110,33 +128,68 @@ class Cone:
             np.outer(np.cos(turns), across[0]) + np.outer(np.sin(turns), across[1]) - slope * along
         )
         normals = rows / np.linalg.norm(rows, axis=1)[:, None]
-        return normals, normals @ np.array(self.apex_m)
+        return np.pad(normals, ((0, 0), (0, 3))), normals @ np.array(self.apex_m)
 
 
 @dataclass(frozen=True, kw_only=True)
 class KeepIn:
-    """Half-spaces for the position, normals . position <= offsets.
+    """Half-spaces for states, normals . position + velocity_normals_s . velocity <= offsets_m.
 
-    They hold from the period `from_period` on.
+    They hold from t = `from_period` to t = `until_period`.
     """
 
     normals: Annotated[tuple[Vector, ...], Field(min_length=1, max_length=50)]
+    velocity_normals_s: tuple[Vector, ...] = ()
     offsets_m: tuple[float, ...]
     from_period: Period = 0
+    until_period: Period = MAX_PERIODS
 
     def __post_init__(self) -> None:
+        _check_times(self.from_period, self.until_period)
         if len(self.offsets_m) != len(self.normals):
             raise ValueError(
                 f"offsets_m: must have {len(self.normals)} numbers, one for each normal"
             )
-        if not all(map(any, self.normals)):
+        if len(self.velocity_normals_s) not in (0, len(self.normals)):
+            raise ValueError(
+                f"velocity_normals_s: must have {len(self.normals)} rows, one for each normal"
+            )
+        if not self._rows.any(axis=1).all():
             raise ValueError("normals: must have no row of zeros")
 
     @property
+    def _rows(self) -> Floats:
+        """Normals of states, shape (k, 6)."""
+        velocity = self.velocity_normals_s or np.zeros((len(self.normals), 3))
+        return np.hstack([self.normals, velocity])
+
+    @property
     def half_spaces(self) -> tuple[Floats, Floats]:
-        """Unit normals and offsets."""
-        lengths = np.linalg.norm(self.normals, axis=1)
-        return np.array(self.normals) / lengths[:, None], np.array(self.offsets_m) / lengths
+        """Normals, shape (k, 6), and offsets; the part for the position has length one."""
+        rows = self._rows
+        lengths = np.linalg.norm(rows[:, :3], axis=1)
+        lengths = np.where(lengths > 0.0, lengths, np.linalg.norm(rows[:, 3:], axis=1))
+        return rows / lengths[:, None], np.array(self.offsets_m) / lengths
+
+
+@dataclass(frozen=True, kw_only=True)
+class ControlLimits:
+    """Half-spaces for the controls, normals . u <= offsets, in the units of the controls.
+
+    They hold from t = `from_period` to t = `until_period`.
+    """
+
+    normals: Annotated[tuple[Vector, ...], Field(min_length=1, max_length=50)]
+    offsets: tuple[float, ...]
+    from_period: Period = 0
+    until_period: Period = MAX_PERIODS
+
+    def __post_init__(self) -> None:
+        _check_times(self.from_period, self.until_period)
+        if len(self.offsets) != len(self.normals):
+            raise ValueError(f"offsets: must have {len(self.normals)} numbers, one for each normal")
+        if not all(map(any, self.normals)):
+            raise ValueError("normals: must have no row of zeros")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -156,9 +209,12 @@ class Navigation:
 
 @dataclass(frozen=True, kw_only=True)
 class Rendezvous:
-    """A rendezvous in T `periods`; `acceleration_m_s2` is that of a unit control.
+    """A rendezvous in T `periods`.
 
-    The constraints hold at t = 0..T, and at `checks_between_periods` instants within each period.
+    With ``engine = "held"`` the thrust is constant over a period, and `acceleration_m_s2` is that
+    of a unit control. With ``engine = "impulses"`` a period begins with an impulse of at most
+    `max_impulse_m_s` along each axis, or in norm for thrust in a ball. The constraints hold at t =
+    0..T, before and after an impulse, and at `checks_between_periods` instants within each period.
     """
 
     kind: ClassVar[str] = "reachable-rendezvous"
@@ -167,7 +223,9 @@ class Rendezvous:
     description: Description = ""
     periods: Annotated[int, Limits(minimum=1, maximum=MAX_PERIODS, whole=True)]
     period_s: Positive
-    acceleration_m_s2: Positive
+    engine: Engine = Engine.HELD
+    acceleration_m_s2: Positive | None = None
+    max_impulse_m_s: Bound | None = None
     model: MotionModel = MotionModel.FROZEN
     thrust: ThrustShape = ThrustShape.BOX
     checks_between_periods: Annotated[int, Limits(minimum=0, maximum=10, whole=True)] = 0
@@ -176,10 +234,12 @@ class Rendezvous:
     bounds: Bounds
     cone: Cone | None = None
     keep_in: Annotated[tuple[KeepIn, ...], Field(max_length=20)] = ()
+    control_limits: Annotated[tuple[ControlLimits, ...], Field(max_length=20)] = ()
     disturbance: Disturbance | None = None
     navigation: Navigation | None = None
 
     def __post_init__(self) -> None:
+        self._check_engine()
         check_angle(
             "period_s, in all periods,",
             self.periods * self.period_s,
@@ -187,17 +247,56 @@ class Rendezvous:
         )
         if self.disturbance is not None and self.checks_between_periods:
             raise ValueError("checks_between_periods: must be 0 with a disturbance")
-        change_m_s = max(self.bounds.control) * self.acceleration_m_s2 * self.period_s
+        change_m_s = float(self.control_bounds.max()) * self.delta_v_m_s
         reach = max(
             change_m_s / min(self.bounds.velocity_m_s),
             change_m_s * self.period_s / min(self.bounds.position_m),
         )
         if reach > _MAX_REACH:
+            key = "max_impulse_m_s" if self.has_impulses else "acceleration_m_s2"
             raise ValueError(
-                f"acceleration_m_s2: full thrust over a period changes a state by {reach:.3g} "
-                f"times its bound; rounding decides the result beyond {_MAX_REACH:g}"
+                f"{key}: full control over a period changes a state by {reach:.3g} times its "
+                f"bound; rounding decides the result beyond {_MAX_REACH:g}"
             )
         _ = self.problem  # raises ValueError if the values define no problem
+
+    def _check_engine(self) -> None:
+        if self.has_impulses:
+            if self.max_impulse_m_s is None:
+                raise ValueError("max_impulse_m_s: is missing; impulses need it")
+            if self.acceleration_m_s2 is not None or self.bounds.control is not None:
+                raise ValueError(
+                    "engine: impulses are limited by max_impulse_m_s; omit acceleration_m_s2 and "
+                    "bounds.control"
+                )
+            return
+        if self.acceleration_m_s2 is None:
+            raise ValueError("acceleration_m_s2: is missing; held thrust needs it")
+        if self.max_impulse_m_s is not None:
+            raise ValueError('max_impulse_m_s: needs engine = "impulses"')
+
+    @property
+    def has_impulses(self) -> bool:
+        """Whether a control is an impulse, in m/s; otherwise it is thrust."""
+        return self.engine is Engine.IMPULSES
+
+    @property
+    def control_bounds(self) -> Floats:
+        """Bounds of the controls, shape (3,): in m/s, or as parts of `acceleration_m_s2`."""
+        if self.has_impulses:
+            return np.array(self.max_impulse_m_s)
+        return np.array(self.bounds.control or (1.0, 1.0, 1.0))
+
+    @property
+    def unit_m_s2(self) -> float:
+        """Acceleration of a unit of held thrust."""
+        assert self.acceleration_m_s2 is not None
+        return self.acceleration_m_s2
+
+    @property
+    def delta_v_m_s(self) -> float:
+        """Delta-v of a unit control over a period."""
+        return 1.0 if self.has_impulses else self.unit_m_s2 * self.period_s
 
     @cached_property
     def ellipse(self) -> EllipticOrbit:
@@ -240,9 +339,8 @@ class Rendezvous:
         """Effect of unit components of the unknown acceleration on the state, shape (T, 6, 3)."""
         if self.disturbance is None:
             return None
-        return np.asarray(
-            self.problem.control / self.acceleration_m_s2 * self.disturbance.acceleration_m_s2
-        )
+        _, held = discretised(self.motion, self.periods, self.period_s, 1.0)
+        return np.asarray(held * self.disturbance.acceleration_m_s2)
 
     @property
     def navigation_error(self) -> Floats | None:
@@ -256,26 +354,42 @@ class Rendezvous:
         if self.checks_between_periods:
             between = self._between(periods, self.checks_between_periods)
         with np.errstate(over="ignore", invalid="ignore"):
-            transition, control = discretised(
-                self.motion, periods, self.period_s, self.acceleration_m_s2
-            )
+            if self.has_impulses:
+                transition, control = impulsive(self.motion, periods, self.period_s)
+            else:
+                transition, control = discretised(
+                    self.motion, periods, self.period_s, self.unit_m_s2
+                )
         return ReachabilityProblem(
             transition,
             control,
             np.array(self.initial.position_m + self.initial.velocity_m_s),
             np.array(self.bounds.position_m + self.bounds.velocity_m_s),
-            np.array(self.bounds.control),
+            self.control_bounds,
             self.thrust,
             *self._half_spaces(periods),
             between,
             STATE_NAMES,
+            IMPULSE if self.has_impulses else None,
+            *self._limits(periods),
         )
 
     def _between(self, periods: int, instants: int) -> Floats:
         with np.errstate(over="ignore", invalid="ignore"):
-            return between_periods(
-                self.motion, periods, self.period_s, self.acceleration_m_s2, instants
-            )
+            if self.has_impulses:
+                return between_impulses(self.motion, periods, self.period_s, instants)
+            return between_periods(self.motion, periods, self.period_s, self.unit_m_s2, instants)
+
+    def _limits(self, periods: int) -> tuple[Floats, Floats]:
+        """Return the limits on the controls as constraints: normals and offsets."""
+        normals = np.zeros((0, 3))
+        offsets = np.zeros((periods, 0))
+        times = np.arange(periods)[:, None]
+        for each in self.control_limits:
+            normals = np.vstack([normals, each.normals])
+            holds = (times >= each.from_period) & (times <= each.until_period)
+            offsets = np.hstack([offsets, np.where(holds, each.offsets, np.inf)])
+        return normals, offsets
 
     def _half_spaces(self, periods: int) -> tuple[Floats, Floats, tuple[str, ...]]:
         """Return cone and half-spaces as constraints on states: normals, offsets and names."""
@@ -291,7 +405,8 @@ class Rendezvous:
         times = np.arange(periods + 1)[:, None]
         for name, region in regions:
             rows, offsets_m = region.half_spaces
-            normals = np.vstack([normals, np.pad(rows, ((0, 0), (0, 3)))])
-            offsets = np.hstack([offsets, np.where(times >= region.from_period, offsets_m, np.inf)])
+            normals = np.vstack([normals, rows])
+            holds = (times >= region.from_period) & (times <= region.until_period)
+            offsets = np.hstack([offsets, np.where(holds, offsets_m, np.inf)])
             names += [name.format(row) for row in range(1, len(rows) + 1)]
         return normals, offsets, tuple(names)

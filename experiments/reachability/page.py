@@ -16,7 +16,8 @@ from infoset.experiments.common.page_motion import (
     faces_of,
     motion_page,
 )
-from infoset.experiments.reachability.report import POINTS, ReachabilityReport
+from infoset.experiments.common.units import Unit
+from infoset.experiments.reachability.report import ReachabilityReport
 from infoset.rendezvous.reachability import SetKind
 
 _PROJECTION_TOLERANCE = 1e-2
@@ -46,8 +47,7 @@ def reachability_page(report: ReachabilityReport) -> str:
     rendezvous = report.rendezvous
     periods = rendezvous.problem.periods
     period_s = rendezvous.period_s
-    instants = len(report.shown[0][1]) if report.shown else periods * POINTS + 1
-    time_s = np.linspace(0.0, periods * period_s, instants)
+    time_s = report.shown_times_s
 
     miss = report.solution.optimal.miss
     about = [rendezvous.description] if rendezvous.description else []
@@ -67,13 +67,26 @@ def reachability_page(report: ReachabilityReport) -> str:
 
 
 def _graphs(report: ReachabilityReport, time_s: Floats) -> list[Graph]:
-    """Return a graph of each component of the controls, constant over each period."""
+    """Return a graph of each component of the controls.
+
+    Thrust is constant over each period; an impulse is a stem, of no duration.
+    """
     rendezvous = report.rendezvous
     last = rendezvous.problem.periods - 1
     period_of = np.minimum((time_s / rendezvous.period_s).astype(int), last)
+    if rendezvous.has_impulses:
+        name = "Impulse"
+        unit: Unit = ("m/s", 1.0)
+        # The first of the two equal times of an impulse, see `shown_times_s`.
+        acts = np.diff(time_s, append=np.inf) == 0.0
+    else:
+        name = "Control"
+        unit = ("m/s²", rendezvous.unit_m_s2)
+        acts = np.ones(len(time_s), dtype=bool)
+
     members = [member for member, _ in report.shown]
     controls = [
-        np.where(np.abs(member.controls) < _ZERO, 0.0, member.controls)[period_of]
+        np.where(np.abs(member.controls) < _ZERO, 0.0, member.controls)[period_of] * acts[:, None]
         for member in members
     ]
     graphs = []
@@ -84,9 +97,9 @@ def _graphs(report: ReachabilityReport, time_s: Floats) -> list[Graph]:
         ]
         graphs.append(
             Graph(
-                f"Control along {AXIS_TITLES[j]}, and its range over all optimal controls",
+                f"{name} along {AXIS_TITLES[j]}, and its range over all optimal controls",
                 f"u{axis}",
-                ("m/s²", rendezvous.acceleration_m_s2),
+                unit,
                 curves,
                 band=report.ranges[period_of, j],
                 stairs=True,

@@ -11,19 +11,21 @@ from rich.table import Table
 
 from infoset.arrays import Floats
 from infoset.experiments.common.hill_axes import AXES
-from infoset.experiments.common.problem_command import trajectories_csv
+from infoset.experiments.common.problem_command import CONTROL_COLUMNS, trajectories_csv
 from infoset.experiments.common.screen import Part, number, number_table
 from infoset.experiments.common.units import Unit, length_unit
 from infoset.experiments.reachability.file import Rendezvous
 from infoset.rendezvous.reachability import (
     ClosedLoopFlight,
     FeedbackPlan,
+    NonlinearMotion,
     SetKind,
     Solution,
     ThrustShape,
     effort,
 )
 
+IMPULSE_COLUMNS = ("impulse_x_m_s", "impulse_y_m_s", "impulse_z_m_s")
 POINTS = 24
 """Points of a displayed trajectory per period."""
 NORM = "(m, m/s)"
@@ -31,7 +33,7 @@ NORM = "(m, m/s)"
 _MAX_SHOWN = 5
 """Number of controls in figures and pages; chosen: more curves cannot be told apart."""
 _ALIKE = 1e-4
-"""Difference of two controls, as parts of the largest one, below which only one is shown."""
+"""Difference of two controls, as a part of their bound, below which only one is shown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,18 +101,49 @@ class ReachabilityReport:
     @cached_property
     def shown(self) -> tuple[tuple[ChosenControl, Floats], ...]:
         """Return the first few different members with nonlinear trajectories, (points, 6)."""
+        bounds = self.rendezvous.problem.control_bounds
         chosen: list[ChosenControl] = []
         for member in self.members:
-            if all(np.abs(member.controls - other.controls).max() > _ALIKE for other in chosen):
+            differences = [np.abs(member.controls - other.controls) / bounds for other in chosen]
+            if all(difference.max() > _ALIKE for difference in differences):
                 chosen.append(member)
         return tuple((member, self._trajectory(member)) for member in chosen[:_MAX_SHOWN])
 
     def _trajectory(self, member: ChosenControl) -> Floats:
+        """Return the states at `shown_times_s`."""
         rendezvous = self.rendezvous
-        push = rendezvous.acceleration_m_s2 * member.controls[None]
-        return np.asarray(
-            rendezvous.truth.fly(rendezvous.problem.initial, push, rendezvous.period_s, POINTS)[0]
-        )
+        start = rendezvous.problem.initial
+        controls = member.controls[None]
+        if rendezvous.has_impulses:
+            paths = rendezvous.truth.coast(start, controls, rendezvous.period_s, POINTS)
+        else:
+            pushes = rendezvous.unit_m_s2 * controls
+            paths = rendezvous.truth.fly(start, pushes, rendezvous.period_s, POINTS)
+        return np.asarray(paths[0])
+
+    @property
+    def shown_times_s(self) -> Floats:
+        """Return the times of displayed trajectories.
+
+        The start of each period occurs twice with impulses: before and after the impulse.
+        """
+        rendezvous = self.rendezvous
+        periods = rendezvous.problem.periods
+        first = 0 if rendezvous.has_impulses else 1
+        times = np.arange(periods)[:, None] + np.arange(first, POINTS + 1) / POINTS
+        return rendezvous.period_s * np.concatenate([[0.0], times.ravel()])
+
+
+def flown(rendezvous: Rendezvous, controls: Floats, truth: NonlinearMotion | None = None) -> Floats:
+    """Return the states at t = 0..T of the nonlinear model, before an impulse, (k, T + 1, 6).
+
+    The controls have shape (k, T, 3); `truth` replaces the nonlinear model.
+    """
+    motion = truth or rendezvous.truth
+    start = rendezvous.problem.initial
+    if rendezvous.has_impulses:
+        return motion.coast(start, controls, rendezvous.period_s)[:, ::2]
+    return motion.fly(start, rendezvous.unit_m_s2 * controls, rendezvous.period_s)
 
 
 def delta_v(rendezvous: Rendezvous, controls: Floats) -> dict[str, float]:
@@ -119,7 +152,7 @@ def delta_v(rendezvous: Rendezvous, controls: Floats) -> dict[str, float]:
     The sum is over the axes, each of which has an engine; for thrust in a ball, with one engine, it
     is over the norms.
     """
-    pushes = rendezvous.acceleration_m_s2 * rendezvous.period_s * controls
+    pushes = rendezvous.delta_v_m_s * controls
     axes = np.abs(pushes).sum(axis=0)
     ball = rendezvous.problem.thrust is ThrustShape.BALL
     total = np.linalg.norm(pushes, axis=1).sum() if ball else axes.sum()
@@ -129,18 +162,20 @@ def delta_v(rendezvous: Rendezvous, controls: Floats) -> dict[str, float]:
 def trajectories(report: ReachabilityReport) -> str:
     """Return the trajectories of the selected controls in both models, as CSV.
 
-    A control is constant over its period.
+    A held control is constant over its period; an impulse acts after the state of its row.
     """
     rendezvous = report.rendezvous
+    unit = 1.0 if rendezvous.has_impulses else rendezvous.unit_m_s2
     times_s = rendezvous.period_s * np.arange(rendezvous.problem.periods + 1)
     tracks = []
     for member in report.members:
-        controls = np.vstack([rendezvous.acceleration_m_s2 * member.controls, np.full(3, np.nan)])
+        controls = np.vstack([unit * member.controls, np.full(3, np.nan)])
         tracks += [
             ([member.name, model], [times_s, states, controls])
             for model, states in (("linear", member.linear), ("nonlinear", member.nonlinear))
         ]
-    return trajectories_csv(["control", "model"], tracks)
+    columns = IMPULSE_COLUMNS if rendezvous.has_impulses else CONTROL_COLUMNS
+    return trajectories_csv(["control", "model"], tracks, columns)
 
 
 def report_json(report: ReachabilityReport) -> dict[str, object]:
@@ -150,13 +185,16 @@ def report_json(report: ReachabilityReport) -> dict[str, object]:
     """
     solution = report.solution
     rendezvous = report.rendezvous
+    controls = "parts of acceleration_m_s2, along x, y, z"
+    if rendezvous.has_impulses:
+        controls = "impulses at the starts of the periods, in m/s, along x, y, z"
     return {
         "units": {
             "period_s": rendezvous.period_s,
             "axes": AXES,
             "states": "x, y, z in m and their rates in m/s",
             "misses": "Euclidean norm of six components, in m and m/s",
-            "controls": "parts of acceleration_m_s2, along x, y, z",
+            "controls": controls,
             "acceleration_m_s2": rendezvous.acceleration_m_s2,
         },
         **solution_json(solution, report.min_periods, (report.forward, report.tube), report.ranges),
@@ -233,10 +271,10 @@ def report_lines(report: ReachabilityReport) -> Iterator[Part]:
     yield f"{rendezvous.name}: minimum terminal norm {solution.optimal.miss:.9g} {NORM}; {reached}"
     yield from solution_lines(solution)
     yield f"axes: {AXES}"
-    yield (
-        f"units: {NORM} is the norm of a state in m and m/s; u is in units of "
-        f"{rendezvous.acceleration_m_s2:g} m/s^2"
-    )
+    control = "u is an impulse at the start of a period, in m/s"
+    if not rendezvous.has_impulses:
+        control = f"u is in units of {rendezvous.unit_m_s2:g} m/s^2"
+    yield f"units: {NORM} is the norm of a state in m and m/s; {control}"
     table = number_table("period", *(f"{axis} of the tube\nm" for axis in "xyz"))
     for t in range(1, solution.problem.periods + 1):
         table.add_row(
@@ -284,10 +322,11 @@ def solution_lines(solution: Solution) -> Iterator[str]:
 
 
 def _members_table(report: ReachabilityReport) -> Table:
+    unit = "m/s" if report.rendezvous.has_impulses else "u"
     table = number_table(
         "control",
-        "energy\nu^2",
-        "peak\nu",
+        "energy\n(m/s)^2" if report.rendezvous.has_impulses else "energy\nu^2",
+        f"peak\n{unit}",
         "Delta-v\nm/s",
         f"nonlinear miss\n{NORM}",
         "violation between\nperiods",

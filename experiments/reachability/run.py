@@ -21,14 +21,20 @@ from infoset.experiments.reachability.report import (
     ChosenControl,
     ReachabilityReport,
     Robustness,
+    flown,
     report_json,
     report_lines,
     trajectories,
 )
-from infoset.experiments.reachability.selection import select_controls, selection
+from infoset.experiments.reachability.selection import (
+    DEFAULT_SELECTION,
+    select_controls,
+    selection,
+)
 from infoset.experiments.reachability.system import COMMAND as SYSTEM_COMMAND
 from infoset.experiments.reachability.system_file import ReachableSystem
 from infoset.rendezvous.reachability import (
+    IMPULSE,
     ClosedLoopFlight,
     EmptyTubeError,
     NonlinearMotion,
@@ -50,7 +56,8 @@ def solve_rendezvous(
     rendezvous: Rendezvous, options: Reach, begin: BeginProgress
 ) -> ReachabilityReport:
     """Return the sets, the selected controls with trajectories, and the simulations."""
-    selection(options.select)  # a mistake is found before anything is computed
+    select = options.select or DEFAULT_SELECTION[rendezvous.engine]
+    selection(select)  # a mistake is found before anything is computed
     progress = begin(rendezvous.name)
     solution = solve(rendezvous.problem)
     progress(0.2)
@@ -60,7 +67,7 @@ def solve_rendezvous(
     forward, tube = (solution.sets.bounds(kind) for kind in (SetKind.FORWARD, SetKind.TUBE))
     progress(0.5)
     ranges = solution.optimal.ranges()
-    controls = select_controls(solution, options)
+    controls = select_controls(solution, select, options.seed)
     members = fly_members(rendezvous, [*controls], np.array([*controls.values()]))
     progress(0.7)
     flight = None
@@ -101,8 +108,7 @@ def fly_members(
     """
     problem = rendezvous.problem
     linear = problem.run(controls)
-    pushes = rendezvous.acceleration_m_s2 * controls
-    nonlinear = (truth or rendezvous.truth).fly(problem.initial, pushes, rendezvous.period_s)
+    nonlinear = flown(rendezvous, controls, truth=truth)
     between = replace(problem, between=rendezvous.instants).excess(controls)
     rows = zip(names, controls, linear, nonlinear, between.tolist(), strict=True)
     return tuple(ChosenControl(*row) for row in rows)
@@ -113,7 +119,11 @@ def _fly(rendezvous: Rendezvous, generator: np.random.Generator | None) -> Close
 
     def truth(period: int, state: Floats, control: Floats) -> Floats:
         start_s = rendezvous.period_s * period
-        push = rendezvous.acceleration_m_s2 * control
+        push = np.zeros(3)
+        if rendezvous.has_impulses:
+            state = state + IMPULSE @ control
+        else:
+            push = rendezvous.unit_m_s2 * control
         return np.asarray(
             rendezvous.truth.paths(start_s, state, push, [start_s + rendezvous.period_s])[0, 0]
         )

@@ -7,13 +7,14 @@ import numpy as np
 from infoset.arrays import Floats
 from infoset.experiments.common.errors import InputError, input_errors
 from infoset.experiments.common.options import choice
-from infoset.experiments.reachability.command import Reach
+from infoset.experiments.reachability.file import Engine
 from infoset.rendezvous.reachability import (
     Solution,
     ThinSetError,
     TooManyVerticesError,
     analytic_centre,
     chebyshev_centre,
+    minimum_delta_v,
     minimum_energy,
     minimum_l1,
     minimum_norms,
@@ -26,11 +27,17 @@ SINGLE = {
     "energy": minimum_energy,
     "l1": minimum_l1,
     "norms": minimum_norms,
+    "delta-v": minimum_delta_v,
     "peak": minimum_peak,
     "chebyshev": chebyshev_centre,
     "analytic": analytic_centre,
 }
 """Selections of one control each: minimum sum of squares, of absolute values, of norms, etc."""
+DEFAULT_SELECTION = {
+    Engine.HELD: "energy,l1,norms,peak,chebyshev,analytic",
+    Engine.IMPULSES: "delta-v,energy,peak,chebyshev,analytic",
+}
+"""Selections without the option --select."""
 VERTICES, SAMPLES = "vertices", "samples"
 """Selections of several controls."""
 MAX_SAMPLES = 1000
@@ -55,9 +62,9 @@ def selection(text: str) -> tuple[list[str], int]:
     return names, count
 
 
-def select_controls(solution: Solution, options: Reach) -> dict[str, Floats]:
+def select_controls(solution: Solution, select: str, seed: int) -> dict[str, Floats]:
     """Return the selected optimal controls, each of shape (T, m), by name."""
-    names, count = selection(options.select)
+    names, count = selection(select)
     controls: dict[str, Floats] = {}
     for name in names:
         if name in SINGLE:
@@ -72,7 +79,7 @@ def select_controls(solution: Solution, options: Reach) -> dict[str, Floats]:
             for number, control in enumerate(several, start=1):
                 controls[f"vertex {number}"] = control
         else:
-            several = samples(solution.optimal, count, np.random.default_rng(options.seed))
+            several = samples(solution.optimal, count, np.random.default_rng(seed))
             for number, control in enumerate(several, start=1):
                 controls[f"sample {number}"] = control
     return controls

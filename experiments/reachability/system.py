@@ -12,8 +12,13 @@ from infoset.experiments.common.errors import InputError
 from infoset.experiments.common.problem_command import ProblemCommand
 from infoset.experiments.common.screen import BeginProgress, Part, number, number_table
 from infoset.experiments.reachability.command import Reach
+from infoset.experiments.reachability.file import Engine
 from infoset.experiments.reachability.report import solution_json, solution_lines
-from infoset.experiments.reachability.selection import select_controls, selection
+from infoset.experiments.reachability.selection import (
+    DEFAULT_SELECTION,
+    select_controls,
+    selection,
+)
 from infoset.experiments.reachability.system_file import ReachableSystem
 from infoset.rendezvous.reachability import SetKind, Solution, min_periods, solve
 from infoset.sim.columns import Cell, csv_text
@@ -46,13 +51,14 @@ def solve_system(system: ReachableSystem, options: Reach, begin: BeginProgress) 
         raise InputError(
             "--replan and --html: are for problems of kind reachable-rendezvous; omit them here"
         )
-    selection(options.select)  # a mistake is found before anything is computed
+    select = options.select or DEFAULT_SELECTION[Engine.HELD]
+    selection(select)  # a mistake is found before anything is computed
     progress = begin(system.name)
     problem = system.problem
     path = system.path
     solution = solve(problem)
     progress(0.5)
-    controls = select_controls(solution, options)
+    controls = select_controls(solution, select, options.seed)
     forward, tube = (
         solution.sets.bounds(kind) + path[..., None] for kind in (SetKind.FORWARD, SetKind.TUBE)
     )

@@ -16,12 +16,14 @@ from infoset.rendezvous.reachability.answer import (
 from infoset.rendezvous.reachability.closed_loop import ClosedLoopFlight, replan
 from infoset.rendezvous.reachability.guaranteed import affine_plan
 from infoset.rendezvous.reachability.motion import (
+    IMPULSE,
     MotionModel,
     NonlinearMotion,
+    between_impulses,
     between_periods,
     discretised,
+    impulsive,
     motion_of,
-    with_impulses,
 )
 from infoset.rendezvous.reachability.optimum import EmptyTubeError
 from infoset.rendezvous.reachability.outputs import (
@@ -48,6 +50,7 @@ from infoset.rendezvous.reachability.selection import (
     analytic_centre,
     chebyshev_centre,
     effort,
+    minimum_delta_v,
     minimum_energy,
     minimum_l1,
     minimum_norms,
@@ -73,6 +76,7 @@ from infoset.rendezvous.reachability.solve import (
 )
 
 __all__ = [
+    "IMPULSE",
     "MAX_PERIODS",
     "AffinePlan",
     "AnsweredPlan",
@@ -103,14 +107,17 @@ __all__ = [
     "affine_plan",
     "analytic_centre",
     "answered_plan",
+    "between_impulses",
     "between_periods",
     "chebyshev_centre",
     "discretised",
     "effort",
     "feedback_plan",
+    "impulsive",
     "information_radius",
     "lower_bound",
     "min_periods",
+    "minimum_delta_v",
     "minimum_energy",
     "minimum_l1",
     "minimum_norms",
@@ -124,5 +131,4 @@ __all__ = [
     "solve",
     "tightened",
     "vertices",
-    "with_impulses",
 ]

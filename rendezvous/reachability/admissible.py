@@ -42,7 +42,8 @@ class Lifted:
     States are x(t) = free[t] + response[t] v, of shapes (T + 1, n) and (T + 1, n, p). Controls of
     all periods, beginning with the first period, are control_free + control_response v, of shapes
     (T m,) and (T m, p). Each of the r rows belongs to the time in `moments` and to the constraint
-    of the block whose index is in `labels`; both are -1 for a bound on a control.
+    of the block whose index is in `labels`; `labels` is -1 for a constraint on controls, and both
+    are -1 for a bound on a control.
 
     For thrust in a ball, `ball` is the number m of controls of a period, and |u(t)| <= 1 is a
     further constraint. For a box it is 0, and the bounds are among the rows.
@@ -160,7 +161,10 @@ def lift_with_states(block: StateBlock) -> Lifted:
 
 
 class _PeriodConstraints(NamedTuple):
-    """Constraints on the states at the end of a period, and at each of the times within it."""
+    """Constraints on the states at the end of a period, and at each of the times within it.
+
+    The time just after an impulse is one of the latter.
+    """
 
     end: _Rows
     within: list[_Rows]
@@ -179,12 +183,21 @@ def _state_constraints(
         limits = block.offsets[t + 1, held] - normals @ free[t + 1]
         end = _Rows(normals @ response[t + 1], limits, np.full(len(held), t + 1), held)
         result.append(_PeriodConstraints(end, []))
+
+        thrust = np.eye(m, response.shape[2], t * m)
+        if block.jump is not None:
+            # Constraints that an impulse does not change hold already at the end of a period.
+            changed = (block.normals @ block.jump).any(axis=1)
+            held = np.flatnonzero(np.isfinite(block.offsets[t]) & changed)
+            normals = block.normals[held]
+            limits = block.offsets[t, held] - normals @ free[t]
+            rows = normals @ (response[t] + block.jump @ thrust)
+            result[t].within.append(_Rows(rows, limits, np.full(len(held), t + 1), held))
         if block.between is None:
             continue
 
         held = np.flatnonzero(np.isfinite(block.offsets[t]))
         normals = block.normals[held]
-        thrust = np.eye(m, response.shape[2], t * m)
         for inner in block.between[t]:
             limits = block.offsets[t, held] - normals @ inner[:, :n] @ free[t]
             rows = normals @ (inner[:, :n] @ response[t] + inner[:, n:] @ thrust)
@@ -207,6 +220,12 @@ def _lifted(
     """
     width = block.periods * len(block.controls)
     unit = np.eye(width, response.shape[2])
+    of_periods = unit.reshape(block.periods, len(block.controls), response.shape[2])
+    for t, thrust in enumerate(of_periods):
+        held = np.isfinite(block.control_offsets[t])
+        rows = block.control_normals[held] @ thrust
+        limits = block.control_offsets[t, held]
+        constraints.append(_Rows(rows, limits, np.full(len(rows), t + 1), np.full(len(rows), -1)))
     if not block.ball:
         hard = np.full(2 * width, -1)
         bounds = _Rows(np.vstack([unit, -unit]), np.ones(2 * width), hard, hard)
@@ -330,7 +349,7 @@ def min_relaxation(lifted: Lifted) -> tuple[float, Floats]:
     is at least -1, where the search stops, and not positive if the set is not empty. The relaxation
     of equations is not negative; without equations a negative relaxation is a margin.
     """
-    soft = lifted.moments >= 0
+    soft = lifted.labels >= 0
     misfit = -np.ones((len(lifted.equal), 1))
     cost = np.zeros(lifted.size + 1)
     cost[-1] = 1.0

@@ -59,15 +59,26 @@ def discretised(
     return segment.transition, acceleration_m_s2 * segment.held
 
 
-def with_impulses(motion: LinearMotion, periods: int, period_s: float) -> tuple[Floats, Floats]:
-    """Return A(t) and B(t) of x(t + 1) = A(t) x(t) + B(t) u(t) with impulses.
+IMPULSE = np.vstack([np.zeros((3, 3)), np.eye(3)])
+"""Immediate effect of an impulse, m/s, on a state."""
 
-    The impulse u(t), in m/s, acts at the start of the period t. States are in m and m/s; A(t) has
-    the shape (periods, 6, 6), and B(t), the last columns of A(t), (periods, 6, 3).
+
+def impulsive(motion: LinearMotion, periods: int, period_s: float) -> tuple[Floats, Floats]:
+    """Return A(t) and B(t) = A(t) (0; 1), of impulses in m/s at the starts of the periods.
+
+    `motion`, `periods`, `period_s` and the shapes of the matrices are as in `discretised`.
     """
     starts = period_s * np.arange(periods)
     transition = motion.transition(starts, starts + period_s)
-    return transition, transition[:, :, 3:]
+    return transition, transition @ IMPULSE
+
+
+def between_impulses(motion: LinearMotion, periods: int, period_s: float, instants: int) -> Floats:
+    """Return what `between_periods` does, for impulses in m/s at the starts of the periods."""
+    starts = period_s * np.arange(periods)[:, None]
+    since_start = period_s * np.arange(1, instants + 1) / (instants + 1)
+    transition = motion.transition(starts, starts + since_start)
+    return np.concatenate([transition, transition @ IMPULSE], axis=-1)
 
 
 def between_periods(
@@ -174,5 +185,24 @@ class NonlinearMotion:
             times = period_s * (t + np.arange(1, points + 1) / points)
             leg = self.paths(period_s * t, state, push[:, t], times)
             legs.append(leg)
+            state = leg[:, -1]
+        return np.concatenate(legs, axis=1)
+
+    def coast(
+        self, start: ArrayLike, impulses: ArrayLike, period_s: float, points: int = 1
+    ) -> Floats:
+        """Return the states of craft that coast after an impulse at the start of each period.
+
+        As `fly`, for `impulses` in m/s. The result, shape (k, T (points + 1) + 1, 6), contains the
+        start, and for each period the state just after the impulse and the `points` times.
+        """
+        changes = np.asarray(impulses, dtype=float)
+        state = np.broadcast_to(np.asarray(start, dtype=float), (len(changes), 6))
+        legs = [state[:, None, :]]
+        for t in range(changes.shape[1]):
+            after = state + changes[:, t] @ IMPULSE.T
+            times = period_s * (t + np.arange(1, points + 1) / points)
+            leg = self.paths(period_s * t, after, np.zeros((len(changes), 3)), times)
+            legs += [after[:, None, :], leg]
             state = leg[:, -1]
         return np.concatenate(legs, axis=1)

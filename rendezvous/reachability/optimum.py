@@ -190,7 +190,7 @@ def admissible(block: StateBlock) -> StateBlock:
     first = 1 + bisect_left(range(1, block.periods), True, key=conflicts)
     _, point = min_relaxation(lifted.until(first))
     gaps = lifted.limits - lifted.rows @ point
-    tight = (gaps < _KEPT) & (lifted.moments >= 0) & (lifted.moments <= first)
+    tight = (gaps < _KEPT) & (lifted.labels >= 0) & (lifted.moments <= first)
     names = dict.fromkeys(
         f"{block.names[label]} at t = {moment}"
         for label, moment in zip(lifted.labels[tight], lifted.moments[tight], strict=True)
@@ -251,8 +251,8 @@ class _OptimumSearch:
     """Search for a point of minimum norm, with the best point and the best lower bound so far.
 
     `_free` + `_response` v is the weighted terminal state, and `_reach` a bound of its norm.
-    `_soft` marks the rows on states, and `_lengths` are the changes of the rows by controls of size
-    one.
+    `_soft` marks all rows but the bounds on controls, and `_lengths` are the changes of the rows by
+    controls of size one.
     """
 
     def __init__(self, lifted: Lifted, weights: Floats) -> None:

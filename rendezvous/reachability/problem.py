@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import linprog
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
@@ -19,6 +20,9 @@ problem then take about 30 MB."""
 _MAX_GROWTH = 1e10
 """Maximum growth of a deviation, relative to the bounds: its rounding, 1e-16 of it, is then 1e-6 of
 the bounds."""
+_MIN_ROOM = 1e-6
+"""Half the size of a cube, relative to the bounds, that a set of controls must contain: far above
+the 1e-9 by which programs may violate constraints."""
 _START_ROUNDING = 1e-12
 """Rounding of a constraint at the initial state, relative to the size of its terms: a start on its
 boundary, as with an apex at the origin, is admissible."""
@@ -71,12 +75,19 @@ class ReachabilityProblem:
         apply.
     state_names : tuple of str
         Names of the states in messages.
+    jump : ndarray, shape (n, m) or None
+        Immediate effect of a control, for impulses at the start of a period: the constraints of
+        time t also apply to x(t) + jump u(t), and B(t) = A(t) jump.
+    control_normals : ndarray, shape (k, m)
+        Further constraints on controls: control_normals u(t) <= control_offsets(t).
+    control_offsets : ndarray, shape (T, k)
+        Offsets in the units of control_normals u; infinite at times without the constraint.
 
     Raises
     ------
     ValueError
-        If bounds on thrust in a ball differ, or A(T-1)...A(0) multiplies deviations by over 1e10,
-        relative to the bounds.
+        If bounds on thrust in a ball differ, the constraints on a control leave no room, or
+        A(T-1)...A(0) multiplies deviations by over 1e10, relative to the bounds.
     InadmissibleStartError
         If x(0) breaks a constraint.
     """
@@ -92,12 +103,36 @@ class ReachabilityProblem:
     constraint_names: tuple[str, ...] = ()
     between: Floats | None = None
     state_names: tuple[str, ...] = ()
+    jump: Floats | None = None
+    control_normals: Floats | None = None
+    control_offsets: Floats | None = None
 
     def __post_init__(self) -> None:
         if self.thrust is ThrustShape.BALL and np.ptp(self.control_bounds) > 0.0:
             raise ValueError("for thrust in a ball the bounds on controls must be equal")
+        self._check_controls()
         self._check_growth()
         self._check_start()
+
+    def _check_controls(self) -> None:
+        """Raise `ValueError` if a set of controls contains no cube of a small size."""
+        normals, offsets = self.limits
+        rows = normals * self.control_bounds
+        half_cube = _MIN_ROOM * np.abs(rows).sum(axis=1)
+        different, times = np.unique(offsets, axis=0, return_index=True)
+        for ends, time in zip(different, times, strict=True):
+            held = np.isfinite(ends)
+            if not held.any():
+                continue
+            found = linprog(
+                np.zeros(self.controls),
+                A_ub=rows[held],
+                b_ub=(ends - half_cube)[held],
+                bounds=(_MIN_ROOM - 1.0, 1.0 - _MIN_ROOM),
+                method="highs",
+            )
+            if found.status != 0:
+                raise ValueError(f"the limits on the controls leave no room at t = {time}")
 
     def _check_growth(self) -> None:
         moved = np.diag(self.state_bounds)
@@ -144,6 +179,13 @@ class ReachabilityProblem:
             return np.zeros((0, self.states)), np.zeros((self.periods + 1, 0))
         return self.normals, self.offsets
 
+    @property
+    def limits(self) -> tuple[Floats, Floats]:
+        """`control_normals` and `control_offsets`; arrays of k = 0 rows if they are None."""
+        if self.control_normals is None or self.control_offsets is None:
+            return np.zeros((0, self.controls)), np.zeros((self.periods, 0))
+        return self.control_normals, self.control_offsets
+
     @cached_property
     def blocks(self) -> tuple[StateBlock, ...]:
         """The smallest independent parts of the problem, in the order of their first states.
@@ -158,8 +200,13 @@ class ReachabilityProblem:
         linked[:n, n:] = (self.control != 0.0).any(axis=0)
         if self.between is not None:
             linked[:n] |= (self.between != 0.0).any(axis=(0, 1))
+        if self.jump is not None:
+            linked[:n, n:] |= self.jump != 0.0
         for normal in self.further[0]:
             acting = np.flatnonzero(normal)
+            linked[acting[0], acting] = True
+        for normal in self.limits[0]:
+            acting = n + np.flatnonzero(normal)
             linked[acting[0], acting] = True
         if self.thrust is ThrustShape.BALL:
             linked[n, n:] = True
@@ -201,9 +248,16 @@ class ReachabilityProblem:
             worst = np.linalg.norm(thrust, axis=-1).max(axis=-1) / self.control_bounds[0] - 1.0
         else:
             worst = (np.abs(thrust) / self.control_bounds).max(axis=(-1, -2)) - 1.0
+        normals, offsets = self.limits
+        beyond = (thrust @ normals.T - offsets) / (np.abs(normals) @ self.control_bounds)
+        worst = np.maximum(worst, beyond.max(axis=(-1, -2), initial=-np.inf))
 
         states = self.run(thrust)
         worst = np.maximum(worst, self._state_excess(states, np.arange(self.periods + 1)))
+
+        if self.jump is not None:
+            after = states[..., :-1, :] + thrust @ self.jump.T
+            worst = np.maximum(worst, self._state_excess(after, np.arange(self.periods)))
 
         if self.between is not None:
             both = np.concatenate([states[..., :-1, :], thrust], axis=-1)
@@ -245,6 +299,7 @@ class ReachabilityProblem:
             initial=state,
             offsets=None if self.offsets is None else self.offsets[start : end + 1],
             between=None if self.between is None else self.between[start:end],
+            control_offsets=self.limits[1][start:end],
         )
 
 
@@ -255,7 +310,10 @@ class StateBlock:
     `states` and `controls` are indices in the problem, and `scale`, shape (n,), the bounds on the
     states in their own units. The constraints on states, with the bounds first, are `normals` x(t)
     <= `offsets`(t), with normals of unit length, and have `names`, of shapes (k, n), (T + 1, k) and
-    (k,). If `ball`, |u(t)| <= 1 in the Euclidean norm; otherwise for each component.
+    (k,). If `ball`, |u(t)| <= 1 in the Euclidean norm; otherwise for each component. `jump`,
+    shape (n, m), is as in `ReachabilityProblem`. `control_normals` u(t) <= `control_offsets`(t),
+    with normals of unit length, of shapes (l, m) and (T, l), are the constraints on controls beyond
+    their bounds.
     """
 
     states: Places
@@ -269,6 +327,9 @@ class StateBlock:
     names: tuple[str, ...]
     ball: bool
     between: Floats | None
+    jump: Floats | None
+    control_normals: Floats
+    control_offsets: Floats
 
     @property
     def periods(self) -> int:
@@ -288,6 +349,7 @@ class StateBlock:
             control=self.control[:periods],
             offsets=self.offsets[: periods + 1],
             between=None if self.between is None else self.between[:periods],
+            control_offsets=self.control_offsets[:periods],
         )
 
 
@@ -309,6 +371,9 @@ def _block(problem: ReachabilityProblem, members: Places) -> StateBlock:
     if problem.between is not None:
         inner = problem.between[:, :, states][:, :, :, members]
         between = inner / scale[:, None] * np.concatenate([scale, reach])
+    jump = None
+    if problem.jump is not None:
+        jump = problem.jump[oblong] / scale[:, None] * reach
 
     unit = np.eye(len(states))
     bounds = np.ones((problem.periods + 1, 2 * len(states)))
@@ -318,6 +383,11 @@ def _block(problem: ReachabilityProblem, members: Places) -> StateBlock:
     lengths = np.linalg.norm(rows, axis=1)
     names = [f"the bound on {problem.state_name(i)}" for i in states.tolist()] * 2
     names += [problem.name_of(k) for k in mine.tolist()]
+
+    of_controls, limits = problem.limits
+    acting = np.abs(of_controls[:, controls]).max(axis=1, initial=0.0) > 0.0
+    control_rows = of_controls[np.ix_(acting, controls)] * reach
+    control_lengths = np.linalg.norm(control_rows, axis=1)
 
     return StateBlock(
         states,
@@ -331,4 +401,7 @@ def _block(problem: ReachabilityProblem, members: Places) -> StateBlock:
         tuple(names),
         problem.thrust is ThrustShape.BALL,
         between,
+        jump,
+        control_rows / control_lengths[:, None],
+        limits[:, acting] / control_lengths,
     )

@@ -103,8 +103,8 @@ def tightened(problem: ReachabilityProblem, disturbance: Floats) -> Reachability
 def feedback_plan(problem: ReachabilityProblem, disturbance: Floats) -> FeedbackPlan:
     """Return the plan with affine feedback whose worst terminal state is smallest.
 
-    The `problem`, with thrust in a box, and the `disturbance` are as for `tightened`; the controls
-    from t + 1 on may depend on w(t), which the state x(t + 1) reveals.
+    The `problem`, with held thrust in a box, and the `disturbance` are as for `tightened`; the
+    controls from t + 1 on may depend on w(t), which the state x(t + 1) reveals.
 
     With affine feedback all constraints are linear in the nominal controls and the gains, except
     for absolute values, each of which needs an additional variable. The result is one linear
@@ -116,12 +116,17 @@ def feedback_plan(problem: ReachabilityProblem, disturbance: Floats) -> Feedback
     NoRobustPlanError
         If no plan with affine feedback satisfies the constraints.
     ValueError
-        If there are too many periods, or thrust is in a ball.
+        If there are too many periods, thrust is in a ball, the controls are impulses, or they have
+        constraints beyond their bounds.
     NoSolutionError
         If the linear program was not solved.
     """
     if problem.thrust is ThrustShape.BALL:
         raise ValueError("feedback from disturbances needs thrust in a box")
+    if len(problem.limits[0]):
+        raise ValueError("feedback from disturbances needs controls without further limits")
+    if problem.jump is not None:
+        raise ValueError("feedback from disturbances needs held thrust, not impulses")
     if problem.periods > MAX_PERIODS_WITH_FEEDBACK:
         raise ValueError(
             f"a plan with feedback from disturbances can have at most {MAX_PERIODS_WITH_FEEDBACK} "

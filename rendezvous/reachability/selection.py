@@ -17,6 +17,7 @@ from infoset.rendezvous.reachability.admissible import (
     quadratic,
 )
 from infoset.rendezvous.reachability.conic import NoSolutionError
+from infoset.rendezvous.reachability.problem import ThrustShape
 from infoset.rendezvous.reachability.relative_interior import relative_interior
 from infoset.rendezvous.reachability.sets import TooManyVerticesError, combined, optimal_polytope
 from infoset.rendezvous.reachability.solve import OptimalControls
@@ -94,6 +95,17 @@ def minimum_norms(optimal: OptimalControls) -> Floats:
     if not optimal.dimension:
         return optimal.at(np.zeros(0))
     return optimal.at(min_sum_of_norms(optimal.space, optimal.scale, optimal.problem.controls))
+
+
+def minimum_delta_v(optimal: OptimalControls) -> Floats:
+    """Return an `optimal` control of minimum Delta-v, shape (T, m).
+
+    The Delta-v is the sum of absolute values for thrust in a box, where each axis has an engine,
+    and the sum of the norms for thrust in a ball, with one engine.
+    """
+    if optimal.problem.thrust is ThrustShape.BALL:
+        return minimum_norms(optimal)
+    return minimum_l1(optimal)
 
 
 def minimum_peak(optimal: OptimalControls) -> Floats:

@@ -169,20 +169,36 @@ def _forward_sets(block: StateBlock) -> tuple[Polytope, ...]:
     """Shorikov and Goranov (2021): G+(t + 1) = (A G+(t) + B U) cut by the constraints."""
     sets = [Polytope.from_vertices(block.initial[None, :])]
     for t in range(block.periods):
-        reached = _with_thrust(sets[-1].linear_map(block.transition[t]), block.control[t])
+        if block.jump is not None:
+            reached = _after_impulse(block, sets[-1], block.jump, t).linear_map(block.transition[t])
+        else:
+            reached = _with_thrust(sets[-1].linear_map(block.transition[t]), block.control[t])
         sets.append(reached.cut(block.normals, upper=block.offsets[t + 1]).needed())
     return tuple(sets)
+
+
+def _after_impulse(block: StateBlock, states: Polytope, jump: Floats, time: int) -> Polytope:
+    """The states just after the impulse at a time, for a set of states before it."""
+    return _with_thrust(states, jump).cut(block.normals, upper=block.offsets[time]).needed()
 
 
 def _tube_to_zero(block: StateBlock, forward: tuple[Polytope, ...]) -> tuple[Polytope, ...]:
     """The states x of G+(t) with A x + B u in the tube at t + 1 for some u, back from zero.
 
-    A x is in the tube minus B U, whose half-spaces need no inverse of A.
+    A x is in the tube minus B U, whose half-spaces need no inverse of A. With impulses, x + jump u
+    is in the set of the states after the impulse that A moves into the tube.
     """
     tube = [Polytope.from_vertices(np.zeros((1, block.size)))]
     for t in range(block.periods - 1, 0, -1):
-        rows, limits = _with_thrust(tube[0], block.control[t]).constraints()
-        tube.insert(0, forward[t].cut(rows @ block.transition[t], upper=limits).needed())
+        if block.jump is not None:
+            rows, limits = tube[0].constraints()
+            after = _after_impulse(block, forward[t], block.jump, t)
+            leading = after.cut(rows @ block.transition[t], upper=limits).needed()
+            rows, limits = _with_thrust(leading, block.jump).constraints()
+            tube.insert(0, forward[t].cut(rows, upper=limits).needed())
+        else:
+            rows, limits = _with_thrust(tube[0], block.control[t]).constraints()
+            tube.insert(0, forward[t].cut(rows @ block.transition[t], upper=limits).needed())
     return (forward[0], *tube)
 
 

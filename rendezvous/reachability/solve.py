@@ -196,6 +196,8 @@ def _refusal(problem: ReachabilityProblem) -> str:
         return "for thrust in a ball the sets are not polytopes"
     if problem.between is not None:
         return "constraints within periods couple states and controls"
+    if len(problem.limits[0]):
+        return "exact sets are computed for controls in a box without further limits"
     largest = max(block.size for block in problem.blocks)
     if largest > MAX_STATES:
         return f"the constraints couple {largest} states; exact sets have at most {MAX_STATES}"

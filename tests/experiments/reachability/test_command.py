@@ -11,7 +11,9 @@ from infoset.experiments.common.input_file import load_problem, read_text
 from infoset.experiments.reachability.command import Reach
 from infoset.experiments.reachability.figures import draw_controls
 from infoset.experiments.reachability.file import Rendezvous
+from infoset.experiments.reachability.page import reachability_page
 from infoset.experiments.reachability.run import COMMAND
+from infoset.rendezvous.reachability import minimum_energy, optimal_controls
 from infoset.rendezvous.reachability.conic import ConeProgram
 from tests.built_in import problem_text
 from tests.experiments.command_line import Command
@@ -61,6 +63,38 @@ def test_delta_v(infoset: Command, thrust: str) -> None:
         assert used["sum"] == pytest.approx(180.0 * float(engines))
 
 
+def test_impulses_of_the_example_of_curtis(infoset: Command) -> None:
+    # Orbital Mechanics for Engineering Students, example 7.4, with n = 0.00115697 rad/s.
+    impulses = np.array([[29.357, -66.751, 13.030], [25.821, 0.472, 24.493]])
+    found = infoset.json("reach", "two-impulses", "--replan", "--csv", "states.csv")
+    least = found["controls"][0]
+    assert least["name"] == "delta-v"
+    np.testing.assert_allclose(least["controls"], impulses, atol=6e-4)
+    # Six components with three printed decimals.
+    lengths = float(np.linalg.norm(impulses, axis=1).sum())
+    assert least["delta_v_m_s"]["sum"] == pytest.approx(lengths, abs=2e-3)
+    assert (found["min_periods"], found["optimal_dimension"]) == (2, 0)
+    assert "impulses at the starts of the periods, in m/s" in found["units"]["controls"]
+    # The plan is solved again from the nonlinear state, which the first impulse does not change.
+    np.testing.assert_allclose(found["replan"]["controls"][0], impulses[0], atol=6e-4)
+    assert Path("states.csv").read_text().splitlines()[0].endswith("impulse_z_m_s")
+
+
+def test_impulses_are_drawn_as_stems_and_jumps() -> None:
+    report = COMMAND.report(Reach(problem="two-impulses", select="delta-v"))
+    ((member, path),) = report.shown
+    times_s = report.shown_times_s
+    assert len(path) == len(times_s)
+    places = np.flatnonzero(np.diff(times_s) == 0.0)
+    np.testing.assert_array_equal(times_s[places], [0.0, 28800.0])
+    jumps = path[places + 1] - path[places]
+    np.testing.assert_allclose(jumps[:, 3:], member.controls, atol=1e-9)
+    assert draw_controls(report).axes[0].get_ylabel().endswith(", m/s")
+    assert "Impulse along x (radial)" in reachability_page(report)
+    printed = "\n".join(map(str, COMMAND.lines(report)))
+    assert "u is an impulse at the start of a period, in m/s" in printed
+
+
 def test_samples_follow_the_seed() -> None:
     one, same, other = (
         COMMAND.report(Reach(select="samples:2", seed=seed)).members for seed in (1, 1, 2)
@@ -96,6 +130,27 @@ def test_constraints_between_the_periods_bind() -> None:
     )
     assert loose.between > 1e-3
     assert kept.between < 0.2 * loose.between
+
+
+def test_speed_behind_the_target_is_bounded_by_its_distance() -> None:
+    # y + 200 s vy <= 80 m from t = 2 to 10: the speed is at most (80 m - y) / 200 s. And the thrust
+    # along the motion is at most 0.3 in the first two periods.
+    text = problem_text("approach-cone").split("[disturbance]")[0]
+    text += (
+        "[[keep_in]]\nnormals = [[0, 1, 0]]\nvelocity_normals_s = [[0, 200, 0]]\n"
+        "offsets_m = [80]\nfrom_period = 2\nuntil_period = 10\n"
+        "[[control_limits]]\nnormals = [[0, 1, 0]]\noffsets = [0.3]\nuntil_period = 1\n"
+    )
+    rendezvous = read_text(Rendezvous, text, "mine.toml")
+    optimal = optimal_controls(rendezvous.problem)
+    controls = minimum_energy(optimal)
+    states = rendezvous.problem.run(controls)
+    sums = states[:, 1] + 200.0 * states[:, 4]
+
+    assert optimal.miss == 0.0
+    # Both bind: without them the control of minimum energy breaks them.
+    assert sums[2:11].max() == pytest.approx(80.0, abs=1e-5)
+    assert controls[:2, 1].max() == pytest.approx(0.3, abs=1e-7)
 
 
 def test_more_periods_are_searched_if_zero_is_out_of_reach(infoset: Command) -> None:
@@ -234,6 +289,51 @@ KEEP_IN = "[[keep_in]]\nnormals = {}\noffsets_m = {}\n[orbit]"
             "[orbit]",
             "checks_between_periods = 1\n[orbit]",
             "checks_between_periods: must be 0 with",
+        ),
+        (
+            "rendezvous-2021",
+            "[orbit]",
+            KEEP_IN.format("[[0, 0, 0]]", "[1]"),
+            "normals: must have no row of zeros",
+        ),
+        (
+            "rendezvous-2021",
+            "[orbit]",
+            KEEP_IN.format(
+                "[[1, 0, 0]]", "[1]\nvelocity_normals_s = []\nfrom_period = 3\nuntil_period = 2"
+            ),
+            "until_period: must be at least from_period, 3",
+        ),
+        (
+            "rendezvous-2021",
+            "[orbit]",
+            "[[control_limits]]\nnormals = [[1, 0, 0]]\noffsets = [-1.0]\nfrom_period = 1\n[orbit]",
+            "the limits on the controls leave no room at t = 1",
+        ),
+        ("approach-cone", "acceleration_m_s2 = 0.01\n", "", "acceleration_m_s2: is missing"),
+        (
+            "approach-cone",
+            "periods = 12",
+            "periods = 12\nmax_impulse_m_s = 1.0",
+            'max_impulse_m_s: needs engine = "impulses"',
+        ),
+        (
+            "approach-cone",
+            "periods = 12",
+            'periods = 12\nengine = "impulses"',
+            "max_impulse_m_s: is missing",
+        ),
+        (
+            "two-impulses",
+            "velocity_m_s = 100.0",
+            "velocity_m_s = 100.0\ncontrol = 1.0",
+            "engine: impulses are limited by max_impulse_m_s",
+        ),
+        (
+            "two-impulses",
+            "max_impulse_m_s = 100.0",
+            "max_impulse_m_s = 1e8",
+            "max_impulse_m_s: full control over a period changes",
         ),
     ],
 )

@@ -9,7 +9,7 @@ from scipy.optimize import linprog
 
 from infoset.arrays import Floats
 from infoset.geometry.zonotope import Zonotope
-from infoset.rendezvous.reachability import AffinePlan, OutputProblem, with_impulses
+from infoset.rendezvous.reachability import AffinePlan, OutputProblem, impulsive
 from infoset.rendezvous.relative_motion import ClohessyWiltshire
 
 PLANE = [0, 1, 3, 4]
@@ -24,7 +24,7 @@ def arch(
 ) -> OutputProblem:
     """Planar motion in a geostationary orbit, in m and minutes; position is measured."""
     motion = ClohessyWiltshire(0.00876276 / 2.0)
-    transition, control = with_impulses(motion, periods, period_min)
+    transition, control = impulsive(motion, periods, period_min)
     return OutputProblem(
         transition[:, PLANE][:, :, PLANE],
         control[:, PLANE][:, :, :2],

@@ -21,10 +21,10 @@ from infoset.rendezvous.reachability import (
     affine_plan,
     answered_plan,
     feedback_plan,
+    impulsive,
     information_radius,
     lower_bound,
     multipliers,
-    with_impulses,
 )
 from infoset.rendezvous.relative_motion import EllipticOrbit, TschaunerHempel
 from tests.rendezvous.reachability.arch_rendezvous import (
@@ -210,7 +210,7 @@ def test_noise_changes_the_guarantee_as_known(noise_m: float, affine: float, val
 def test_bound_is_attained_in_low_orbit_and_on_an_elliptic_orbit(eccentricity: float) -> None:
     # n = 6 = 2 m, position known to 1 m, impulses of 1 mm/s error, a start known to 20 m, 5 cm/s.
     orbit = EllipticOrbit.of_size(6778137.0, eccentricity, 3.986004418e14)
-    transition, control = with_impulses(TschaunerHempel(orbit), 6, 60.0)
+    transition, control = impulsive(TschaunerHempel(orbit), 6, 60.0)
     start = np.array([0.0, -1000.0, 0.0, 0.0, 0.0, 0.0])
     error = np.repeat([20.0, 0.05], 3)
     problem = OutputProblem(
