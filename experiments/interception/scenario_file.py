@@ -12,7 +12,7 @@ from infoset.experiments.common.input_file import read_file
 from infoset.experiments.common.options import choice
 from infoset.experiments.common.units import duration_text, length_text
 from infoset.experiments.interception.strategies import is_own
-from infoset.experiments.interception.study import percent, wrong_images_text
+from infoset.experiments.interception.study import percent, some_wrong_images
 from infoset.guidance import strategy_names
 from infoset.model import Model, SetModel
 from infoset.sim.closed_form import PossibleMiss
@@ -238,7 +238,7 @@ def flight_facts(scenario: Scenario) -> list[str]:
     errors = "errors at their bounds"
     wrong_images = scenario.set_model.wrong_images
     if wrong_images:
-        errors += f" and {wrong_images_text(wrong_images)}"
+        errors += f" and {some_wrong_images(wrong_images)}"
     if possible.images_m is not None:
         lines.append(
             f"miss that the images alone leave possible, with {errors} (closed form): up to "

@@ -396,20 +396,12 @@ def wrong_images_text(results: Results, scenario: Scenario) -> str:
     if results.wrong_image_proved_s is None or results.wrong_image_s is None:
         return ""
     text = (
-        f"at most {some_wrong_images(scenario)} assumed; proved in "
+        f"at most {some_wrong_images(scenario.information_set.wrong_images)} assumed; proved in "
         f"{results.wrong_image_proved_s.count()} of {some_runs(len(results))}"
     )
     if scenario.information_set.wrong_images == 1:
         text += f", named in {results.wrong_image_s.count()}"
     return text
-
-
-def some_wrong_images(scenario: Scenario) -> str:
-    """Return the number of wrong images that the set allows for as text: 1 wrong image."""
-    number = scenario.information_set.wrong_images
-    if number == 1:
-        return "1 wrong image"
-    return f"{number} wrong images"
 
 
 def max_guarantee_m(results: Results) -> float | None:
@@ -420,7 +412,7 @@ def max_guarantee_m(results: Results) -> float | None:
     return float(bounds.max())
 
 
-def wrong_images_text(count: int) -> str:
+def some_wrong_images(count: int) -> str:
     """Return a number of wrong images as text: 1 wrong image, 2 wrong images."""
     if count == 1:
         return "1 wrong image"

@@ -49,6 +49,16 @@ class Reach(FileOptions):
             ),
         ),
     ] = False
+    backward: Annotated[
+        bool,
+        typer.Option(
+            "--backward",
+            help=(
+                "Also compute the backward sets: the states at each time from which the terminal "
+                "state of minimum norm can be reached."
+            ),
+        ),
+    ] = False
     seed: Seed = 0
     csv: Csv = None
     html: Html = None

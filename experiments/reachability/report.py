@@ -76,9 +76,9 @@ class ReachabilityReport:
     """Results of one command.
 
     `min_periods` is the minimum number of periods, up to `searched_periods`, in which the terminal
-    norm is zero. `forward` and `tube`, shape (T + 1, 6, 2), are bounds of the sets, `ranges`, shape
-    (T, 3, 2), those of the optimal controls. `flight` is the simulation in closed loop, `noisy` are
-    those with navigation errors.
+    norm is zero. `forward`, `tube` and `backward`, shape (T + 1, 6, 2), are bounds of the sets,
+    `ranges`, shape (T, 3, 2), those of the optimal controls. `flight` is the simulation in closed
+    loop, `noisy` are those with navigation errors.
     """
 
     rendezvous: Rendezvous
@@ -87,6 +87,7 @@ class ReachabilityReport:
     searched_periods: int
     forward: Floats
     tube: Floats
+    backward: Floats | None
     ranges: Floats
     members: tuple[ChosenControl, ...]
     flight: ClosedLoopFlight | None
@@ -199,6 +200,7 @@ def report_json(report: ReachabilityReport) -> dict[str, object]:
         },
         **solution_json(solution, report.min_periods, (report.forward, report.tube), report.ranges),
         "min_periods_searched": report.searched_periods,
+        "backward": report.backward,
         "controls": [_member_json(rendezvous, member) for member in report.members],
         "replan": report.flight and _flight_json(rendezvous, report.flight),
         "replan_noisy": [_flight_json(rendezvous, flight) for flight in report.noisy],
@@ -275,15 +277,20 @@ def report_lines(report: ReachabilityReport) -> Iterator[Part]:
     if not rendezvous.has_impulses:
         control = f"u is in units of {rendezvous.unit_m_s2:g} m/s^2"
     yield f"units: {NORM} is the norm of a state in m and m/s; {control}"
-    table = number_table("period", *(f"{axis} of the tube\nm" for axis in "xyz"))
-    for t in range(1, solution.problem.periods + 1):
-        table.add_row(
-            str(t), *(f"{low:.1f} .. {high:.1f}" for low, high in report.tube[t, :3] + 0.0)
-        )
-    yield from ("", table)
+    yield from ("", _sets_table("tube", report.tube, first=1))
+    if report.backward is not None:
+        yield from ("", _sets_table("backward set", report.backward, first=0))
     if report.members:
         yield from ("", _members_table(report))
     yield from _flight_lines(report)
+
+
+def _sets_table(name: str, bounds: Floats, first: int) -> Table:
+    """Return the ranges of the positions in sets, from a period on."""
+    table = number_table("period", *(f"{axis} of the {name}\nm" for axis in "xyz"))
+    for t in range(first, len(bounds)):
+        table.add_row(str(t), *(f"{low:.1f} .. {high:.1f}" for low, high in bounds[t, :3] + 0.0))
+    return table
 
 
 def _flight_lines(report: ReachabilityReport) -> Iterator[str]:

@@ -40,6 +40,7 @@ from infoset.rendezvous.reachability import (
     NonlinearMotion,
     NoRobustPlanError,
     SetKind,
+    backward_bounds,
     feedback_plan,
     min_periods,
     optimal_controls,
@@ -66,6 +67,7 @@ def solve_rendezvous(
     progress(0.3)
     forward, tube = (solution.sets.bounds(kind) for kind in (SetKind.FORWARD, SetKind.TUBE))
     progress(0.5)
+    backward = backward_bounds(solution.optimal) if options.backward else None
     ranges = solution.optimal.ranges()
     controls = select_controls(solution, select, options.seed)
     members = fly_members(rendezvous, [*controls], np.array([*controls.values()]))
@@ -88,6 +90,7 @@ def solve_rendezvous(
         searched.periods,
         forward,
         tube,
+        backward,
         ranges,
         members,
         flight,

@@ -47,9 +47,10 @@ class SystemReport:
 
 def solve_system(system: ReachableSystem, options: Reach, begin: BeginProgress) -> SystemReport:
     """Return the sets and the selected optimal controls with their motions."""
-    if options.replan or options.html is not None:
+    if options.replan or options.backward or options.html is not None:
         raise InputError(
-            "--replan and --html: are for problems of kind reachable-rendezvous; omit them here"
+            "--replan, --backward and --html: are for problems of kind reachable-rendezvous; omit "
+            "them here"
         )
     select = options.select or DEFAULT_SELECTION[Engine.HELD]
     selection(select)  # a mistake is found before anything is computed

@@ -13,6 +13,7 @@ from infoset.rendezvous.reachability.answer import (
     lower_bound,
     multipliers,
 )
+from infoset.rendezvous.reachability.backward import backward_bounds
 from infoset.rendezvous.reachability.closed_loop import ClosedLoopFlight, replan
 from infoset.rendezvous.reachability.guaranteed import affine_plan
 from infoset.rendezvous.reachability.motion import (
@@ -107,6 +108,7 @@ __all__ = [
     "affine_plan",
     "analytic_centre",
     "answered_plan",
+    "backward_bounds",
     "between_impulses",
     "between_periods",
     "chebyshev_centre",

@@ -147,17 +147,45 @@ def lift_with_states(block: StateBlock) -> Lifted:
     for t in range(1, periods + 1):
         response[t][:, width + (t - 1) * n : width + t * n] = np.eye(n)
 
-    equal = np.zeros((periods, n, total))
     levels = np.zeros((periods, n))
-    for t in range(periods):
-        equal[t] = response[t + 1] - block.transition[t] @ response[t]
-        equal[t][:, t * m : (t + 1) * m] = -block.control[t]
     levels[0] = block.transition[0] @ block.initial
 
     constraints = []
     for each in _state_constraints(block, free, response):
         constraints += [each.end, *each.within]
-    return _lifted(block, free, response, constraints, equal.reshape(-1, total), levels.ravel())
+    equal = _equations_of_motion(block, response)
+    return _lifted(block, free, response, constraints, equal, levels.ravel())
+
+
+def lift_from_any_start(block: StateBlock) -> Lifted:
+    """Return the set of `lift_with_states` for all starts: v = all controls, then x(0)..x(T)."""
+    periods = block.periods
+    n = block.size
+    width = periods * len(block.controls)
+    free = np.zeros((periods + 1, n))
+    states = np.eye((periods + 1) * n, width + (periods + 1) * n, width)
+    response = states.reshape(periods + 1, n, -1)
+
+    held = np.flatnonzero(np.isfinite(block.offsets[0]))
+    rows = block.normals[held] @ response[0]
+    constraints = [_Rows(rows, block.offsets[0, held], np.zeros(len(held), dtype=int), held)]
+    for each in _state_constraints(block, free, response):
+        constraints += [each.end, *each.within]
+    equal = _equations_of_motion(block, response)
+    return _lifted(block, free, response, constraints, equal, np.zeros(len(equal)))
+
+
+def _equations_of_motion(block: StateBlock, response: Floats) -> Floats:
+    """Return the rows x(t + 1) - A(t) x(t) - B(t) u(t), shape (T n, p), of states response[t] v.
+
+    The controls are the first of the p variables v.
+    """
+    m = len(block.controls)
+    equal = np.zeros_like(response[1:])
+    for t in range(block.periods):
+        equal[t] = response[t + 1] - block.transition[t] @ response[t]
+        equal[t][:, t * m : (t + 1) * m] = -block.control[t]
+    return np.asarray(equal.reshape(-1, response.shape[2]))
 
 
 class _PeriodConstraints(NamedTuple):

@@ -352,6 +352,17 @@ class StateBlock:
             control_offsets=self.control_offsets[:periods],
         )
 
+    def rest(self, start: int) -> StateBlock:
+        """Return the block that begins at time `start`, from 0 to T - 1, in the same state."""
+        return replace(
+            self,
+            transition=self.transition[start:],
+            control=self.control[start:],
+            offsets=self.offsets[start:],
+            between=None if self.between is None else self.between[start:],
+            control_offsets=self.control_offsets[start:],
+        )
+
 
 def _block(problem: ReachabilityProblem, members: Places) -> StateBlock:
     """Return the block of some members: indices of states, and of controls after all states."""

@@ -22,7 +22,7 @@ from infoset.experiments.common.figure_style import (
     subplots,
 )
 from infoset.experiments.common.screen import number
-from infoset.experiments.interception.study import wrong_images_text
+from infoset.experiments.interception.study import some_wrong_images
 from infoset.sim import Scenario
 from infoset.sim.bound.lower_bound import LowerBound
 from infoset.sim.bound.pair_of_motions import TruthPair, later_impulses
@@ -72,7 +72,7 @@ def draw_bound(
     title = "bound for all strategies"
     wrong_images = scenario.set_model.wrong_images
     if wrong_images:
-        title += f", {wrong_images_text(wrong_images)}"
+        title += f", {some_wrong_images(wrong_images)}"
     letters(panels, [title, f"{proof} the bound", "strategies and bound"])
     return figure
 

@@ -29,7 +29,7 @@ from infoset.experiments.interception.runs.shared import (
 )
 from infoset.experiments.interception.scenario_file import study_scenario
 from infoset.experiments.interception.strategies import chosen_strategies
-from infoset.experiments.interception.study import max_guarantee_m, wrong_images_text
+from infoset.experiments.interception.study import max_guarantee_m, some_wrong_images
 from infoset.guidance import Strategy
 from infoset.sim import Record, Results, Scenario
 from infoset.sim.bound.game_value import ValueReserve, value_reserve, why_no_value
@@ -376,7 +376,7 @@ def _bound_parts(
     )
     if model.wrong_images:
         line += (
-            f" with {wrong_images_text(model.wrong_images)} in a flight ({number(exact_m)} m "
+            f" with {some_wrong_images(model.wrong_images)} in a flight ({number(exact_m)} m "
             "without wrong images)"
         )
     yield line

@@ -73,7 +73,8 @@ def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
 
 def _wrong_image_line(record: Record) -> str:
     """Return whether a wrong image is proved, and the images one of which is wrong."""
-    head = f"at most {some_wrong_images(record.scenario)} assumed"
+    allowed = some_wrong_images(record.scenario.information_set.wrong_images)
+    head = f"at most {allowed} assumed"
     proved = record.result.wrong_image_proved_s
     if proved is None or not proved.count():
         return f"{head}; none is proved"

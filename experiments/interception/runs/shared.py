@@ -144,7 +144,7 @@ def allowance(scenario: Scenario) -> str | None:
     if model.pointing_error_rad:
         line += f", error of their direction at most {model.pointing_error_rad:g} rad"
     if model.wrong_images:
-        line += f"; at most {some_wrong_images(scenario)} in a flight"
+        line += f"; at most {some_wrong_images(scenario.information_set.wrong_images)} in a flight"
     return line
 
 

@@ -95,6 +95,19 @@ def test_impulses_are_drawn_as_stems_and_jumps() -> None:
     assert "u is an impulse at the start of a period, in m/s" in printed
 
 
+def test_backward_sets_are_written_and_printed(infoset: Command) -> None:
+    arguments = ("reach", "--backward", "--select", "energy", "--set", "bounds.control=0.2")
+    found = infoset.json(*arguments)
+    bounds = np.array(found["backward"])
+    assert bounds.shape == (5, 6, 2)
+    # The tube is inside.
+    for each in found["sets"]:
+        at_time = bounds[each["period"]]
+        assert (np.array(each["tube"]["min"]) >= at_time[:, 0] - 1e-5).all()
+        assert (np.array(each["tube"]["max"]) <= at_time[:, 1] + 1e-5).all()
+    assert "x of the backward set" in infoset(*arguments)[1]
+
+
 def test_samples_follow_the_seed() -> None:
     one, same, other = (
         COMMAND.report(Reach(select="samples:2", seed=seed)).members for seed in (1, 1, 2)
