@@ -10,7 +10,7 @@ import numpy as np
 from infoset.arrays import Flags, Floats
 from infoset.guidance.estimate import MissEstimate
 from infoset.guidance.situation import Situation
-from infoset.limits import Checked, NotNegative
+from infoset.limits import Checked, NotNegative, Positive
 from infoset.model import SetModel
 from infoset.sensors import BearingSensor, RangeSensor
 
@@ -47,6 +47,9 @@ class KalmanBank:
         Numbers (C, B) of lateral axes and engagements.
     is_augmented : bool
         Estimate the lateral acceleration of the target.
+    gate_sigma : float or None
+        Measurements are ignored whose difference from the expected value of the bank is more than
+        this number of its standard deviations; None ignores none.
 
     Attributes
     ----------
@@ -92,7 +95,10 @@ class KalmanBank:
     acceleration.
     """
 
-    def __init__(self, shape: tuple[int, int], is_augmented: bool = False) -> None:
+    def __init__(
+        self, shape: tuple[int, int], is_augmented: bool = False, gate_sigma: float | None = None
+    ) -> None:
+        self._gate_sigma = gate_sigma
         size = 5 if is_augmented else 4
         self.mean = np.zeros((*shape, MEMBERS, size))
         self.covariance = np.zeros((*shape, MEMBERS, size, size))
@@ -264,7 +270,9 @@ class KalmanBank:
         """Update each filter with one scalar measurement, in Joseph's form, and its weight."""
         new = situation.is_new(sensor)
         innovation = np.where(new, situation.measured[sensor], 0.0)[..., None] - expected
-        new = new[:, None]
+        if self._gate_sigma is not None:
+            new = new & self._passes_gate(self._gate_sigma, innovation, gradient, variance)
+        new = new[..., None]
         precise = self._is_precise(gradient, variance)
         if precise.any():
             self._measure_precisely(new & precise, innovation, expected, gradient, variance)
@@ -282,6 +290,18 @@ class KalmanBank:
         self.covariance += variance[..., None, None] * gain[..., :, None] * gain[..., None, :]
         likelihood = 0.5 * (innovation**2 / total + np.log(total))
         self.log_weight = self.log_weight - np.where(new, likelihood, 0.0)
+
+    def _passes_gate(
+        self, gate_sigma: float, innovation: Floats, gradient: Floats, variance: Floats
+    ) -> Flags:
+        """Return whether a measurement is near the expected value of the bank, shape (C, B)."""
+        of_state = np.einsum("...i,...ij,...j->...", gradient, self.covariance, gradient)
+        weight = self._weights()
+        mean = (weight * innovation).sum(axis=-1)
+        apart = (innovation - mean[..., None]) ** 2
+        # Rounding may leave a negative variance of the state.
+        total = (weight * (np.maximum(of_state, 0.0) + variance + apart)).sum(axis=-1)
+        return np.asarray(mean**2 <= gate_sigma**2 * total)
 
     def _measure_precisely(
         self, where: Flags, innovation: Floats, expected: Floats, gradient: Floats, variance: Floats
@@ -369,6 +389,8 @@ class Kalman(Checked):
     last_s : float
         Time to go below which there is no dead zone, s. With a cut-off, the time before the
         cut-off.
+    gate_sigma : float or None
+        Innovation gate of the filters in standard deviations; None uses all measurements.
 
     Notes
     -----
@@ -383,12 +405,13 @@ class Kalman(Checked):
 
     dead_zone: NotNegative = 1.0
     last_s: NotNegative = 3.0
+    gate_sigma: Positive | None = None
 
     name: ClassVar[str] = "kalman"
 
     def start(self, shape: tuple[int, int]) -> KalmanBank:
         """Start with empty filters; the first step sets their prior."""
-        return KalmanBank(shape)
+        return KalmanBank(shape, gate_sigma=self.gate_sigma)
 
     def decide(self, situation: Situation, state: KalmanBank) -> Floats:
         """Update the filters with the measurements of this step, and return the impulses, m/s."""

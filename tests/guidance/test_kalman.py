@@ -45,12 +45,14 @@ def box_of(offset_m: float, speed_m_s: float, range_m: float) -> StateBox:
     )
 
 
-def after(box: StateBox, angles_rad: Floats) -> tuple[KalmanBank, Situation]:
+def after(
+    box: StateBox, angles_rad: Floats, gate_sigma: float | None = None
+) -> tuple[KalmanBank, Situation]:
     """Return the bank after equal angles of both axes, one a step, without impulses, and its last
     situation.
     """
     model = set_model(box)
-    bank = KalmanBank((2, 1))
+    bank = KalmanBank((2, 1), gate_sigma=gate_sigma)
     view = InformationSet(model).view()
     for step, angle in enumerate(angles_rad):
         now = Situation(
@@ -88,6 +90,22 @@ def test_two_exact_angles_give_the_motion_at_a_known_range() -> None:
     to_go_s = RANGE_M / CLOSING_SPEED - STEP_S
     np.testing.assert_allclose(bank.estimate(now).miss_m, position_m - 7.25 * to_go_s, rtol=1e-8)
     assert (bank.estimate(now).deviation_m < 1e-3).all()
+
+
+def test_gate_ignores_a_wrong_angle() -> None:
+    box = box_of(5e3, 50.0, 0.0)
+    angles = line(1234.5, -7.25, RANGE_M, 2)
+    right, _ = after(box, angles, gate_sigma=4.0)
+    np.testing.assert_allclose(right.mean, after(box, angles)[0].mean, rtol=1e-12)
+
+    # The velocity is known to within 50 m/s: 20 times as much is wrong.
+    angles[1] += 20.0 * 50.0 * STEP_S / RANGE_M
+    gated, _ = after(box, angles, gate_sigma=4.0)
+    first, _ = after(box, angles[:1])
+    predicted_m = first.mean[..., Z] + STEP_S * first.mean[..., VZ]
+    np.testing.assert_allclose(gated.mean[..., Z], predicted_m, rtol=1e-9)
+    without, _ = after(box, angles)
+    assert (np.abs(without.mean[..., Z] - predicted_m) > 500.0 * STEP_S).all()
 
 
 def test_exact_angle_conditions_the_prior_on_a_line_of_sight() -> None:
