@@ -72,12 +72,14 @@ class LeastEffort:
         view = situation.information
         e = situation.closing_speed_m_s
         most = situation.thruster.max_impulse_m_s
-        pending = situation.pending_m(view.ranges_m / e)
+        ranges_m = view.ranges_m
+        feasible = view.feasible
+        pending = situation.pending_m(ranges_m / e)
         minimum, maximum = view.predicted_miss_by_section_m()
-        lower = _between(np.where(view.feasible, minimum - pending, NO_DEMAND_M))
-        upper = _between(np.where(view.feasible, maximum - pending, -NO_DEMAND_M))
+        lower = _between(np.where(feasible, minimum - pending, NO_DEMAND_M))
+        upper = _between(np.where(feasible, maximum - pending, -NO_DEMAND_M))
 
-        ranges = _between(view.ranges_m)
+        ranges = _between(ranges_m)
         fastest = max(e, *(-vx for vx in view.model.bounds.vx_m_s)) / e
         authority = correctable_later_m(situation, ranges) / fastest
         to_go_s = range_at_impulse(ranges, e, situation.lead_s) / e
@@ -127,9 +129,13 @@ def _between(values: Floats) -> Floats:
 
     The shape of the sections is (..., B, S).
     """
-    share = np.arange(PARTS) / PARTS
-    inner = values[..., :-1, None] * (1.0 - share) + values[..., 1:, None] * share
-    return np.concatenate([inner.reshape(*values.shape[:-1], -1), values[..., -1:]], axis=-1)
+    between = np.empty((*values.shape[:-1], PARTS * (values.shape[-1] - 1) + 1))
+    between[..., -1] = values[..., -1]
+    # A part at a time is faster than all parts in one short inner axis.
+    for part in range(PARTS):
+        share = part / PARTS
+        between[..., part:-1:PARTS] = values[..., :-1] * (1.0 - share) + values[..., 1:] * share
+    return between
 
 
 def balanced(falling: Floats, rising: Floats, slopes: Floats, most: float) -> tuple[Floats, Floats]:

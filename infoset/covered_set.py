@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from infoset.arrays import Flags, Floats, some
 from infoset.engine.predicted_miss import ExtremePoints, PredictedMiss
-from infoset.engine.set_state import SetStatus
+from infoset.engine.set_state import SetState, SetStatus
 from infoset.information_set import InformationSet, InformationSetView
 from infoset.limits import COUNT, flags, real_array, shown
 from infoset.model import SetModel
@@ -54,6 +54,7 @@ class CoveredSetView(InformationSetView):
         self.left_out = left_out
         self._members = members
         self._suspects = suspects
+        self._batch = members.batch // len(left_out)
 
     def copy(self) -> CoveredSet:
         """Return an independent set that starts from the state of this one."""
@@ -65,25 +66,35 @@ class CoveredSetView(InformationSetView):
     @property
     def batch(self) -> int:
         """Number of engagements B."""
-        return self._members.batch // len(self.left_out)
+        return self._batch
 
     def _by_member(self, values: NDArray[Any], axis: int = 0) -> NDArray[Any]:
         """Return an array with an axis of B R rows as one with two axes, B and R."""
-        shape = (*values.shape[:axis], self.batch, len(self.left_out), *values.shape[axis + 1 :])
+        shape = (*values.shape[:axis], self._batch, len(self.left_out), *values.shape[axis + 1 :])
         return values.reshape(shape)
 
     def _members_status(self) -> NDArray[np.int64]:
         """Values of `SetStatus` of the members, shape (B, R)."""
-        return np.asarray(self._by_member(self._members._state.status), dtype=np.int64)
+        return np.asarray(self._by_member(self._state.status), dtype=np.int64)
+
+    @property
+    def emptied(self) -> Flags:
+        """Whether each member became empty before a label left, shape (B, R)."""
+        return np.asarray(self._by_member(self._members.inconsistent), dtype=bool)
 
     @property
     def refuted(self) -> Flags:
-        """Whether each member became empty before a label left, shape (B, R).
+        """Whether it is proved that each member became empty before a label left, shape (B, R).
 
         A wrong image outside the classes that the member leaves out is then proved, if no other
         assumption is broken. After a split, members that are not in use count as refuted.
         """
-        return np.asarray(self._by_member(self._members.inconsistent), dtype=bool)
+        return self.emptied & ~self._unproved
+
+    @property
+    def _unproved(self) -> Flags:
+        """Whether the emptiness of each member, if it is empty, is not proved, shape (B, R)."""
+        return np.asarray(self._by_member(self._state.sections.unproved), dtype=bool)
 
     @property
     def proof_step(self) -> MaskedIntegers:
@@ -100,14 +111,14 @@ class CoveredSetView(InformationSetView):
         There are none before a wrong image is proved, and if all members are refuted.
         """
         self._need_engagement(engagement)
-        return self._suspects.steps(engagement, self._members._state)
+        return self._suspects.steps(engagement, self._state)
 
     def groups(self, engagement: int = 0) -> dict[int, tuple[int, ...]] | None:
         """Return the steps of the images that each member leaves out that is not refuted, after a
         split; None before, when members leave out the classes in `left_out`.
         """
         self._need_engagement(engagement)
-        return self._suspects.groups(engagement, self._members._state)
+        return self._suspects.groups(engagement, self._state)
 
     @property
     def status(self) -> list[SetStatus]:
@@ -122,14 +133,14 @@ class CoveredSetView(InformationSetView):
     @property
     def inconsistent(self) -> Flags:
         """Whether all members became empty: more images are wrong than assumed, shape (B,)."""
-        return np.asarray(self.refuted.all(axis=1))
+        return np.asarray(self.emptied.all(axis=1))
 
     @property
     def inconsistency(self) -> tuple[MaskedIntegers, MaskedFloats]:
         """Step at which the last member became empty, and its label closest to feasible, m; masked
         if some member never did.
         """
-        state = self._members._state
+        state = self._state
         steps = np.asarray(self._by_member(state.lost_step))
         labels = np.asarray(self._by_member(state.lost_label))
         last = steps.argmax(axis=1)
@@ -142,19 +153,15 @@ class CoveredSetView(InformationSetView):
 
     def _side_by_side(self, values: NDArray[Any], gap: bool | float) -> NDArray[Any]:
         """Return an array of sections, shape (..., B R, S), as (..., B, R (S + 1))."""
-        ends = np.full((*values.shape[:-1], 1), gap, dtype=values.dtype)
-        padded = np.concatenate((values, ends), axis=-1)
-        return padded.reshape(*values.shape[:-2], self.batch, -1)
+        padded = np.empty((*values.shape[:-1], values.shape[-1] + 1), dtype=values.dtype)
+        padded[..., :-1] = values
+        padded[..., -1] = gap
+        return padded.reshape(*values.shape[:-2], self._batch, -1)
 
     @property
     def feasible(self) -> Flags:
         """Whether each stored section is not empty, shape (B, R (S + 1))."""
-        return np.asarray(self._side_by_side(self._members.feasible & self._counted(), False))
-
-    def _counted(self) -> Flags:
-        """Whether each member counts, shape (B R, 1): a refuted one that was stopped does not."""
-        stopped = self._members._state.status == SetStatus.STOPPED.value
-        return np.asarray(~(stopped & self._members.inconsistent))[:, None]
+        return np.asarray(self._side_by_side(self._members.feasible, False))
 
     @property
     def labels_m(self) -> Floats:
@@ -182,70 +189,48 @@ class CoveredSetView(InformationSetView):
 
     def min_and_max_alpha(self) -> tuple[Floats, Floats, Floats, Floats]:
         """Return the minimum and the maximum angle of all members, and their ranges."""
-        minimum, maximum, of_min, of_max = (
-            self._by_member(values, axis=1) for values in self._members.min_and_max_alpha()
-        )
+        minimum, maximum, of_min, of_max = self._by_member(self._state.extreme_angles(), axis=2)
         counts = self._nonempty_members()
-        lowest = np.where(counts, minimum, np.inf).argmin(axis=2)[..., None]
-        highest = np.where(counts, maximum, -np.inf).argmax(axis=2)[..., None]
-
-        def chosen(values: NDArray[Any], member: NDArray[np.intp]) -> Floats:
-            picked = np.take_along_axis(values, member, axis=2)[..., 0]
-            return np.asarray(np.where(counts.any(axis=1), picked, 0.0))
-
+        lowest = np.where(counts, minimum, np.inf).argmin(axis=2)
+        highest = np.where(counts, maximum, -np.inf).argmax(axis=2)
+        # Members without a nonempty section have zeros.
         return (
-            chosen(minimum, lowest),
-            chosen(maximum, highest),
-            chosen(of_min, lowest),
-            chosen(of_max, highest),
+            _of_member(minimum, lowest),
+            _of_member(maximum, highest),
+            _of_member(of_min, lowest),
+            _of_member(of_max, highest),
         )
 
     def _nonempty_members(self) -> Flags:
-        """Whether each member has a nonempty section that counts, shape (B, R)."""
-        nonempty = np.asarray((self._members.feasible & self._counted()).any(axis=1))
-        return self._by_member(nonempty)
+        """Whether each member has a nonempty section, shape (B, R)."""
+        return self._by_member(np.asarray(self._members.feasible.any(axis=1)))
 
     def predicted_miss(self, pending: Sequence[tuple[float, Floats]] = ()) -> PredictedMiss:
         """Return the smallest interval that contains the possible misses of all members."""
         members = len(self.left_out)
         repeated = [(time_s, np.repeat(impulse, members, axis=1)) for time_s, impulse in pending]
-        miss = self._members.predicted_miss(repeated)
-        counts = self._nonempty_members()
-        lower = np.where(counts, self._by_member(miss.lower_m, axis=1), np.inf)
-        upper = np.where(counts, self._by_member(miss.upper_m, axis=1), -np.inf)
-        lowest = lower.argmin(axis=2)[..., None]
-        highest = upper.argmax(axis=2)[..., None]
-        exists = np.asarray(counts.any(axis=1))
-
-        def chosen(values: Floats, member: NDArray[np.intp]) -> Floats:
-            picked = np.take_along_axis(self._by_member(values, axis=1), member, axis=2)[..., 0]
-            return np.asarray(np.where(exists, picked, 0.0))
-
-        def points(of: ExtremePoints, member: NDArray[np.intp]) -> ExtremePoints:
-            return ExtremePoints(
-                chosen(of.alpha_rad, member),
-                chosen(of.omega_rad_s, member),
-                chosen(of.range_m, member),
-            )
-
+        exists, ends = self._state.widest(repeated)
+        counts = self._by_member(exists)
+        # An end is the predicted miss, and the state that reaches it; zeros without a section.
+        lower_ends, upper_ends = self._by_member(np.moveaxis(ends, 2, 0), axis=2)
+        lowest = np.where(counts, lower_ends[..., 0], np.inf).argmin(axis=2)
+        highest = np.where(counts, upper_ends[..., 0], -np.inf).argmax(axis=2)
+        lower = _of_member(lower_ends, lowest)
+        upper = _of_member(upper_ends, highest)
         return PredictedMiss(
-            exists,
-            chosen(miss.lower_m, lowest),
-            chosen(miss.upper_m, highest),
-            points(miss.lower_point, lowest),
-            points(miss.upper_point, highest),
+            np.asarray(counts.any(axis=1)),
+            lower[..., 0],
+            upper[..., 0],
+            ExtremePoints(lower[..., 1], lower[..., 2], lower[..., 3]),
+            ExtremePoints(upper[..., 1], upper[..., 2], upper[..., 3]),
         )
 
     def predicted_miss_by_section_m(self) -> tuple[Floats, Floats]:
         """Return minimum and maximum predicted miss of each section, m, each (C, B, R (S + 1));
         zeros if it is empty.
         """
-        feasible = self.feasible
-        lower, upper = (
-            np.where(feasible, self._side_by_side(values, 0.0), 0.0)
-            for values in self._members.predicted_miss_by_section_m()
-        )
-        return lower, upper
+        lower, upper = self._members.predicted_miss_by_section_m()
+        return self._side_by_side(lower, 0.0), self._side_by_side(upper, 0.0)
 
     def predicted_miss_by_member(self) -> tuple[Floats, Floats, Flags]:
         """Return minimum and maximum predicted miss of each member, m, each (C, B, R), and where
@@ -275,10 +260,11 @@ class CoveredSetView(InformationSetView):
 class CoveredSet(CoveredSetView, InformationSet):
     """Information sets of a batch of engagements in which at most q images of a flight are wrong.
 
-    It has the methods of `InformationSet`. A member that becomes empty before a label has left is
-    refuted, and stops if another one is not. For q = 1 the others are then split into members that
-    leave out as few images as possible, see `Suspects`. If all are refuted, more than q images are
-    wrong, and the last ones recover as an `InformationSet` does.
+    It has the methods of `InformationSet`. A member that becomes empty before a label of it has
+    left is refuted, and stays empty if another one lives, which tracks or has labels that have
+    left. For q = 1 the others are then split into members that leave out as few images as possible,
+    see `Suspects`. If none lives, more than q images are wrong, and the members that became empty
+    last recover as an `InformationSet` does.
 
     Parameters
     ----------
@@ -301,7 +287,9 @@ class CoveredSet(CoveredSetView, InformationSet):
         COUNT.need("batch", batch)
         left_out = classes_left_out(model.wrong_images, model.classes)
         ordinary = replace(model, wrong_images=0, image_classes=None)
-        members = InformationSet(ordinary, batch * len(left_out), guarantee=guarantee)
+        members = InformationSet.__new__(InformationSet)
+        state = SetState(ordinary, batch * len(left_out), guarantee, members=len(left_out))
+        SetQueries.__init__(members, state)
         CoveredSetView.__init__(self, members, model, left_out, Suspects(batch, left_out))
 
     def view(self) -> InformationSetView:
@@ -309,15 +297,22 @@ class CoveredSet(CoveredSetView, InformationSet):
         return CoveredSetView(self._members, self.model, self.left_out, self._suspects)
 
     def guaranteed_miss(self) -> tuple[Floats, Flags]:
-        """Return the guaranteed miss: the maximum over the members that are not refuted."""
-        phi_m, exists = self._members.guaranteed_miss()
-        exists_of = np.asarray(self._by_member(exists), dtype=bool)
-        phi_of = np.where(exists_of, self._by_member(phi_m), 0.0)
-        return np.asarray(phi_of.max(axis=1)), np.asarray(exists_of.any(axis=1))
+        """Return the guaranteed miss: the maximum over the members that did not become empty before
+        a label of them left.
+
+        It does not exist if it is not proved that each of the others is empty.
+        """
+        state = self._state
+        if state.phi is None:
+            return np.zeros(self.batch), np.zeros(self.batch, dtype=bool)
+        # No label of an emptied member has left, unless all are empty and some have recovered.
+        phi_m, exists = state.phi.bound(state.table, state.history)
+        is_proved = ~(self.emptied & self._unproved).any(axis=1)
+        return phi_m, np.asarray(exists & is_proved & ~self.inconsistent)
 
     def measure_angle(self, alpha_rad: ArrayLike, where: ArrayLike = True) -> None:
         """Cut the members that use this image. Its number is the number of periods so far."""
-        state = self._members._state
+        state = self._state
         every = self.model.steps_in(self.model.angle_sensor.period_s)
         image_class = (state.elapsed // every) % self.left_out.shape[1]
         wanted = self._where(where)
@@ -326,8 +321,8 @@ class CoveredSet(CoveredSetView, InformationSet):
         uses = ~self.left_out[:, image_class] | self._suspects.is_split[:, None]
         active = wanted[:, None] & uses
         measured = real_array("alpha_rad", alpha_rad, (len(self.axes), self.batch))
-        self._members.measure_angle(self._lateral_of_members(measured), active.ravel())
-        self._stop_refuted()
+        self._state.measure_angle(self._lateral_of_members(measured), active.ravel())
+        self._split_if_refuted()
 
     def measure_range(
         self,
@@ -336,6 +331,7 @@ class CoveredSet(CoveredSetView, InformationSet):
         where: ArrayLike = True,
         *,
         alpha_rad: ArrayLike | None = None,
+        wrong_measurements: int = 0,
     ) -> None:
         """Remove the ranges that contradict a range measurement.
 
@@ -348,8 +344,9 @@ class CoveredSet(CoveredSetView, InformationSet):
             np.repeat(np.broadcast_to(measured, (self.batch,)), len(self.left_out)),
             relative_error,
             self._where_of_members(where),
+            wrong_measurements=wrong_measurements,
         )
-        self._stop_refuted()
+        self._split_if_refuted()
 
     def measure_rate(
         self, omega_rad_s: ArrayLike, error_rad_s: float, where: ArrayLike = True
@@ -366,7 +363,7 @@ class CoveredSet(CoveredSetView, InformationSet):
     def shift(self, impulse_m_s: ArrayLike, where: ArrayLike = True) -> None:
         """Shift every section of every member by an impulse."""
         impulse = real_array("impulse_m_s", impulse_m_s, (len(self.axes), self.batch))
-        self._members.shift(self._lateral_of_members(impulse), self._where_of_members(where))
+        self._state.shift(self._lateral_of_members(impulse), self._where_of_members(where))
 
     def drop_below_threshold(self) -> Flags:
         """Remove the sections whose range will be below the threshold after the next step.
@@ -376,9 +373,7 @@ class CoveredSet(CoveredSetView, InformationSet):
         ndarray of bool, shape (B, R (S + 1))
             Stored sections that were removed.
         """
-        counted = self._counted()
-        removed = self._members.drop_below_threshold() & counted
-        return np.asarray(self._side_by_side(removed, False))
+        return np.asarray(self._side_by_side(self._state.drop_below_threshold(), False))
 
     def sections_are_leaving(self) -> bool:
         """Return whether `drop_below_threshold` would remove a stored section now."""
@@ -394,9 +389,8 @@ class CoveredSet(CoveredSetView, InformationSet):
 
     def _lateral_of_members(self, values: Floats) -> Floats:
         """Return values of shape (C, B) for all members, (C, B R)."""
-        return np.repeat(
-            np.broadcast_to(values, (len(self.axes), self.batch)), len(self.left_out), axis=1
-        )
+        every = np.broadcast_to(values, (len(self.axes), self.batch))
+        return np.repeat(every, len(self.left_out), axis=1)
 
     def _where(self, where: ArrayLike) -> Flags:
         return np.broadcast_to(flags("where", where, (self.batch,)), (self.batch,))
@@ -404,14 +398,10 @@ class CoveredSet(CoveredSetView, InformationSet):
     def _where_of_members(self, where: ArrayLike) -> Flags:
         return np.repeat(self._where(where), len(self.left_out))
 
-    def _stop_refuted(self) -> None:
-        """Stop the refuted members of engagements in which another member is not refuted."""
-        refuted = self.refuted
-        stopping = refuted & ~self.inconsistent[:, None]
-        if some(stopping):
-            self._members.stop(stopping.ravel())
-        if some(refuted):
-            self._suspects.update(self._members._state, self.model.wrong_images)
+    def _split_if_refuted(self) -> None:
+        """Note refuted members, and split the others of their engagements."""
+        if some(self.emptied):
+            self._suspects.update(self._state, self.model.wrong_images)
 
 
 def classes_left_out(wrong_images: int, image_classes: int) -> Flags:
@@ -421,6 +411,12 @@ def classes_left_out(wrong_images: int, image_classes: int) -> Flags:
     for member, classes in enumerate(members):
         left_out[member, list(classes)] = True
     return left_out
+
+
+def _of_member(values: Floats, member: NDArray[np.intp]) -> Floats:
+    """Return the values, shape (C, B, R, ...), of one member for each axis and engagement."""
+    axes, engagements = member.shape
+    return np.asarray(values[np.arange(axes)[:, None], np.arange(engagements), member])
 
 
 def _status_of(members: list[int]) -> SetStatus:

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from infoset.arrays import Flags, Floats, some
 from infoset.engine.set_state import SetState
-from infoset.limits import COUNT, NOT_NEGATIVE, PART, flags, real_array, shown
+from infoset.limits import COUNT, NOT_NEGATIVE, PART, WHOLE, flags, real_array, shown
 from infoset.model import SetModel
 from infoset.set_queries import SetQueries
 
@@ -103,6 +103,7 @@ class InformationSet(InformationSetView):
         where: ArrayLike = True,
         *,
         alpha_rad: ArrayLike | None = None,
+        wrong_measurements: int = 0,
     ) -> None:
         """Keep the ranges that agree with a measurement: x_m/(1 + b) <= x <= x_m/(1 - b).
 
@@ -118,11 +119,15 @@ class InformationSet(InformationSetView):
             Angles measured at the same time. In the guaranteed model the measured distance is x /
             cos(alpha); without a measured angle, alpha is bounded by the maximum possible
             displacement across x.
+        wrong_measurements : int
+            Maximum number of measured ranges of a flight that may have any error; the same at all
+            of them.
 
         Raises
         ------
         TypeError, ValueError
-            If a value is not finite, the range is negative, or the error bound is not in [0, 1).
+            If a value is not finite, the range is negative, the error bound is not in [0, 1), or
+            the number of wrong measurements is not a whole number.
 
         Notes
         -----
@@ -130,13 +135,15 @@ class InformationSet(InformationSetView):
         unchanged.
         """
         PART.need("relative_error", relative_error)
+        WHOLE.need("wrong_measurements", wrong_measurements)
         measured = real_array("range_m", range_m, (self.batch,))
         if some(measured < 0.0):
             raise ValueError(f"range_m must not be negative: got {shown(range_m)}")
         alpha = None
         if alpha_rad is not None and self.model.is_guaranteed:
             alpha = self._lateral("alpha_rad", alpha_rad)
-        self._state.measure_range(measured, relative_error, alpha, self._where(where))
+        active = self._where(where)
+        self._state.measure_range(measured, relative_error, alpha, active, wrong_measurements)
 
     def measure_angle(self, alpha_rad: ArrayLike, where: ArrayLike = True) -> None:
         """Cut every section by a line-of-sight angle measurement: |alpha - alpha_m| <= a + h(x).

@@ -13,7 +13,7 @@ import copy
 import numpy as np
 
 from infoset.arrays import Flags
-from infoset.engine.set_state import SetState, SetStatus
+from infoset.engine.set_state import SetState
 
 
 class Suspects:
@@ -135,7 +135,11 @@ class Suspects:
             return
 
         while True:
-            free = [member for member in range(members) if member not in groups]
+            # A set that seems empty, but is not proved to be, is not used again: Phi is withheld.
+            doubtful = state.sections.unproved[first : first + members]
+            free = [
+                member for member in range(members) if member not in groups and not doubtful[member]
+            ]
             largest = max(groups, key=lambda member: len(groups[member]))
             images = groups[largest]
             if len(images) < 2 or not free:
@@ -145,22 +149,20 @@ class Suspects:
             middle = len(images) // 2
             halves = {free[0]: images[:middle]}
             halves[free[1] if len(free) > 1 else largest] = images[middle:]
-            nonempty = {}
-            for member, half in halves.items():
-                used = [self._events[image] for image in images if image not in half]
-                applies = state.history.applies[: state.history.events, first + largest].copy()
-                applies[used] = True
-                if state.replace(first + member, first + largest, applies):
-                    nonempty[member] = half
-                else:
-                    self._retire(first + member, state)
-
+            nonempty = self._replace(halves, images, first, first + largest, state)
+            is_kept = largest not in halves
+            if is_kept and any(doubtful[member] for member in halves if member not in nonempty):
+                # The group stays whole: one half is not proved to be empty.
+                for member in halves:
+                    state.retire(first + member)
+                break
             if not nonempty and len(groups) == 1:
                 # Every image is cleared: more than one is wrong, and the set goes on as it is.
                 state.refute(first + largest)
                 break
-            if largest not in halves:
-                self._retire(first + largest, state)
+
+            if is_kept:
+                state.retire(first + largest)
             del groups[largest]
             groups |= nonempty
 
@@ -168,7 +170,22 @@ class Suspects:
         self._groups[engagement] = groups
         self._refuted[engagement] = members - len(self._living(engagement, state))
 
-    def _retire(self, row: int, state: SetState) -> None:
-        """End a member whose images are cleared, or left out by other members."""
-        state.refute(row)
-        state.status[row] = SetStatus.STOPPED.value
+    def _replace(
+        self,
+        halves: dict[int, tuple[int, ...]],
+        images: tuple[int, ...],
+        first: int,
+        divided: int,
+        state: SetState,
+    ) -> dict[int, tuple[int, ...]]:
+        """Give each member of `halves` the set without its half of the `images` that the member in
+        row `divided` leaves out. Return those whose set is not empty.
+        """
+        left_out = state.history.applies[: state.history.events, divided].copy()
+        nonempty = {}
+        for member, half in halves.items():
+            applies = left_out.copy()
+            applies[[self._events[image] for image in images if image not in half]] = True
+            if state.replace(first + member, divided, applies):
+                nonempty[member] = half
+        return nonempty

@@ -4,7 +4,8 @@ Labels leave the set step by step as their range passes below the threshold. Phi
 (10) in docs/guarantee-miss.md over all of them: a search by branch and bound. The labels that leave
 in one step are divided into pieces, and `piece_bounds` bounds each piece. The piece with the
 maximum bound is divided further until an exact section reaches nearly as much; the other pieces
-need no more than their first bounds.
+need no more than their first bounds. If an engagement has several sets, Phi is the maximum over all
+of them, and one search.
 """
 
 from __future__ import annotations
@@ -75,17 +76,17 @@ class Leaving(NamedTuple):
 
 
 @pasted
-def list_leaving(leaving: Leaving, b: int, past: Past, pieces: Records) -> int:
-    """Write the labels of an engagement that leave in each step as one piece, whose bound is
-    infinite; return the number of pieces.
+def list_leaving(leaving: Leaving, b: int, past: Past, pieces: Records, count: int) -> int:
+    """Add the labels of a set that leave in each step as one piece, whose bound is infinite, to
+    `count` pieces; return the new count.
     """
-    count = ZERO
     for step in range(leaving.events.shape[0]):
         if leaving.near[step, b] > leaving.far[step, b]:
             continue
         piece = pieces[count]
         piece.near = leaving.near[step, b]
         piece.far = leaving.far[step, b]
+        piece.set = b
         piece.step = step
         piece.bound = np.inf
         count += 1
@@ -110,7 +111,6 @@ def worst_of(pieces: Records, count: int) -> int:
 @pasted
 def divide(
     i: int,
-    b: int,
     reached: float,
     leaving: Leaving,
     past: Past,
@@ -124,6 +124,7 @@ def divide(
     """
     near = pieces[i].near
     far = pieces[i].far
+    b = pieces[i].set
     step = pieces[i].step
     count -= 1
     pieces[i] = pieces[count]
@@ -141,6 +142,7 @@ def divide(
     before = count
     count = bound_pieces(feasible, replayed, window, outlines, pieces, count)
     for part in range(before, count):
+        pieces[part].set = b
         pieces[part].step = step
     return count, max(reached, max_exact_miss(replayed, reached, window, outlines))
 
@@ -153,34 +155,45 @@ def bound_all(
 
     It is minus infinity where no feasible label has left. A new piece has an infinite bound; the
     first division of each is not counted in `MAX_DIVIDED`. `pieces` has room for all pieces of an
-    engagement.
+    engagement, which has the same number of sets as all others.
     """
-    for b in range(phi.shape[0]):
-        select(past, b)
-        count = list_leaving(leaving, b, past, pieces)
+    members = leaving.near.shape[1] // phi.shape[0]
+    for engagement in range(phi.shape[0]):
+        count = ZERO
+        selected = ZERO
+        for b in range(members * engagement, members * (engagement + 1)):
+            select(past, b)
+            selected = b
+            count = list_leaving(leaving, b, past, pieces, count)
+
         divided = ZERO
         reached = -np.inf
-        phi[b] = -np.inf
+        phi[engagement] = -np.inf
         while count > 0:
             worst = worst_of(pieces, count)
             bound = pieces[worst].bound
             if bound < np.inf:
-                phi[b] = bound
+                phi[engagement] = bound
                 divided += 1
-                if bound <= TIGHT * reached or divided > MAX_DIVIDED:
+                if bound <= TIGHT * reached or divided > members * MAX_DIVIDED:
                     break
-            count, reached = divide(worst, b, reached, leaving, past, outlines, pieces, count)
+            if pieces[worst].set != selected:
+                selected = pieces[worst].set
+                select(past, selected)
+            count, reached = divide(worst, reached, leaving, past, outlines, pieces, count)
 
 
 class GuaranteedMiss:
     """Phi of a batch of engagements: an upper bound of the true miss over the labels that have left
     the set.
 
-    `speed_error` is the maximum |eta|, the relative error of the closing speed.
+    `batch` sets, `members` in a row for each engagement. `speed_error` is the maximum |eta|, the
+    relative error of the closing speed.
     """
 
-    def __init__(self, law: SectionLaw, batch: int, speed_error: float) -> None:
+    def __init__(self, law: SectionLaw, batch: int, speed_error: float, members: int = 1) -> None:
         self._law = law
+        self._members = members
         self._speed_error = speed_error
         steps = law.label_max / (law.closing_speed * law.step)
         self._group_steps = max(1, int(steps / GROUPS))
@@ -221,16 +234,16 @@ class GuaranteedMiss:
         self._leaving.append(Leaving(near, far, known, events, elapsed))
 
     def bound(self, laws: Laws, history: History) -> tuple[Floats, Flags]:
-        """Return Phi so far, m, and whether a label has left, both of shape (B,).
+        """Return Phi so far, m, and whether a label has left, for each engagement.
 
         The labels that have left are replayed from the start; the impulses that followed act on
         them. The time is linear in the number of events and in the number of the steps in which
         labels leave.
         """
-        batch = len(self._bounded_below)
+        engagements = len(self._bounded_below) // self._members
         channels = len(laws)
         windows = len(self._leaving)
-        phi = np.full(batch, -np.inf)
+        phi = np.full(engagements, -np.inf)
         if windows:
             outlines = Outlines(
                 labels=np.empty(MAX_LABELS),
@@ -239,7 +252,7 @@ class GuaranteedMiss:
                 supports=np.empty((4, MAX_LABELS)),
             )
             leaving = Leaving(*(np.stack(each) for each in zip(*self._leaving, strict=True)))
-            pieces = np.recarray(PIECES * (windows + MAX_DIVIDED), PIECE)
+            pieces = np.recarray(PIECES * (windows + MAX_DIVIDED) * self._members, PIECE)
             bound_all(leaving, past_of(history, laws), outlines, pieces, phi)
         exists = phi >= 0.0
         factor = (1.0 + self._speed_error) * (1.0 + SLACK)

@@ -150,15 +150,19 @@ def search_bracket(past: Past) -> bool:
 
     Return whether the middle label is feasible now; if not, the bracket has no feasible label. The
     larger half of the bracket is evaluated at its middle. The search ends if the bracket is as
-    narrow as `NARROWEST`, or if no label in it can be feasible.
+    narrow as `NARROWEST`, or if no label in it can be feasible. The latter is a proof, and so is a
+    bracket of one label.
     """
     bracket = past.room.bracket
     four = past.room.four
     for _ in range(MAX_EVALUATIONS):
         lower_half = bracket[MIDDLE].label - bracket[FIRST].label
         upper_half = bracket[LAST].label - bracket[MIDDLE].label
-        if bracket[LAST].label - bracket[FIRST].label <= NARROWEST * bracket[LAST].label:
+        width = bracket[LAST].label - bracket[FIRST].label
+        if width == 0.0:
             return False
+        if width <= NARROWEST * bracket[LAST].label:
+            break
 
         outer = FIRST if lower_half > upper_half else LAST
         other = LAST - outer
@@ -177,6 +181,7 @@ def search_bracket(past: Past) -> bool:
             bracket[outer] = four[at]
         if is_feasible:
             return True
+    past.room.unproved[0] = True
     return False
 
 

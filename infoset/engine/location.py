@@ -251,7 +251,8 @@ def refine_all(
     labels, ends included.
 
     Return the number of vertices that every new section may gain. If no label is feasible, the
-    engagement has no feasible section afterwards. The limits of the labels, each of shape (B,), are
+    engagement has no feasible section afterwards; `sections.unproved` is then whether that is not
+    proved. The limits of the labels, each of shape (B,), are
     narrowed to infeasible labels, except where other labels may be feasible beyond them: with
     rates, and with an error bound that rises with range in the paper's model.
     """
@@ -267,6 +268,7 @@ def refine_all(
         for s in range(used[b]):
             slots[b, s].feasible = False
         if not labels.exists:
+            sections.unproved[b] |= past.room.unproved[0]
             continue
 
         if past.errors is None and is_convex(past.laws):
@@ -275,4 +277,5 @@ def refine_all(
         used[b] = number
         for s in range(number):
             spare = min(spare, fill_slot(b, s, number, labels, sections, past))
+        sections.unproved[b] |= past.room.unproved[0]
     return spare

@@ -61,10 +61,16 @@ rounding errors of supports 200 times. Chosen: Phi of flights of ten seconds is 
 SLACK = 1e-9
 """Relative enlargement of a bound; the rounding errors of supports and lines are far smaller."""
 PIECE = np.dtype(
-    [("near", np.float64), ("far", np.float64), ("step", np.int64), ("bound", np.float64)]
+    [
+        ("near", np.float64),
+        ("far", np.float64),
+        ("set", np.int64),
+        ("step", np.int64),
+        ("bound", np.float64),
+    ]
 )
-"""A piece: its labels, m, the number of the step in which they leave, and the bound of its miss by
-(12), m.
+"""A piece: its labels, m, the number of their set, the number of the step in which they leave, and
+the bound of its miss by (12), m.
 """
 
 

@@ -79,7 +79,11 @@ def replay_angles(
             if not nonempty:
                 return event, done
         else:
-            move_section(section, kinds[event], own[event], across, elapsed, law, past.room.points)
+            is_reduced = move_section(
+                section, kinds[event], own[event], across, elapsed, law, past.room.points
+            )
+            if is_reduced:
+                past.room.unproved[0] = True
             elapsed += kinds[event] == PREDICTION
     return NEVER_EMPTIED, Replayed(until, elapsed, done.sight)
 

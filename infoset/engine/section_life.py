@@ -319,20 +319,23 @@ def move_section(
     elapsed: int,
     law: SectionLaw,
     points: Floats,
-) -> None:
+) -> bool:
     """Apply an event to a section that is not a measurement: a prediction, an impulse or an
-    enlargement.
+    enlargement. Return whether the section was reduced.
 
     `elapsed` is the number of predictions before the event. `points` is a working array.
     """
+    is_reduced = False
     if kind == PREDICTION:
-        if chains.is_crowded(section):
+        is_reduced = chains.is_crowded(section)
+        if is_reduced:
             chains.reduce_outward(section, time_to_go(section.label, elapsed, law), points)
         predict_section(section, elapsed + 1, law)
     elif kind == IMPULSE:
         shift_section(section, elapsed, value, across, law)
     elif kind == WIDENING:
         widen_section(section, elapsed, law)
+    return is_reduced
 
 
 @inlined

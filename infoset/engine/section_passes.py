@@ -92,6 +92,9 @@ class Sections(NamedTuple):
     behind, stale : ndarray of bool, shape (B,)
         Engagements with sections one step behind the present one, and those with summaries out of
         date.
+    unproved : ndarray of bool, shape (B,)
+        Engagements with a section that was reduced, or with a search that found no feasible label
+        and does not prove that there is none.
     rows : ndarray of int, shape (B S, 3)
         Working array for a list of sections: row, engagement and slot.
     """
@@ -102,6 +105,7 @@ class Sections(NamedTuple):
     summaries: Floats
     behind: Flags
     stale: Flags
+    unproved: Flags
     rows: Integers
 
 
@@ -121,6 +125,7 @@ def room_for_sections(channels: int, labels: Floats, used: Integers) -> Sections
         summaries=np.zeros((channels, *labels.shape, SUMMARY_COLUMNS)),
         behind=np.zeros(len(labels), dtype=bool),
         stale=np.ones(len(labels), dtype=bool),
+        unproved=np.zeros(len(labels), dtype=bool),
         rows=np.empty((labels.size, 3), dtype=np.int64),
     )
 
@@ -314,6 +319,7 @@ def make_room_all(
                 section = section_of(sections, channel, b, s)
                 if widen and active[b] and chains.is_crowded(section):
                     chains.reduce_outward(section, time_to_go(slot.label, elapsed, law), points)
+                    sections.unproved[b] = True
 
                 count = chains.count_of(section)
                 room = chain_storage.room_of(section)

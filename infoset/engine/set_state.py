@@ -55,6 +55,11 @@ class SetState:
     and summaries of the stored sections are postponed to the next measurement or query, so that one
     pass over the memory does both; a query therefore may write the sections, but changes no result.
 
+    `members` sets in a row belong to one engagement; usually it is 1. A set that becomes empty is
+    recovered only if no other one of its engagement lives: a set lives while it tracks, or if a
+    label of it has passed below the threshold. If another one lives and the emptiness is not
+    proved, the set leaves the image out that made it empty.
+
     Attributes
     ----------
     sections : Sections
@@ -77,8 +82,9 @@ class SetState:
         The guaranteed miss; None if it is not computed.
     """
 
-    def __init__(self, model: SetModel, batch: int, guarantee: bool) -> None:
+    def __init__(self, model: SetModel, batch: int, guarantee: bool, members: int = 1) -> None:
         self.model = model
+        self._members = members
         self.laws = section_laws(model)
         self.table = law_table(self.laws)
 
@@ -105,8 +111,13 @@ class SetState:
         has_phi = guarantee and model.is_guaranteed
         # Phi reads label limits, closing speed, step and range threshold here: all axes have the
         # same ones.
-        self.phi = GuaranteedMiss(self.laws[0], batch, model.speed_error) if has_phi else None
+        self.phi: GuaranteedMiss | None = None
+        if has_phi:
+            self.phi = GuaranteedMiss(self.laws[0], batch, model.speed_error, members)
 
+        # If q measured ranges may be wrong: the q + 1 largest lower limits of the label by ranges,
+        # and of the upper ones with a minus sign, increasing, shape (2, q + 1, B), m.
+        self._range_limits = np.empty((2, 0, batch))
         self._none = np.zeros(batch, dtype=bool)
         self._no_angles = np.empty((len(self.laws), 0))
         # Vertices that every section may still gain.
@@ -179,8 +190,10 @@ class SetState:
         active = self.tracking & where
         event = self.history.record(ANGLE, alpha, active)
         before = (self.lower_label.copy(), self.upper_label.copy())
+        # Members that do not use this image are summarised in the same pass.
+        wanted = MOVED if self._members == 1 else SUMMARISED
         newly_emptied = section_passes.step_all(
-            active, alpha, event, self.elapsed, MOVED, self.sections, self.table
+            active, alpha, event, self.elapsed, wanted, self.sections, self.table
         )
         if newly_emptied:
             self._handle_emptied(active, event, *before)
@@ -204,11 +217,17 @@ class SetState:
             self._handle_emptied(active, event, *before)
 
     def measure_range(
-        self, measured: Floats, relative_error: float, alpha: Floats | None, where: Flags
+        self,
+        measured: Floats,
+        relative_error: float,
+        alpha: Floats | None,
+        where: Flags,
+        wrong: int = 0,
     ) -> None:
         """Keep the labels that agree with measured ranges of shape (B,), m.
 
-        `alpha` are angles of shape (C, B), rad, measured at the same time, or None.
+        `alpha` are angles of shape (C, B), rad, measured at the same time, or None. At most `wrong`
+        of all measured ranges are wrong.
         """
         active = self.tracking & where
         travelled = self.travelled
@@ -218,12 +237,38 @@ class SetState:
         lower = measured * nearer / ((1.0 + relative_error) * (1.0 + eta)) + travelled - slack
         upper = measured / ((1.0 - relative_error) * (1.0 - eta)) + travelled + slack
 
+        earlier = self._range_limits
+        if wrong:
+            earlier = self._earlier_range_limits(wrong)
+            lower, upper = self._limits_of_right_ranges(earlier, lower, upper, active)
+
         before = (self.lower_label.copy(), self.upper_label.copy())
         self.lower_label[active] = np.maximum(self.lower_label, lower)[active]
         self.upper_label[active] = np.minimum(self.upper_label, upper)[active]
         _, removed = self._keep_labels(active)
         if removed:
-            self._handle_emptied(active, None, *before)
+            recovered = self._handle_emptied(active, None, *before)
+            if wrong and some(recovered):
+                self._range_limits[..., recovered] = earlier[..., recovered]
+
+    def _earlier_range_limits(self, wrong: int) -> Floats:
+        """Return the stored limits by earlier ranges, of which at most `wrong` are wrong."""
+        if self._range_limits.shape[1] == 0:
+            return np.full((2, wrong + 1, self.batch), -np.inf)
+        return self._range_limits
+
+    def _limits_of_right_ranges(
+        self, earlier: Floats, lower: Floats, upper: Floats, active: Flags
+    ) -> tuple[Floats, Floats]:
+        """Return the limits of the label by all measured ranges, each of shape (B,), m: Theorem B
+        of docs/wrong-images.md.
+
+        A label below the (q + 1)-th largest of the lower limits contradicts more than q ranges.
+        """
+        new = np.where(active, np.stack((lower, -upper)), -np.inf)
+        ordered = np.sort(np.concatenate((earlier, new[:, None]), axis=1), axis=1)
+        self._range_limits = ordered[:, 1:]
+        return self._range_limits[0, 0], -self._range_limits[1, 0]
 
     def _min_cosine(self, alpha: Floats | None) -> Floats:
         """Lower bound of x over the distance, shape (B,): from measured angles, or from the maximum
@@ -256,9 +301,9 @@ class SetState:
 
     def _handle_emptied(
         self, active: Flags, event: int | None, lower: Floats, upper: Floats
-    ) -> None:
+    ) -> Flags:
         """Refine the sets that a measurement has left with few sections, and recover the sets that
-        it has made empty.
+        it has made empty. Return which were recovered, shape (B,).
 
         `event` is the number of the measurement, None for a range, which the history does not
         contain. `lower` and `upper`, shape (B,), are the limits of the labels before it, m.
@@ -268,14 +313,30 @@ class SetState:
         self.status[empty] = SetStatus.EMPTY.value
         self.status[is_below_threshold] = SetStatus.REFUTED.value
         lost = empty & ~is_below_threshold
+        if self._members > 1 and event is not None:
+            # A set without this image contains the set with it.
+            doubtful = lost & self.sections.unproved & self._engagement_lives()
+            if some(doubtful):
+                self._discard(doubtful, event, lower, upper)
+                lost &= self.status == SetStatus.EMPTY.value
         if not some(lost):
-            return
+            return lost
 
         for b in np.flatnonzero(lost & (self.lost_step < 0)):
             self.lost_step[b] = self.elapsed
             self.lost_label[b] = self._nearest_to_feasible(int(b), event, lower[b], upper[b])
-        if self.model.recovery is not Recovery.NONE:
+        if self.model.recovery is Recovery.NONE:
+            return self._none
+        lost &= ~self._engagement_lives()
+        if some(lost):
             self._recover(lost, event, lower, upper)
+        return lost
+
+    def _engagement_lives(self) -> Flags:
+        """Whether a set of the same engagement lives, shape (B,)."""
+        lives = self.status != SetStatus.EMPTY.value
+        of_engagement = lives.reshape(-1, self._members).any(axis=1)
+        return np.repeat(of_engagement, self._members)
 
     def _refine_if_few(self, active: Flags) -> Flags:
         """Make a new grid where too few sections are left; return which sets are empty."""
@@ -295,12 +356,18 @@ class SetState:
         return float(min(max(middle, lower), upper))
 
     def _recover(self, empty: Flags, event: int | None, lower: Floats, upper: Floats) -> None:
-        """Discard the measurement that made sets empty: restore the last consistent sets, predict
-        and enlarge them. The arguments are explained in `_handle_emptied`.
+        """Discard the measurement that made sets empty, and enlarge the last consistent sets. The
+        arguments are explained in `_handle_emptied`.
+        """
+        self.history.record(WIDENING, applies=empty)
+        self._discard(empty, event, lower, upper)
+
+    def _discard(self, empty: Flags, event: int | None, lower: Floats, upper: Floats) -> None:
+        """Discard the measurement that made sets empty: restore the last consistent sets and
+        predict them. The arguments are explained in `_handle_emptied`.
         """
         if event is not None:
             self.history.retract(event, empty)
-        self.history.record(WIDENING, applies=empty)
 
         # The labels that this measurement has emptied or removed are feasible again. Their polygons
         # are not restored: the refinement below computes others.
@@ -331,7 +398,7 @@ class SetState:
 
     def replace(self, row: int, source: int, applies: Flags) -> bool:
         """Replace the set of engagement `row` by the set of other measurements of engagement
-        `source`, computed by replay; return whether it is not empty.
+        `source`, computed by replay; return whether it is not empty, or else end it.
 
         `applies`, shape (events,), says which events of the history apply. The new set must be a
         part of the set of `source`, whose limits of the labels it takes over. No label of either
@@ -340,22 +407,36 @@ class SetState:
         self.history.replace(row, source, applies)
         self.lower_label[row] = self.lower_label[source]
         self.upper_label[row] = self.upper_label[source]
+        self._range_limits[..., row] = self._range_limits[..., source]
         self.status[row] = SetStatus.TRACKING.value
         self.lost_step[row] = -1
 
         # The stored labels became empty with other measurements: the search does not know them.
         self.sections.slots["feasible"][row] = False
         self.sections.used[row] = 0
+        self.sections.unproved[row] = False
         wanted = self._none.copy()
         wanted[row] = True
         self.refine(wanted, self._grid)
         self.sections.stale[row] = True
-        return bool(self.feasible[row].any())
+        if self.feasible[row].any():
+            return True
+        self.refute(row)
+        self.status[row] = SetStatus.EMPTY.value
+        return False
 
     def refute(self, row: int) -> None:
         """Note that the set of an engagement does not contain the true state."""
         self.lost_step[row] = self.elapsed
         self.lost_label[row] = 0.5 * (self.lower_label[row] + self.upper_label[row])
+
+    def retire(self, row: int) -> None:
+        """End the set of an engagement, because others of the same engagement contain it."""
+        self.refute(row)
+        self.status[row] = SetStatus.EMPTY.value
+        self.sections.slots["feasible"][row] = False
+        self.sections.unproved[row] = False
+        self.min_label = self._min_label()
 
     def _min_label(self) -> float:
         return float(np.where(self.feasible, self.labels, np.inf).min())

@@ -70,6 +70,10 @@ class Workspace(NamedTuple):
         Labels and overlaps of those that became empty at the latest event.
     windows : recarray of WINDOW, shape (MAX_HALVED_WINDOWS + 2,)
         Windows of labels to be searched.
+    unproved : ndarray of bool, shape (1,)
+        Whether a search without a result proves nothing for a history without rates: a section was
+        reduced, or a bracket ended without a proof. `select` resets it, `replay_angles` and
+        `search_bracket` set it.
     """
 
     values: Floats
@@ -85,6 +89,7 @@ class Workspace(NamedTuple):
     four: Records
     latest: Floats
     windows: Records
+    unproved: Flags
 
 
 class Past(NamedTuple):
@@ -150,6 +155,7 @@ def past_of(history: History, laws: Laws, slots: int = 1) -> Past:
         four=np.recarray(4, EVALUATED),
         latest=np.empty((2, 4)),
         windows=np.recarray(MAX_HALVED_WINDOWS + 2, WINDOW),
+        unproved=np.zeros(1, dtype=bool),
     )
     return Past(history.log, history.errors_if_any, laws, room, np.inf, -np.inf, FALSE)
 
@@ -161,6 +167,7 @@ def select(past: Past, b: int) -> None:
     values = past.room.values
     applies = past.room.applies
     cuts = past.room.cuts
+    past.room.unproved[0] = False
     for event in range(log.number):
         applies[event] = log.applies[event, b]
         # A replay that leaves out measurements must apply every enlargement of the section.

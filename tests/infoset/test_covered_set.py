@@ -139,6 +139,117 @@ def test_set_with_more_wrong_images_than_assumed_becomes_inconsistent() -> None:
     assert not exists.any()
 
 
+def test_member_that_may_be_empty_without_a_proof_withholds_the_guarantee() -> None:
+    covered = CoveredSet(MODEL)
+    wrong = 21
+    flown(covered, wrong + 1, wrong)
+    while covered.tracking.any():
+        covered.drop_below_threshold()
+        covered.predict()
+    phi_m, exists = covered.guaranteed_miss()
+    assert exists.all()
+    assert phi_m.min() > 0.0
+
+    # A search that ended in an interval of labels as short as their rounding, or whose sections
+    # were reduced.
+    emptied = int(np.flatnonzero(covered.emptied[0])[0])
+    covered._state.sections.unproved[emptied] = True
+    _, exists = covered.guaranteed_miss()
+    assert not exists.any()
+    assert not covered.refuted[0, emptied]
+    assert covered.emptied[0, emptied]
+
+
+def after_a_wrong_image(model: SetModel, steps_without_image: int) -> CoveredSet:
+    """A covered set after steps without an image, and then four good images and a wrong one."""
+    covered = CoveredSet(model)
+    for step in range(steps_without_image + 5):
+        is_wrong = step == steps_without_image + 4
+        covered.measure_angle(0.02 if is_wrong else 0.0, where=step >= steps_without_image)
+        covered.predict()
+    assert covered.tracking.all()
+    return covered
+
+
+def test_emptiness_of_an_ordinary_set_of_labels_is_proved() -> None:
+    covered = after_a_wrong_image(MODEL, 20)
+    assert covered.refuted.sum() == 3
+
+
+def test_emptiness_of_an_exactly_known_label_is_proved() -> None:
+    exact = replace(KNOWN, x_m=(X, X), vx_m_s=(-E, -E))
+    covered = after_a_wrong_image(replace(MODEL, bounds=exact), 20)
+    assert covered.refuted.sum() == 3
+
+
+@pytest.mark.parametrize(
+    ("model", "steps_without_image"),
+    [
+        # The labels are 4 ulp wide: the search does not look between the two that it evaluates.
+        (
+            replace(MODEL, bounds=replace(KNOWN, x_m=(X, X * (1.0 + 8.0e-16)), vx_m_s=(-E, -E))),
+            20,
+        ),
+        # Without images a step adds two vertices, up to 256: the sections are reduced.
+        (MODEL, 140),
+    ],
+)
+def test_member_leaves_an_image_out_if_it_may_be_empty_without_a_proof(
+    model: SetModel, steps_without_image: int
+) -> None:
+    covered = after_a_wrong_image(model, steps_without_image)
+    assert not covered.emptied.any()
+    assert covered.proof_step.mask.all()
+    # All members are as if the last image had been lost.
+    untold = CoveredSet(model)
+    for step in range(steps_without_image + 5):
+        is_image = steps_without_image <= step < steps_without_image + 4
+        untold.measure_angle(0.0, where=is_image)
+        untold.predict()
+    lower, upper, _ = covered.predicted_miss_by_member()
+    expected_lower, expected_upper, _ = untold.predicted_miss_by_member()
+    np.testing.assert_allclose(lower, expected_lower, rtol=1e-3)
+    np.testing.assert_allclose(upper, expected_upper, rtol=1e-3)
+
+
+def test_member_recovers_only_if_no_other_one_lives() -> None:
+    covered = CoveredSet(MODEL)
+    flown(covered, 20)
+    # Image 20 is in class 0: member 0 does not use it and lives.
+    covered.measure_angle(0.02)
+    assert covered.emptied[0].tolist() == [False, True, True, True]
+    assert covered._nonempty_members()[0].tolist() == [True, False, False, False]
+    covered.predict()
+
+    covered.measure_angle(-0.02)
+    assert covered.inconsistent.all()
+    assert covered._nonempty_members()[0].tolist() == [True, False, False, False]
+    assert covered.tracking.all()
+    assert not covered.guaranteed_miss()[1].any()
+
+
+def test_member_whose_labels_have_left_counts_although_the_others_are_empty() -> None:
+    near = replace(KNOWN, x_m=(200e3, 400e3))
+    covered = CoveredSet(replace(MODEL, bounds=near))
+    for _ in range(8):
+        covered.measure_angle(0.0)
+        covered.drop_below_threshold()
+        covered.predict()
+    status = covered._members_status()
+    assert (status == SetStatus.TRACKING.value).all()
+    assert covered._state.some_left.all()
+
+    # Two contradictory images: all members become empty, but labels of all have left.
+    for alpha in (0.05, -0.05):
+        covered.measure_angle(alpha)
+        covered.drop_below_threshold()
+        covered.predict()
+    assert not covered.tracking.any()
+    assert not covered.inconsistent.any()
+    assert not covered.refuted.any()
+    assert covered.guaranteed_miss()[1].all()
+
+
 def test_view_and_copy_of_a_covered_set_agree_with_it() -> None:
     covered = CoveredSet(MODEL, 2)
     view = covered.view()
