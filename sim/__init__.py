@@ -22,7 +22,7 @@ from infoset.sim.statistics import (
 )
 from infoset.sim.stopping_rule import QuantileName, StoppingRule
 from infoset.sim.storage import Axis
-from infoset.sim.wrong_images import WrongImages
+from infoset.sim.wrong_images import WrongImages, WrongRanges
 
 __all__ = [
     "Axis",
@@ -53,6 +53,7 @@ __all__ = [
     "Target",
     "WorstEngagement",
     "WrongImages",
+    "WrongRanges",
     "empirical_distribution",
     "estimate_hits",
     "estimate_quantiles",

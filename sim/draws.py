@@ -11,13 +11,14 @@ import numpy as np
 
 from infoset.arrays import Flags, Floats, Integers
 from infoset.guidance import NoiseKind, TieRule
+from infoset.sensors import Sensor
 from infoset.sim.covariance import Covariance
 from infoset.sim.gravity import max_impulses_m_s, with_gravity
 from infoset.sim.scenario import Scenario, corners
-from infoset.sim.wrong_images import draw_wrong_images
+from infoset.sim.wrong_images import WrongImages, draw_wrong_measurements
 
 START, TIE, EXECUTION, TARGET, POINTING, BIAS, IMAGES = 0, 3, 5, 6, 7, 8, 9
-WRONG_IMAGES = 11
+WRONG_IMAGES, WRONG_RANGES = 11, 12
 """Streams of a run; each kind of sensor has a separate one (`Sensor.stream`). Their numbers are
 never changed or used again: runs of a seed would change.
 """
@@ -64,6 +65,9 @@ class Draws:
         image.
     wrong_by_noise : ndarray of bool, shape (B, steps), or None
         Other images that are wrong: the measurement noise of the batch makes these errors.
+    wrong_ranges : ndarray, shape (B, steps), or None
+        Errors of wrong ranges in units of their bounds, zero for other ranges; None has no wrong
+        range.
     redraws : ndarray of int, shape (B,), or None
         Normal starts outside the dispersion that were drawn again; None for uniform starts.
     """
@@ -79,6 +83,7 @@ class Draws:
     images: Floats | None = None
     wrong: Floats | None = None
     wrong_by_noise: Flags | None = None
+    wrong_ranges: Floats | None = None
     redraws: Integers | None = None
 
     @property
@@ -140,6 +145,7 @@ def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
         bias=lateral(BIAS, 1)[..., 0] if camera.has_constant_bias else None,
         images=images,
         wrong=_wrong_images(scenario, runs, seed, steps),
+        wrong_ranges=_wrong_ranges(scenario, runs, seed, steps),
         redraws=starts.redraws,
     )
 
@@ -149,19 +155,40 @@ def _wrong_images(scenario: Scenario, runs: Sequence[int], seed: int, steps: int
     wrong = scenario.wrong_images
     if wrong is None or wrong.number == 0:
         return None
+    before_s = _before_arrival_s(scenario, scenario.bearing_sensor, steps)
+    axes = len(scenario.set_model.axes)
+    return _wrong_measurements(wrong, before_s, axes, runs, seed, WRONG_IMAGES)
 
+
+def _wrong_ranges(scenario: Scenario, runs: Sequence[int], seed: int, steps: int) -> Floats | None:
+    """Return the errors of wrong ranges, shape (B, steps); None without any."""
+    wrong = scenario.wrong_ranges
+    if wrong is None or wrong.number == 0 or scenario.range_sensor is None:
+        return None
+    before_s = _before_arrival_s(scenario, scenario.range_sensor, steps)
+    return np.asarray(_wrong_measurements(wrong, before_s, 1, runs, seed, WRONG_RANGES)[0])
+
+
+def _before_arrival_s(scenario: Scenario, sensor: Sensor, steps: int) -> Floats:
+    """Return the time of each step before the nominal arrival, s; NaN where a sensor does not
+    measure.
+    """
     model = scenario.set_model
-    camera = scenario.bearing_sensor
-    every = model.steps_in(camera.period_s)
+    every = model.steps_in(sensor.period_s)
     before_s: Floats = scenario.nominal_arrival_s - model.step_s * np.arange(float(steps))
     for step, before in enumerate(before_s.tolist()):
-        if step % every != 0 or not camera.measures_at(before):
+        if step % every != 0 or not sensor.measures_at(before):
             before_s[step] = np.nan
+    return before_s
 
-    axes = len(model.axes)
+
+def _wrong_measurements(
+    wrong: WrongImages, before_s: Floats, axes: int, runs: Sequence[int], seed: int, stream: int
+) -> Floats:
+    """Return the errors of the wrong measurements of some runs, shape (axes, B, steps)."""
     return np.stack(
         [
-            draw_wrong_images(wrong, before_s, axes, generator(seed, run, WRONG_IMAGES))
+            draw_wrong_measurements(wrong, before_s, axes, generator(seed, run, stream))
             for run in runs
         ],
         axis=1,

@@ -10,12 +10,12 @@ from infoset.arrays import Flags, Floats, some
 from infoset.guidance import GameNoise, LineOfSight, MeasurementNoise
 from infoset.guidance.noise import checked_measurements
 from infoset.information_set import InformationSetView
-from infoset.sensors import BearingSensor, Measurements, Sensor
+from infoset.sensors import BearingSensor, Measurements, RangeSensor, Sensor
 from infoset.sim.draws import Draws
 from infoset.sim.impulse_queue import Pending
 from infoset.sim.kepler import Sight
 from infoset.sim.scenario import Scenario
-from infoset.sim.wrong_images import wrong_angles
+from infoset.sim.wrong_images import wrong_angles, wrong_ranges
 
 
 class Cut(NamedTuple):
@@ -111,6 +111,10 @@ class Instruments:
         if wrong is not None and camera in measured:
             angles = wrong_angles(due[camera], asked, measured[camera], wrong[..., step])
             measured[camera] = angles
+        of_ranges = self._draws.wrong_ranges
+        meter = RangeSensor.name
+        if of_ranges is not None and meter in measured:
+            measured[meter] = wrong_ranges(due[meter], asked, measured[meter], of_ranges[:, step])
         if self._draws.images is not None and BearingSensor.name in measured:
             seen = self._draws.images[:, step] >= self._image_loss
             return self._with_lost_images(due, measured, seen, tracking)

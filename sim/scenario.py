@@ -30,7 +30,7 @@ from infoset.limits import (
 from infoset.model import SetModel, SetSettings, StateBox
 from infoset.sensors import AngleSensor, BearingSensor, Camera, RangeSensor, RateSensor, Sensor
 from infoset.sim.covariance import Covariance
-from infoset.sim.wrong_images import WrongImages
+from infoset.sim.wrong_images import WrongImages, WrongRanges
 
 LIGHT_M_S = 299_792_458.0
 """Speed of light, m/s: exact, by the definition of the metre."""
@@ -195,6 +195,8 @@ class Scenario:
         None is free space.
     wrong_images : WrongImages or None
         Images with errors beyond their bound in the simulated flights; None has none.
+    wrong_ranges : WrongRanges or None
+        Measured ranges with errors beyond their bound in the simulated flights; None has none.
     target : Target or None
         A target that manoeuvres; None does not.
     body : Body or None
@@ -226,6 +228,7 @@ class Scenario:
     range_sensor: RangeSensor | None = None
     rate_sensor: RateSensor | None = None
     wrong_images: WrongImages | None = None
+    wrong_ranges: WrongRanges | None = None
     target: Target | None = None
     body: Body | None = None
     thruster: Thruster
@@ -244,10 +247,26 @@ class Scenario:
         if self.information_set.is_guaranteed:
             _ = self.set_model.label_limits_m
         self._check_lengths()
+        self._check_wrong_ranges()
         if self.information_set.wrong_images and self.rate_sensor is not None:
             raise ValueError(
                 "information_set.wrong_images must be 0 with a rate_sensor, for which there is no "
                 f"proof: got {self.information_set.wrong_images}"
+            )
+
+    def _check_wrong_ranges(self) -> None:
+        """Check that wrong ranges fit the model and the sensors."""
+        meter = self.range_sensor
+        if self.wrong_ranges is not None and meter is None:
+            raise ValueError(
+                "wrong_ranges needs a range_sensor: add the table, or leave wrong_ranges out"
+            )
+        if meter is None or meter.wrong_measurements == 0:
+            return
+        if not self.information_set.is_guaranteed:
+            raise ValueError(
+                'range_sensor.wrong_measurements must be 0 in model = "paper", which guarantees '
+                f"nothing: got {meter.wrong_measurements}"
             )
 
     def _check_lengths(self) -> None:

@@ -78,7 +78,13 @@ class TruthSection:
         self._history.record(ANGLE, alpha_rad, where)
 
     def measure_range(
-        self, range_m: Floats, relative_error: float, where: Flags, *, alpha_rad: ArrayLike | None
+        self,
+        range_m: Floats,
+        relative_error: float,
+        where: Flags,
+        *,
+        alpha_rad: ArrayLike | None,
+        wrong_measurements: int = 0,
     ) -> None:
         """Do nothing: a range selects labels and does not cut sections."""
 

@@ -1,4 +1,4 @@
-"""Wrong images of simulated flights: which ones, by how much, and which ones a set proves."""
+"""Wrong images and ranges of simulated flights: which, by how much, and which a set proves."""
 
 from __future__ import annotations
 
@@ -45,22 +45,41 @@ class WrongImages(Checked):
     when_s: tuple[NotNegative, NotNegative] | None = None
 
 
-def draw_wrong_images(
+@dataclass(frozen=True)
+class WrongRanges(WrongImages):
+    """Measured ranges with errors beyond their bound in the simulated flights.
+
+    They are simulated whatever the set allows for: `wrong_measurements` of `[range_sensor]` is what
+    the set allows for.
+
+    Parameters
+    ----------
+    number : int
+        Number of wrong ranges of each flight.
+    size : tuple of float
+        Minimum and maximum error of a wrong range in units of its bound: the logarithm is uniform,
+        and the sign random. A negative range becomes zero.
+    when_s : tuple of float, or None
+        Interval of the times before the nominal arrival, s; None is the whole flight.
+    """
+
+
+def draw_wrong_measurements(
     wrong: WrongImages, before_arrival_s: Floats, axes: int, random: np.random.Generator
 ) -> Floats:
-    """Return the errors of the wrong images of one flight.
+    """Return the errors of the wrong measurements of one flight.
 
     Parameters
     ----------
     before_arrival_s : ndarray, shape (steps,)
-        Time of the image of each step before the nominal arrival, s; NaN without an image.
+        Time of the measurement of each step before the nominal arrival, s; NaN without one.
     axes : int
-        Number of lateral axes.
+        Number of measured values.
 
     Returns
     -------
     ndarray, shape (axes, steps)
-        Errors in units of the bounds; zero for images that are not wrong.
+        Errors in units of the bounds; zero for measurements that are not wrong.
     """
     earliest_s, latest_s = math.inf, -math.inf
     if wrong.when_s is not None:
@@ -108,3 +127,11 @@ def proved_columns(information: InformationSetView) -> dict[str, Any]:
         "suspected_images": np.ma.MaskedArray(count, mask=count == 0),
         "wrong_image_s": np.ma.MaskedArray(last_s, mask=count != 1),
     }
+
+
+def wrong_ranges(sensor: Sensor, sight: Geometry, measured: Floats, errors: Floats) -> Floats:
+    """Return measured ranges, m, with wrong ones in place of the others; `errors` has the shape
+    (B,).
+    """
+    ranges = np.maximum(sensor.measured(sight, errors), 0.0)
+    return np.where(errors != 0.0, ranges, measured)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from infoset.arrays import Flags, Floats
-from infoset.limits import Checked, Fraction, Positive
+from infoset.limits import Checked, Fraction, Limits, Positive
 from infoset.sensors.bearing import BearingSensor
 from infoset.sensors.sensor import Apart, Cuttable, Geometry, Measurements, Sensor
+
+_WRONG = Limits(minimum=0, maximum=3, whole=True)
 
 
 @dataclass(frozen=True)
@@ -23,6 +25,9 @@ class RangeSensor(Checked, Sensor):
         Time between measurements, s; the first is at t = 0.
     relative_error : float
         Maximum |d_m - d| / d, in (0, 1).
+    wrong_measurements : int
+        Maximum number of measured ranges of a flight whose errors may be arbitrary. Only in the
+        guaranteed model.
 
     References
     ----------
@@ -37,6 +42,7 @@ class RangeSensor(Checked, Sensor):
 
     period_s: Positive
     relative_error: Fraction
+    wrong_measurements: Annotated[int, _WRONG] = 0
 
     def true_value(self, sight: Geometry) -> Floats:
         """Return the range, m."""
@@ -53,6 +59,7 @@ class RangeSensor(Checked, Sensor):
             self.relative_error,
             where,
             alpha_rad=measured.get(BearingSensor.name),
+            wrong_measurements=self.wrong_measurements,
         )
 
     def band(self, range_m: Floats, closing_speed_m_s: Floats | float, errors: float = 1.0) -> None:

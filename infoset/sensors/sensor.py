@@ -80,7 +80,13 @@ class Cuttable(Protocol):
         """Cut by a line-of-sight angle."""
 
     def measure_range(
-        self, range_m: Floats, relative_error: float, where: Flags, *, alpha_rad: ArrayLike | None
+        self,
+        range_m: Floats,
+        relative_error: float,
+        where: Flags,
+        *,
+        alpha_rad: ArrayLike | None,
+        wrong_measurements: int = 0,
     ) -> None:
         """Cut by a range."""
 

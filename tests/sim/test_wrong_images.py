@@ -15,7 +15,7 @@ from infoset.sim import Record, Results, Scenario, fly_one
 from infoset.sim.draws import draw
 from infoset.sim.gravity import on_board_model
 from infoset.sim.simulate import simulate_runs
-from infoset.sim.wrong_images import WrongImages, draw_wrong_images
+from infoset.sim.wrong_images import WrongImages, WrongRanges, draw_wrong_measurements
 
 
 def scenario_of(name: str, allowed: int, number: int, noise: NoiseKind) -> Scenario:
@@ -62,6 +62,65 @@ def test_miss_is_at_most_phi_in_every_flight_with_as_many_wrong_images_as_allowe
     assert results.phi_held.all()
 
 
+def with_wrong_ranges(allowed: int, number: int, noise: NoiseKind, images: int) -> Scenario:
+    """The scenario of 1997 with its range sensor, wrong ranges, and perhaps wrong images."""
+    scenario = scenario_of("asteroid-1997", images, images, noise)
+    assert scenario.range_sensor is not None
+    return replace(
+        scenario,
+        range_sensor=replace(scenario.range_sensor, wrong_measurements=allowed),
+        wrong_ranges=WrongRanges(number, size=(1.05, 1000.0)),
+    )
+
+
+@pytest.mark.parametrize(
+    ("allowed", "images", "noise", "runs"),
+    [
+        (1, 0, NoiseKind.RANDOM, 30),
+        (1, 0, NoiseKind.GAME, 10),
+        (2, 1, NoiseKind.RANDOM, 10),
+        pytest.param(1, 0, NoiseKind.RANDOM, 400, marks=pytest.mark.thorough),
+        pytest.param(3, 1, NoiseKind.RANDOM, 100, marks=pytest.mark.thorough),
+    ],
+)
+def test_miss_is_at_most_phi_in_every_flight_with_as_many_wrong_ranges_as_allowed(
+    allowed: int, images: int, noise: NoiseKind, runs: int
+) -> None:
+    results = simulate_runs(with_wrong_ranges(allowed, allowed, noise, images), runs, seed=6)
+    assert not results.set_emptied.any()
+    assert results.truth_kept.all()
+    assert results.phi_held.count() == runs
+    assert results.phi_held.all()
+
+
+def test_wrong_ranges_empty_a_set_that_allows_for_none() -> None:
+    results = simulate_runs(with_wrong_ranges(0, 1, NoiseKind.RANDOM, 0), 20, seed=6)
+    assert results.set_emptied.any()
+
+
+def test_wrong_ranges_of_a_flight_are_measured_ranges() -> None:
+    scenario = with_wrong_ranges(1, 2, NoiseKind.RANDOM, 0)
+    errors = draw(scenario, [0, 1], 0).wrong_ranges
+    assert errors is not None
+    steps = np.flatnonzero(errors.any(axis=0))
+    assert ((errors != 0.0).sum(axis=1) == 2).all()
+    assert (steps % scenario.set_model.steps_in(2.0) == 0).all()
+
+
+def test_ranges_without_wrong_ones_do_not_depend_on_the_table() -> None:
+    scenario = with_wrong_ranges(0, 0, NoiseKind.RANDOM, 0)
+    with_table = simulate_runs(scenario, 5, seed=0)
+    without = simulate_runs(replace(scenario, wrong_ranges=None), 5, seed=0)
+    np.testing.assert_array_equal(with_table.miss_m, without.miss_m)
+
+
+def test_wrong_ranges_in_the_model_paper_are_refused() -> None:
+    scenario = with_wrong_ranges(1, 1, NoiseKind.RANDOM, 0)
+    settings = replace(scenario.information_set, model=Model.PAPER)
+    with pytest.raises(ValueError, match=r"range_sensor\.wrong_measurements must be 0"):
+        replace(scenario, information_set=settings)
+
+
 def test_set_that_allows_for_no_wrong_image_loses_its_bound_with_one() -> None:
     results = flown("asteroid-1997", 0, 1, NoiseKind.RANDOM, 30)
     assert results.set_emptied.sum() > 10
@@ -83,7 +142,7 @@ def test_flights_without_wrong_images_do_not_depend_on_the_table() -> None:
 def test_wrong_images_are_images_in_the_interval_of_times() -> None:
     before_s = np.array([5.0, np.nan, 4.0, 3.0, np.nan, 2.0, 1.0, 0.0])
     wrong = WrongImages(3, size=(2.0, 4.0), when_s=(1.0, 4.0))
-    errors = draw_wrong_images(wrong, before_s, 2, np.random.default_rng(0))
+    errors = draw_wrong_measurements(wrong, before_s, 2, np.random.default_rng(0))
     changed = np.flatnonzero(errors.any(axis=0))
     assert len(changed) == 3
     assert set(changed) <= {2, 3, 5, 6}

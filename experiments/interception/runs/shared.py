@@ -145,6 +145,8 @@ def allowance(scenario: Scenario) -> str | None:
         line += f", error of their direction at most {model.pointing_error_rad:g} rad"
     if model.wrong_images:
         line += f"; at most {some_wrong_images(scenario.information_set.wrong_images)} in a flight"
+    if scenario.range_sensor is not None and scenario.range_sensor.wrong_measurements:
+        line += f"; at most {scenario.range_sensor.wrong_measurements} wrong ranges in a flight"
     return line
 
 
