@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from infoset import InformationSet, Model, SetModel, StateBox
 from infoset.arrays import Flags, Floats
 from infoset.covered_set import CoveredSet, CoveredSetView, classes_left_out, information_set
+from infoset.engine.set_state import SetStatus
 from tests.infoset.test_information_set import SENSOR, STEP, E
 
 KNOWN = StateBox((-10e3, 10e3), (5301.3e3, 6301.3e3), (-100.0, 100.0), (-59e3, -57e3))
