@@ -1,9 +1,9 @@
 """Information sets of which at least one never sees a wrong image.
 
-Theorem A of docs/wrong-images.md: the images are dealt into G classes, image number modulo G, and
-each member of the cover leaves out the images of q classes. At most q wrong images lie in at most q
-classes, so one member uses none of them: it contains the true state, and its guaranteed miss bounds
-the miss.
+Theorem 9 of docs/guarantee-wrong-images.md: the images are dealt into G classes, image number
+modulo G, and each member of the cover leaves out the images of q classes. At most q wrong images
+lie in at most q classes, so one member uses none of them: it contains the true state, and its
+guaranteed miss bounds the miss.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 If at most one image is wrong, a proof says more than that a member is empty: the wrong image is one
 of the images so far that the other members leave out. They are divided into groups, each of which a
 new member leaves out; groups whose member is empty are cleared, and the others are divided further.
-See "Detection and split" in docs/wrong-images.md.
+See Lemma 24 in docs/guarantee-wrong-images.md.
 """
 
 from __future__ import annotations

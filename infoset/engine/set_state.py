@@ -260,8 +260,8 @@ class SetState:
     def _limits_of_right_ranges(
         self, earlier: Floats, lower: Floats, upper: Floats, active: Flags
     ) -> tuple[Floats, Floats]:
-        """Return the limits of the label by all measured ranges, each of shape (B,), m: Theorem B
-        of docs/wrong-images.md.
+        """Return the limits of the label by all measured ranges, each of shape (B,), m: Theorem
+        10 of docs/guarantee-wrong-images.md.
 
         A label below the (q + 1)-th largest of the lower limits contradicts more than q ranges.
         """
