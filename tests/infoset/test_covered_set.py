@@ -213,18 +213,30 @@ def test_member_leaves_an_image_out_if_it_may_be_empty_without_a_proof(
     np.testing.assert_allclose(upper, expected_upper, rtol=1e-3)
 
 
+def test_member_that_would_leave_out_many_images_is_empty_without_a_proof() -> None:
+    covered = after_a_wrong_image(MODEL, 140)
+    for _ in range(5):
+        covered.measure_angle(0.02)
+        covered.predict()
+    assert covered.emptied.any()
+    assert covered.tracking.all()
+    assert not covered.refuted.any()
+
+
 def test_member_recovers_only_if_no_other_one_lives() -> None:
     covered = CoveredSet(MODEL)
     flown(covered, 20)
-    # Image 20 is in class 0: member 0 does not use it and lives.
+    # Only the set without image 20 lives: it is proved to be wrong.
     covered.measure_angle(0.02)
-    assert covered.emptied[0].tolist() == [False, True, True, True]
-    assert covered._nonempty_members()[0].tolist() == [True, False, False, False]
+    assert covered.suspected_steps() == [20]
+    assert covered.emptied[0].sum() == 3
+    living = ~covered.emptied
+    assert covered._nonempty_members().tolist() == living.tolist()
     covered.predict()
 
     covered.measure_angle(-0.02)
     assert covered.inconsistent.all()
-    assert covered._nonempty_members()[0].tolist() == [True, False, False, False]
+    assert covered._nonempty_members().tolist() == living.tolist()
     assert covered.tracking.all()
     assert not covered.guaranteed_miss()[1].any()
 
