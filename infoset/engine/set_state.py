@@ -418,6 +418,7 @@ class SetState:
         self.lower_label[row] = self.lower_label[source]
         self.upper_label[row] = self.upper_label[source]
         self._range_limits[..., row] = self._range_limits[..., source]
+        self._left_out[row] = self._left_out[source]
         self.status[row] = SetStatus.TRACKING.value
         self.lost_step[row] = -1
 
