@@ -16,6 +16,13 @@ from infoset.rendezvous.reachability.answer import (
 from infoset.rendezvous.reachability.backward import backward_bounds
 from infoset.rendezvous.reachability.closed_loop import ClosedLoopFlight, replan
 from infoset.rendezvous.reachability.guaranteed import affine_plan
+from infoset.rendezvous.reachability.guided import (
+    GuidedCraft,
+    GuidedFlight,
+    LinearTruth,
+    TrueMotion,
+    guided_flight,
+)
 from infoset.rendezvous.reachability.motion import (
     IMPULSE,
     MotionModel,
@@ -86,7 +93,10 @@ __all__ = [
     "EmptyTubeError",
     "ErrorSet",
     "FeedbackPlan",
+    "GuidedCraft",
+    "GuidedFlight",
     "InadmissibleStartError",
+    "LinearTruth",
     "MirrorBound",
     "MotionModel",
     "Multipliers",
@@ -104,6 +114,7 @@ __all__ = [
     "ThinSetError",
     "ThrustShape",
     "TooManyVerticesError",
+    "TrueMotion",
     "VertexCounts",
     "affine_plan",
     "analytic_centre",
@@ -115,6 +126,7 @@ __all__ = [
     "discretised",
     "effort",
     "feedback_plan",
+    "guided_flight",
     "impulsive",
     "information_radius",
     "lower_bound",

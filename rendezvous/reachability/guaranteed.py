@@ -153,15 +153,15 @@ def affine_plan(problem: OutputProblem, window: int | None = None) -> AffinePlan
         If the program was not solved.
     """
     if problem.relative_error is None:
-        return _best_plan(problem, window)
+        return plan_at_caps(problem, window)
     if not np.isfinite(problem.limits).all():
         raise ValueError("errors proportional to the controls need limits of all controls")
 
-    plan = _best_plan(replace(problem, caps=problem.limits), window)
+    plan = plan_at_caps(replace(problem, caps=problem.limits), window)
     for _ in range(_MAX_CAP_ROUNDS - 1):
         smaller = replace(problem, caps=plan.control_ranges.largest)
         try:
-            better = _best_plan(smaller, window)
+            better = plan_at_caps(smaller, window)
         except (NoRobustPlanError, NoSolutionError):
             # Only the margin for the solver's errors can be missing.
             return plan
@@ -174,8 +174,12 @@ def affine_plan(problem: OutputProblem, window: int | None = None) -> AffinePlan
     return plan
 
 
-def _best_plan(problem: OutputProblem, window: int | None) -> AffinePlan:
-    """Return the plan of the program, whose constraints on the path enter when they are broken."""
+def plan_at_caps(problem: OutputProblem, window: int | None) -> AffinePlan:
+    """Return the affine plan with the smallest guarantee at the caps of the problem.
+
+    Constraints on the path enter the program when they are broken. Arguments and exceptions are
+    those of `affine_plan`.
+    """
     rows = problem.rows
     on_path = np.asarray(rows.states.any(axis=1))
     for spare in _SPARES:
