@@ -15,6 +15,13 @@ from infoset.rendezvous.reachability.answer import (
 )
 from infoset.rendezvous.reachability.backward import backward_bounds
 from infoset.rendezvous.reachability.closed_loop import ClosedLoopFlight, replan
+from infoset.rendezvous.reachability.coasting import Coasting, CoastTube, UnboundedCoastError
+from infoset.rendezvous.reachability.drift import (
+    DriftCertificate,
+    PassiveSafety,
+    drift_certificate,
+    safe_plan,
+)
 from infoset.rendezvous.reachability.guaranteed import affine_plan
 from infoset.rendezvous.reachability.guided import (
     GuidedCraft,
@@ -89,7 +96,10 @@ __all__ = [
     "AffinePlan",
     "AnsweredPlan",
     "ClosedLoopFlight",
+    "CoastTube",
+    "Coasting",
     "ControlEffort",
+    "DriftCertificate",
     "EmptyTubeError",
     "ErrorSet",
     "FeedbackPlan",
@@ -104,6 +114,7 @@ __all__ = [
     "NonlinearMotion",
     "OptimalControls",
     "OutputProblem",
+    "PassiveSafety",
     "PathRows",
     "Ranges",
     "ReachabilityProblem",
@@ -115,6 +126,7 @@ __all__ = [
     "ThrustShape",
     "TooManyVerticesError",
     "TrueMotion",
+    "UnboundedCoastError",
     "VertexCounts",
     "affine_plan",
     "analytic_centre",
@@ -124,6 +136,7 @@ __all__ = [
     "between_periods",
     "chebyshev_centre",
     "discretised",
+    "drift_certificate",
     "effort",
     "feedback_plan",
     "guided_flight",
@@ -141,6 +154,7 @@ __all__ = [
     "nearest",
     "optimal_controls",
     "replan",
+    "safe_plan",
     "samples",
     "solve",
     "tightened",

@@ -130,7 +130,9 @@ class PlanVariables:
         return AffinePlan(self.problem, values[self.nominal], values[self.gains])
 
 
-def affine_plan(problem: OutputProblem, window: int | None = None) -> AffinePlan:
+def affine_plan(
+    problem: OutputProblem, window: int | None = None, *, every_row: bool = False
+) -> AffinePlan:
     """Return the affine plan with the smallest certified guarantee.
 
     A `window` of w outputs makes the program sparser: u(t) depends on p(t - w + 1), ..., p(t).
@@ -143,6 +145,9 @@ def affine_plan(problem: OutputProblem, window: int | None = None) -> AffinePlan
     next program, until the guarantee stays. The guarantee holds in every round and does not
     increase, but the caps may be a local optimum.
 
+    Constraints of the path enter the program when they are broken, or all at first with
+    `every_row`, which is faster if most of them are needed.
+
     Raises
     ------
     NoRobustPlanError
@@ -153,15 +158,15 @@ def affine_plan(problem: OutputProblem, window: int | None = None) -> AffinePlan
         If the program was not solved.
     """
     if problem.relative_error is None:
-        return plan_at_caps(problem, window)
+        return plan_at_caps(problem, window, every_row)
     if not np.isfinite(problem.limits).all():
         raise ValueError("errors proportional to the controls need limits of all controls")
 
-    plan = plan_at_caps(replace(problem, caps=problem.limits), window)
+    plan = plan_at_caps(replace(problem, caps=problem.limits), window, every_row)
     for _ in range(_MAX_CAP_ROUNDS - 1):
         smaller = replace(problem, caps=plan.control_ranges.largest)
         try:
-            better = plan_at_caps(smaller, window)
+            better = plan_at_caps(smaller, window, every_row)
         except (NoRobustPlanError, NoSolutionError):
             # Only the margin for the solver's errors can be missing.
             return plan
@@ -174,14 +179,14 @@ def affine_plan(problem: OutputProblem, window: int | None = None) -> AffinePlan
     return plan
 
 
-def plan_at_caps(problem: OutputProblem, window: int | None) -> AffinePlan:
+def plan_at_caps(problem: OutputProblem, window: int | None, every_row: bool = False) -> AffinePlan:
     """Return the affine plan with the smallest guarantee at the caps of the problem.
 
-    Constraints on the path enter the program when they are broken. Arguments and exceptions are
-    those of `affine_plan`.
+    Constraints on the path enter the program when they are broken, or at once if `every_row`.
+    Arguments and exceptions are those of `affine_plan`.
     """
     rows = problem.rows
-    on_path = np.asarray(rows.states.any(axis=1))
+    on_path = np.asarray(rows.states.any(axis=1)) & (not every_row)
     for spare in _SPARES:
         entered = ~on_path
         while True:

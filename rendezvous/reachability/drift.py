@@ -1,0 +1,347 @@
+"""Passive safety: if the engines fail, the drift stays outside a ball about the target.
+
+Theorem 8 of `docs/guaranteed-rendezvous.md`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+
+from infoset.rendezvous._arrays import Flags, Floats
+from infoset.rendezvous.reachability.coasting import Coasting, CoastTube
+from infoset.rendezvous.reachability.conic import NoSolutionError
+from infoset.rendezvous.reachability.guaranteed import PlanVariables, affine_plan, row_sizes
+from infoset.rendezvous.reachability.motion import IMPULSE
+from infoset.rendezvous.reachability.outputs import AffinePlan, OutputProblem, PathRows
+from infoset.rendezvous.reachability.robust import NoRobustPlanError
+from infoset.rendezvous.reachability.sparse_program import (
+    Affine,
+    InfeasibleProgramError,
+    SparseProgram,
+    variable_sum,
+)
+
+_NORMAL_STEPS = 60
+"""Steps towards the nearest point of a set; the last ones change a distance by less than 1 %."""
+_MAX_ROUNDS = 12
+"""Maximum number of renewals of the normals; most plans end after three."""
+_MAX_CHECKS = 40
+"""Maximum number of programs with the same normals: each one has more rows, or larger caps."""
+_GAIN = 1e-3
+"""Relative decrease of the guarantee below which the normals are not renewed, as for the caps of
+errors proportional to the controls."""
+_SPARE = 1e-6
+"""Margin of the constraints in the program of the least violation, relative to their sizes."""
+_CAP_RESERVE = 1e-3
+"""Part of a limit that is added to a cap, because the solver cannot keep caps of nearly
+zero; it makes an error of 3 % larger by 0.003 % of the limit."""
+_AHEAD = 0.05
+"""Part of the keep-out distance by which the least violation may be negative: it leaves room for
+the bounds between instants, which change with the plan."""
+
+
+@dataclass(frozen=True, eq=False)
+class PassiveSafety:
+    """If the engines fail after an impulse, the drift stays outside a ball about the target.
+
+    Parameters
+    ----------
+    coasting : Coasting
+        The drifts: after which impulses the engines may fail, and for how long.
+    keep_out_m : float
+        Radius of the ball about the origin.
+    """
+
+    coasting: Coasting
+    keep_out_m: float
+
+
+@dataclass(frozen=True, eq=False)
+class DriftCertificate:
+    """Certain distances of all drifts from the target under a plan.
+
+    Parameters
+    ----------
+    plan : AffinePlan
+        The plan.
+    tube : CoastTube
+        The drifts under the plan with its errors.
+    normals : ndarray, shape (K, N, 3)
+        A unit vector for each interval of each drift. Any of them prove a distance.
+    """
+
+    plan: AffinePlan
+    tube: CoastTube
+    normals: Floats
+
+    @cached_property
+    def distances(self) -> Floats:
+        """Lower bounds of the distance in each interval of each drift, m, shape (K, N)."""
+        return self.tube.certain_distances(self.normals)
+
+    @property
+    def least_distance(self) -> float:
+        """The certain distance from the target at all times of all drifts, m; 0 if there is none.
+
+        The flight before a failure is part of the drifts. After the last impulse with a drift the
+        flight is covered for the duration of a drift.
+        """
+        return max(0.0, float(self.distances.min()))
+
+
+def drift_certificate(
+    plan: AffinePlan, coasting: Coasting, normals: Floats | None = None
+) -> DriftCertificate:
+    """Return the certain distances of drifts, with the best normals that were found.
+
+    If `normals`, shape (K, N, 3), are given, each is replaced only by one that proves more. The
+    problem must have states in m and m/s in Hill's axes and impulses in m/s at the starts of the
+    periods.
+
+    Raises
+    ------
+    ValueError
+        If there are more failures than impulses, or the intervals are too long for a bound.
+    UnboundedCoastError
+        If nonlinear motion is not proved to stay within any distance.
+    """
+    problem = plan.problem
+    if coasting.impulses > problem.periods:
+        raise ValueError(
+            f"engines can fail after at most {problem.periods} impulses, found {coasting.impulses}"
+        )
+    tube = coasting.tube(plan)
+    return DriftCertificate(plan, tube, _best_normals(tube, normals))
+
+
+def _best_normals(tube: CoastTube, known: Floats | None) -> Floats:
+    """Return unit vectors, (K, N, 3), with large certain distances, not smaller than the known."""
+    centres = 0.5 * (tube.middles[:, :-1, :3] + tube.middles[:, 1:, :3])
+    best = _unit(centres) if known is None else known
+    values = tube.certain_distances(best)
+
+    def offer(normals: Floats) -> None:
+        found = tube.certain_distances(normals)
+        better = found > values
+        best_now = np.where(better[..., None], normals, best)
+        best[...] = best_now
+        values[...] = np.maximum(values, found)
+
+    best = best.copy()
+    if known is not None:
+        offer(_unit(centres))
+    for corner in product((-1.0, 0.0, 1.0), repeat=3):
+        if any(corner):
+            offer(np.broadcast_to(_unit(np.array(corner)), best.shape))
+
+    # Gilbert's method: towards the point of the set that is nearest to the origin.
+    point = tube.nearest(best)
+    for _ in range(_NORMAL_STEPS):
+        change = tube.nearest(_unit(point)) - point
+        square = np.einsum("kia,kia->ki", change, change)
+        down = -np.einsum("kia,kia->ki", point, change)
+        share = np.divide(down, square, out=np.zeros_like(down), where=square > 0.0)
+        point = point + np.clip(share, 0.0, 1.0)[..., None] * change
+        offer(_unit(point))
+    return best
+
+
+def _unit(vectors: Floats) -> Floats:
+    """Return unit vectors; the first axis for zero."""
+    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    first = np.zeros(3)
+    first[0] = 1.0
+    safe = np.where(lengths > 0.0, lengths, 1.0)
+    return np.where(lengths > 0.0, vectors / safe, first)
+
+
+def safe_plan(
+    problem: OutputProblem, safety: PassiveSafety, window: int | None = None
+) -> DriftCertificate:
+    """Return the affine plan with the smallest guarantee that was found with safe drifts.
+
+    The problem and the `window` are those of `affine_plan`, with states in m and m/s in Hill's axes
+    and impulses in m/s. The plan's problem has the constraints of the drifts as further rows of the
+    path. The normals of the constraints are those of the plan without safety at first, and are then
+    renewed until the guarantee stays: the plan is a local optimum. Its distances are certificates.
+
+    Raises
+    ------
+    NoRobustPlanError
+        If no safe plan was found.
+    ValueError, NoSolutionError, UnboundedCoastError
+        As in `affine_plan` and `drift_certificate`.
+    """
+    free = _at_own_caps(affine_plan(problem, window))
+    found = drift_certificate(free, safety.coasting)
+    if found.least_distance >= safety.keep_out_m:
+        return found
+
+    found = _first_safe(problem, safety, free, window)
+    for _ in range(_MAX_ROUNDS):
+        if found.plan.guarantee <= (1.0 + _GAIN) * free.guarantee:
+            return found
+        better = _safe_with(problem, safety, found, window)
+        if better is None or better.plan.guarantee >= found.plan.guarantee:
+            return found
+        gain = found.plan.guarantee - better.plan.guarantee
+        found = better
+        if gain <= _GAIN * found.plan.guarantee:
+            return found
+    return found
+
+
+def _at_own_caps(plan: AffinePlan) -> AffinePlan:
+    """Return the plan with errors proportional to its own largest controls."""
+    problem = plan.problem
+    if problem.relative_error is None:
+        return plan
+    limits = replace(problem, caps=None).limits
+    caps = plan.control_ranges.largest + _CAP_RESERVE * limits
+    return plan.under(replace(problem, caps=np.minimum(limits, caps)))
+
+
+def _first_safe(
+    problem: OutputProblem, safety: PassiveSafety, free: AffinePlan, window: int | None
+) -> DriftCertificate:
+    """Return a safe plan, with normals of the plan without safety at first.
+
+    Errors proportional to the controls are bounded at caps, which are constraints: those of the
+    plan without safety may exclude the safe plans, and larger ones make the errors larger.
+    """
+    starts = [free]
+    if problem.relative_error is not None:
+        own = free.control_ranges.largest
+        same = np.broadcast_to(own.max(axis=0), own.shape)
+        starts = [free.under(replace(problem, caps=caps)) for caps in (own, same, problem.limits)]
+    nearest = 0.0
+    for start in starts:
+        found = drift_certificate(start, safety.coasting)
+        nearest = max(nearest, found.least_distance)
+        for _ in range(_MAX_ROUNDS):
+            safe = _safe_with(problem, safety, found, window)
+            if safe is not None:
+                return safe
+            nearer = _least_violation(problem, safety, found, window)
+            nearest = max(nearest, nearer.least_distance)
+            if nearer.distances.min() <= found.distances.min() + _GAIN * safety.keep_out_m:
+                break
+            found = nearer
+    raise NoRobustPlanError(
+        f"no plan was found whose drifts stay {safety.keep_out_m:g} m from the target for all "
+        f"errors; the best one stays {nearest:.3g} m away; reduce the keep-out distance, the "
+        "periods of drift or the errors"
+    )
+
+
+def _safe_with(
+    problem: OutputProblem, safety: PassiveSafety, found: DriftCertificate, window: int | None
+) -> DriftCertificate | None:
+    """Return the best plan with the normals of a certificate, or None if there is none."""
+    limited = replace(problem, caps=found.plan.problem.caps)
+    normals = found.normals
+    extents = found.tube.extents(normals)
+    sagittas = found.tube.sagittas
+    entered = _worst(found.distances, (1.0 + _AHEAD) * safety.keep_out_m)
+    for _ in range(_MAX_CHECKS):
+        rows = _rows(safety, normals, extents + sagittas[..., None], entered)
+        try:
+            safe = replace(limited, path=_joined(problem.path, rows))
+            plan = affine_plan(safe, window, every_row=True)
+        except (NoRobustPlanError, NoSolutionError):
+            return None
+        own = _at_own_caps(plan)
+        tube = safety.coasting.tube(own)
+        distances = tube.certain_distances(normals)
+        if distances.min() >= safety.keep_out_m:
+            return drift_certificate(own, safety.coasting, normals)
+
+        entered = entered | _worst(distances, safety.keep_out_m)
+        # The bounds between instants may be larger for the new plan: they are the next caps.
+        extents = np.maximum(extents, tube.extents(normals))
+        sagittas = np.maximum(sagittas, tube.sagittas)
+    return None
+
+
+def _worst(distances: Floats, below: float) -> Flags:
+    """Return flags of the interval of each drift with the least distance, if it is too small."""
+    flags = np.zeros(distances.shape, dtype=bool)
+    drifts = np.arange(len(distances))
+    lowest = distances.argmin(axis=1)
+    flags[drifts, lowest] = distances[drifts, lowest] < below
+    return flags
+
+
+def _rows(safety: PassiveSafety, normals: Floats, allowances: Floats, entered: Flags) -> PathRows:
+    """Return the constraints of x(k) and u(k) for both ends of some intervals.
+
+    `allowances`, shape (K, N, 2), are what is subtracted from normal . position, in m.
+    """
+    transitions = safety.coasting.transitions
+    drifts, intervals = np.nonzero(entered)
+    chosen = normals[drifts, intervals]
+    begin = np.einsum("ra,ran->rn", chosen, transitions[drifts, intervals, :3])
+    end = np.einsum("ra,ran->rn", chosen, transitions[drifts, intervals + 1, :3])
+    states = np.concatenate([begin, end])
+    return PathRows(
+        np.concatenate([drifts, drifts]),
+        states,
+        states @ IMPULSE,
+        safety.keep_out_m + allowances[drifts, intervals].T.ravel(),
+        np.full(len(states), np.inf),
+    )
+
+
+def _joined(first: PathRows | None, second: PathRows) -> PathRows:
+    if first is None:
+        return second
+    return PathRows(*(np.concatenate(pair) for pair in zip(first, second, strict=True)))
+
+
+def _least_violation(
+    problem: OutputProblem, safety: PassiveSafety, found: DriftCertificate, window: int | None
+) -> DriftCertificate:
+    """Return the plan whose drifts violate the constraints least, with renewed normals."""
+    limited = replace(problem, caps=found.plan.problem.caps)
+    allowances = found.tube.extents(found.normals) + found.tube.sagittas[..., None]
+    aim = (1.0 + _AHEAD) * safety.keep_out_m
+    entered = _worst(found.distances, aim)
+    if not entered.any():
+        return found
+    while True:
+        rows = _rows(safety, found.normals, allowances, entered)
+        plan = _plan_of_least_violation(limited, rows, window, -_AHEAD * safety.keep_out_m)
+        violation = float((rows.lower - plan.ranges_of(rows).lower).max())
+        tube = safety.coasting.tube(plan)
+        distances = tube.certain_distances(found.normals) + tube.sagittas - found.tube.sagittas
+        reached = min(aim, safety.keep_out_m - violation)
+        new = _worst(distances, reached - _GAIN * safety.keep_out_m) & ~entered
+        if not new.any():
+            return drift_certificate(plan, safety.coasting, found.normals)
+        entered = entered | new
+
+
+def _plan_of_least_violation(
+    problem: OutputProblem, rows: PathRows, window: int | None, least: float
+) -> AffinePlan:
+    """Return the plan that minimises the largest violation of rows, which is `least` or more."""
+    program = SparseProgram()
+    plan = PlanVariables(program, problem, window, problem.periods)
+    violation = program.variables(1)
+    less_violation = variable_sum(violation, -np.ones((1, 1)))
+    program.keep(less_violation.plus(Affine(np.array([least]))))
+    for k in range(len(rows.times)):
+        middle, errors = plan.row(int(rows.times[k]), rows.states[k], rows.controls[k])
+        under = middle.times(-1.0).plus(program.maxima(problem.errors, errors).below)
+        program.keep(under.plus(Affine(rows.lower[k : k + 1])).plus(less_violation))
+
+    kept = problem.rows
+    plan.keep_rows(kept, _SPARE * row_sizes(problem, kept))
+    try:
+        return plan.plan(program.minimise(variable_sum(violation, np.ones((1, 1)))))
+    except InfeasibleProgramError as error:
+        raise NoRobustPlanError("no plan keeps the constraints for all errors") from error

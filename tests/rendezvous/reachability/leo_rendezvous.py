@@ -1,0 +1,109 @@
+"""A rendezvous in low Earth orbit with bounded errors, and its motion computed independently."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from infoset.arrays import Floats
+from infoset.geometry.zonotope import Zonotope
+from infoset.rendezvous.reachability import OutputProblem, impulsive
+from infoset.rendezvous.relative_motion import EllipticOrbit, TschaunerHempel
+
+GRAVITY = 3.986004418e14
+PERIGEE_M = 6778137.0
+PERIODS = 12
+START_ERROR = np.repeat([20.0, 0.01], 3)
+
+
+def orbit_of(eccentricity: float = 0.0) -> EllipticOrbit:
+    """An orbit that starts at its perigee, 400 km above the equator."""
+    return EllipticOrbit.of_size(PERIGEE_M / (1.0 - eccentricity), eccentricity, GRAVITY)
+
+
+def rendezvous(
+    orbit: EllipticOrbit, behind_m: float = 1000.0, period_s: float = 240.0, limit: float = 1.0
+) -> OutputProblem:
+    """Twelve impulses of 1 mm/s error to a point 150 m behind; position is known to 1 m."""
+    transition, control = impulsive(TschaunerHempel(orbit), PERIODS, period_s)
+    start = np.array([0.0, -behind_m, 0.0, 0.0, 0.0, 0.0])
+    return OutputProblem(
+        transition,
+        control,
+        np.repeat(np.eye(3, 6)[None], PERIODS, axis=0),
+        np.repeat(np.eye(3)[None], PERIODS, axis=0),
+        Zonotope.box(start - START_ERROR, start + START_ERROR),
+        np.diag(np.repeat([1.0, 50.0], 3)),
+        target=np.array([0.0, -150.0, 0.0, 0.0, 0.0, 0.0]),
+        execution_error=np.full(3, 1e-3),
+        control_limits=np.full((PERIODS, 3), limit),
+    )
+
+
+def hill(rate: float, time_s: float) -> Floats:
+    """The textbook's matrix of the Clohessy-Wiltshire equations."""
+    s = np.sin(rate * time_s)
+    c = np.cos(rate * time_s)
+    turned = rate * time_s
+    return np.array(
+        [
+            [4.0 - 3.0 * c, 0.0, 0.0, s / rate, 2.0 * (1.0 - c) / rate, 0.0],
+            [
+                6.0 * (s - turned),
+                1.0,
+                0.0,
+                -2.0 * (1.0 - c) / rate,
+                4.0 * s / rate - 3.0 * time_s,
+                0.0,
+            ],
+            [0.0, 0.0, c, 0.0, 0.0, s / rate],
+            [3.0 * rate * s, 0.0, 0.0, c, 2.0 * s, 0.0],
+            [-6.0 * rate * (1.0 - c), 0.0, 0.0, -2.0 * s, 4.0 * c - 3.0, 0.0],
+            [0.0, 0.0, -rate * s, 0.0, 0.0, c],
+        ]
+    )
+
+
+def two_body(orbit: EllipticOrbit, start_s: float, states: Floats, times_s: Floats) -> Floats:
+    """Relative states of craft about a central body at some times, shape (s, k, 6).
+
+    `states` have the shape (k, 6). All craft and the target are integrated in inertial axes.
+    """
+    count = len(states)
+    inertial = np.vstack([np.zeros((1, 6)), states])
+    frame, spin, target = _frame(orbit, start_s)
+    position = target[:3] + inertial[:, :3] @ frame
+    velocity = target[3:] + (inertial[:, 3:] + np.cross(spin, inertial[:, :3])) @ frame
+
+    def slope(_time: float, flat: Floats) -> Floats:
+        r, v = flat.reshape(2, count + 1, 3)
+        pull = -GRAVITY * r / np.linalg.norm(r, axis=1, keepdims=True) ** 3
+        return np.concatenate([v.ravel(), pull.ravel()])
+
+    begin = np.concatenate([position.ravel(), velocity.ravel()])
+    # Positions of 7e6 m to 1e-12: errors below 1 mm.
+    solution = solve_ivp(
+        slope, (start_s, times_s[-1]), begin, "DOP853", times_s, rtol=1e-12, atol=1e-6
+    )
+    relative = []
+    for time_s, flat in zip(times_s, solution.y.T, strict=True):
+        r, v = flat.reshape(2, count + 1, 3)
+        frame, spin, _ = _frame(orbit, float(time_s))
+        apart = (r[1:] - r[:1]) @ frame.T
+        relative.append(np.hstack([apart, (v[1:] - v[:1]) @ frame.T - np.cross(spin, apart)]))
+    return np.array(relative)
+
+
+def _frame(orbit: EllipticOrbit, time_s: float) -> tuple[Floats, Floats, Floats]:
+    """Hill's axes as rows, their rate in these axes, and the target's inertial state."""
+    e = orbit.eccentricity
+    f = float(orbit.true_anomaly(time_s))
+    parameter = PERIGEE_M * (1.0 + e)
+    outward = np.array([np.cos(f), np.sin(f), 0.0])
+    along = np.array([-np.sin(f), np.cos(f), 0.0])
+    radius = parameter / (1.0 + e * np.cos(f))
+    speed = np.sqrt(GRAVITY / parameter)
+    velocity = speed * (e * np.sin(f) * outward + (1.0 + e * np.cos(f)) * along)
+    spin = np.array([0.0, 0.0, np.sqrt(GRAVITY * parameter) / radius**2])
+    frame = np.vstack([outward, along, [0.0, 0.0, 1.0]])
+    return frame, spin, np.concatenate([radius * outward, velocity])
