@@ -20,6 +20,10 @@ class Reach(FileOptions):
     are simulated, those of a rendezvous on the linear and on the nonlinear model. Without --out,
     --json, --csv or --html no file is written.
 
+    If the problem has measurements or an initial state with bounded errors ([sensor],
+    [initial_error]), the result is how near the craft comes for certain: without measurements, with
+    affine feedback, with a last impulse that is planned again, and what no strategy can improve.
+
     Axes: x radially outward, y along the motion, z along the orbit's normal (Hill's), at the
     passive craft.
     """
@@ -59,6 +63,18 @@ class Reach(FileOptions):
             ),
         ),
     ] = False
+    flights: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N",
+            min=0,
+            max=100_000,
+            help=(
+                "Number of simulated flights of affine feedback, half of them with errors at their "
+                "bounds, for a problem with bounded errors. Default: 100."
+            ),
+        ),
+    ] = None
     seed: Seed = 0
     csv: Csv = None
     html: Html = None

@@ -39,7 +39,7 @@ _MAX_TIMES = 6
 """Largest number of times at which sets are drawn in planes; chosen: more cover each other."""
 _MAX_TIMES_IN_SPACE = 4
 """Largest number of times at which sets are drawn in space; chosen: more cover each other."""
-_COLOUR_RANGE = (0.1, 0.95)
+COLOUR_RANGE = (0.1, 0.95)
 """Part of the colour map for the times of the sets, from yellow to violet.
 
 The colours differ in hue and in brightness.
@@ -144,10 +144,10 @@ def _draw_motion(
     unit, per_m = report.length_unit
     factors = np.array([per_m if state < 3 else 1.0 for state in states])
     times = shown_times(report.solution.problem.periods, max_times)
-    colours = mpl.colormaps["viridis_r"](np.linspace(*_COLOUR_RANGE, len(times)))
+    colours = mpl.colormaps["viridis_r"](np.linspace(*COLOUR_RANGE, len(times)))
     for t, colour in zip(times, colours, strict=True):
         points = report.solution.sets.projection(SetKind.TUBE, t, states, tolerance) * factors
-        _draw_set(axes, points, colour, f"tube at t = {t}")
+        draw_set(axes, points, colour, f"tube at t = {t}")
 
     for look, member, path in _shown(report):
         name = _NAMES.get(member.name, member.name)
@@ -165,7 +165,7 @@ def _draw_motion(
     label_axes(axes, [f"{_AXES[state]}, {unit if state < 3 else 'm/s'}" for state in states])
 
 
-def _draw_set(axes: Any, points: Floats, colour: Any, label: str) -> None:
+def draw_set(axes: Any, points: Floats, colour: Any, label: str) -> None:
     """Draw the convex hull of points in a plane or in space.
 
     A hull without area or volume is drawn as its points on a line.

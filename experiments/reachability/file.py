@@ -6,19 +6,31 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
-from pydantic import BeforeValidator, Field
+from pydantic import Field
 
 from infoset.arrays import Floats
 from infoset.experiments.common.orbit_checks import check_angle, check_orbit
-from infoset.limits import POSITIVE, Description, Limits, Name, Part, Positive
+from infoset.experiments.reachability.error_tables import (
+    MAX_GUARANTEED_PERIODS,
+    NO_ERROR,
+    ExecutionError,
+    Goal,
+    InitialError,
+    PositionSensor,
+    check_starts,
+)
+from infoset.experiments.reachability.vectors import Bound, Vector
+from infoset.limits import Description, Limits, Name, Part, Positive
 from infoset.rendezvous.reachability import (
     IMPULSE,
     MAX_PERIODS,
+    ErrorBounds,
     MotionModel,
     NonlinearMotion,
+    OutputProblem,
     ReachabilityProblem,
     ThrustShape,
     between_impulses,
@@ -26,6 +38,7 @@ from infoset.rendezvous.reachability import (
     discretised,
     impulsive,
     motion_of,
+    with_errors,
 )
 from infoset.rendezvous.relative_motion import EllipticOrbit, HeldMotion
 from infoset.rendezvous.two_body import OrbitalElements
@@ -37,10 +50,6 @@ _INSTANTS = 12
 """Instants within a period at which selected controls are checked."""
 
 
-def _for_each_axis(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else (value,) * 3
-
-
 class Engine(Enum):
     """Shape of the control: thrust held over each period, or an impulse at its start."""
 
@@ -48,9 +57,6 @@ class Engine(Enum):
     IMPULSES = "impulses"
 
 
-Vector = tuple[float, float, float]
-Bound = Annotated[Vector, POSITIVE, BeforeValidator(_for_each_axis)]
-"""A positive number for each axis; a file may have one number for all."""
 Period = Annotated[int, Limits(minimum=0, maximum=MAX_PERIODS, whole=True)]
 
 
@@ -215,6 +221,8 @@ class Rendezvous:
     of a unit control. With ``engine = "impulses"`` a period begins with an impulse of at most
     `max_impulse_m_s` along each axis, or in norm for thrust in a ball. The constraints hold at t =
     0..T, before and after an impulse, and at `checks_between_periods` instants within each period.
+
+    With `sensor` or `initial_error` the result is what a rendezvous can guarantee.
     """
 
     kind: ClassVar[str] = "reachable-rendezvous"
@@ -237,6 +245,10 @@ class Rendezvous:
     control_limits: Annotated[tuple[ControlLimits, ...], Field(max_length=20)] = ()
     disturbance: Disturbance | None = None
     navigation: Navigation | None = None
+    initial_error: InitialError | None = None
+    execution_error: ExecutionError | None = None
+    sensor: PositionSensor | None = None
+    goal: Goal | None = None
 
     def __post_init__(self) -> None:
         self._check_engine()
@@ -259,6 +271,40 @@ class Rendezvous:
                 f"bound; rounding decides the result beyond {_MAX_REACH:g}"
             )
         _ = self.problem  # raises ValueError if the values define no problem
+        self._check_errors()
+
+    def _check_errors(self) -> None:
+        """Raise `ValueError` if the tables of the errors contradict others, or one is missing."""
+        if not self.is_guaranteed:
+            for key in ("execution_error", "goal"):
+                if getattr(self, key) is not None:
+                    raise ValueError(f"{key}: needs [sensor] or [initial_error]")
+            return
+        if self.goal is None:
+            raise ValueError("goal: is missing; [sensor] and [initial_error] need it")
+        if self.navigation is not None:
+            raise ValueError("navigation: must be omitted with [sensor] or [initial_error]")
+        if self.thrust is ThrustShape.BALL:
+            raise ValueError(
+                'thrust: must be "box" with [sensor] or [initial_error]; a box with 0.577 of the '
+                "bound is inside the ball"
+            )
+        if self.periods > MAX_GUARANTEED_PERIODS:
+            raise ValueError(
+                f"periods: must be at most {MAX_GUARANTEED_PERIODS} with [sensor] or "
+                "[initial_error]"
+            )
+        self._check_execution()
+        check_starts(self.problem, self.errors.start)
+
+    def _check_execution(self) -> None:
+        execution = self.execution_error
+        if execution is None:
+            return
+        if self.has_impulses and execution.absolute_m_s2 is not None:
+            raise ValueError("execution_error.absolute_m_s2: impulses need absolute_m_s")
+        if not self.has_impulses and execution.absolute_m_s is not None:
+            raise ValueError("execution_error.absolute_m_s: held thrust needs absolute_m_s2")
 
     def _check_engine(self) -> None:
         if self.has_impulses:
@@ -348,6 +394,39 @@ class Rendezvous:
         if self.navigation is None:
             return None
         return np.array(self.navigation.position_error_m + self.navigation.velocity_error_m_s)
+
+    @property
+    def is_guaranteed(self) -> bool:
+        """Whether the file asks for what a rendezvous can guarantee with bounded errors."""
+        return self.sensor is not None or self.initial_error is not None
+
+    @cached_property
+    def errors(self) -> ErrorBounds:
+        """Bounds of the errors, in the units of the states and the controls."""
+        start = self.initial_error or InitialError()
+        execution = self.execution_error or ExecutionError()
+        absolute = np.array(execution.absolute_m_s or NO_ERROR)
+        if not self.has_impulses:
+            absolute = np.array(execution.absolute_m_s2 or NO_ERROR) / self.unit_m_s2
+        measured: tuple[float, ...] = ()
+        if self.sensor is not None:
+            measured = self.sensor.position_error_m + (self.sensor.velocity_error_m_s or ())
+        return ErrorBounds(
+            np.array(start.position_m + start.velocity_m_s),
+            absolute,
+            np.full(3, execution.relative),
+            np.array(measured),
+            self.disturbance_effect,
+        )
+
+    @cached_property
+    def output_problem(self) -> OutputProblem:
+        """The problem with bounded errors."""
+        goal = self.goal
+        assert goal is not None
+        box = goal.position_box_m + (goal.velocity_box_m_s or (np.inf,) * 3)
+        target = np.array(goal.position_m + goal.velocity_m_s)
+        return with_errors(self.problem, self.errors, target, np.array(box))
 
     def _problem(self, periods: int) -> ReachabilityProblem:
         between = None

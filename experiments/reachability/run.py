@@ -11,11 +11,12 @@ import numpy as np
 from infoset.arrays import Floats
 from infoset.experiments.common.built_in_files import kind_of
 from infoset.experiments.common.errors import InputError
-from infoset.experiments.common.input_file import parse, source_of
+from infoset.experiments.common.input_file import parse, read_file, source_of
 from infoset.experiments.common.problem_command import ProblemCommand
 from infoset.experiments.common.screen import BeginProgress
 from infoset.experiments.reachability.command import Reach
 from infoset.experiments.reachability.file import Rendezvous
+from infoset.experiments.reachability.guarantee_report import COMMAND as GUARANTEE_COMMAND
 from infoset.experiments.reachability.page import reachability_page
 from infoset.experiments.reachability.report import (
     ChosenControl,
@@ -171,9 +172,13 @@ COMMAND = ProblemCommand(
 
 
 def run(options: Reach) -> None:
-    """Solve a rendezvous, or a problem of a linear system."""
+    """Solve a rendezvous, with bounded errors or without, or a problem of a linear system."""
     text, source = source_of(options.problem, [Rendezvous.kind, ReachableSystem.kind])
     command: ProblemCommand[Any, Any] = COMMAND
     if kind_of(parse(text, source)) == ReachableSystem.kind:
         command = SYSTEM_COMMAND
+    elif read_file(Rendezvous, options.problem, options.settings).is_guaranteed:
+        command = GUARANTEE_COMMAND
+    if options.flights is not None and command is not GUARANTEE_COMMAND:
+        raise InputError("--flights: is for problems with [sensor] or [initial_error]")
     command.run(options)

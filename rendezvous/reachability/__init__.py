@@ -6,6 +6,7 @@ controls. Controls are selected from this set and simulated.
 
 from infoset.rendezvous.reachability.answer import (
     AnsweredPlan,
+    LateConstraintError,
     MirrorBound,
     Multipliers,
     answered_plan,
@@ -14,6 +15,12 @@ from infoset.rendezvous.reachability.answer import (
     multipliers,
 )
 from infoset.rendezvous.reachability.backward import backward_bounds
+from infoset.rendezvous.reachability.bounded_errors import (
+    ErrorBounds,
+    PlanFlights,
+    fly_plan,
+    with_errors,
+)
 from infoset.rendezvous.reachability.closed_loop import ClosedLoopFlight, replan
 from infoset.rendezvous.reachability.coasting import Coasting, CoastTube, UnboundedCoastError
 from infoset.rendezvous.reachability.drift import (
@@ -29,6 +36,11 @@ from infoset.rendezvous.reachability.guided import (
     LinearTruth,
     TrueMotion,
     guided_flight,
+)
+from infoset.rendezvous.reachability.independent_parts import (
+    ProblemPart,
+    independent_parts,
+    plan_of_parts,
 )
 from infoset.rendezvous.reachability.motion import (
     IMPULSE,
@@ -101,11 +113,13 @@ __all__ = [
     "ControlEffort",
     "DriftCertificate",
     "EmptyTubeError",
+    "ErrorBounds",
     "ErrorSet",
     "FeedbackPlan",
     "GuidedCraft",
     "GuidedFlight",
     "InadmissibleStartError",
+    "LateConstraintError",
     "LinearTruth",
     "MirrorBound",
     "MotionModel",
@@ -116,6 +130,8 @@ __all__ = [
     "OutputProblem",
     "PassiveSafety",
     "PathRows",
+    "PlanFlights",
+    "ProblemPart",
     "Ranges",
     "ReachabilityProblem",
     "ReachableSets",
@@ -139,8 +155,10 @@ __all__ = [
     "drift_certificate",
     "effort",
     "feedback_plan",
+    "fly_plan",
     "guided_flight",
     "impulsive",
+    "independent_parts",
     "information_radius",
     "lower_bound",
     "min_periods",
@@ -153,10 +171,12 @@ __all__ = [
     "multipliers",
     "nearest",
     "optimal_controls",
+    "plan_of_parts",
     "replan",
     "safe_plan",
     "samples",
     "solve",
     "tightened",
     "vertices",
+    "with_errors",
 ]

@@ -14,11 +14,14 @@ import numpy as np
 
 from infoset.rendezvous._arrays import Floats, Places
 from infoset.rendezvous.reachability.conic import NoSolutionError
-from infoset.rendezvous.reachability.guaranteed import (
-    PlanVariables,
-    row_sizes,
+from infoset.rendezvous.reachability.guaranteed import PlanVariables, is_broken, row_sizes
+from infoset.rendezvous.reachability.outputs import (
+    AffinePlan,
+    ErrorSet,
+    OutputProblem,
+    PathRows,
+    Ranges,
 )
-from infoset.rendezvous.reachability.outputs import AffinePlan, ErrorSet, OutputProblem, PathRows
 from infoset.rendezvous.reachability.robust import NoRobustPlanError
 from infoset.rendezvous.reachability.sparse_program import (
     Affine,
@@ -40,6 +43,10 @@ _SAME = 1e-12
 _EQUAL_OUTPUTS = 1e-12
 """Difference of outputs up to which they are equal, relative to the largest sum of the absolute
 terms over all errors: rounding."""
+
+
+class LateConstraintError(ValueError):
+    """A constraint of the path depends on a last control that answers all outputs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,31 +199,63 @@ class AnsweredPlan:
 def answered_plan(problem: OutputProblem, window: int | None = None) -> AnsweredPlan:
     """Return the plan with the smallest guarantee if the last control answers all outputs.
 
-    One linear program; `window` and the errors are as for `affine_plan`, and errors proportional to
-    the controls are bounded at the caps of the problem, such as the caps of an affine plan.
+    `window` and the errors are as for `affine_plan`, and errors proportional to the controls are
+    bounded at the caps of the problem, such as the caps of an affine plan. Constraints of the path
+    enter the linear program only when they are broken. Those that depend on the last control are
+    not in it: they must follow from its limits and from the guarantee.
 
     Raises
     ------
-    ValueError
-        If a constraint of the path depends on the last control.
+    LateConstraintError
+        If a constraint of the path that depends on the last control does not follow.
     NoRobustPlanError
         If no plan satisfies the constraints for all errors.
     NoSolutionError
         If the program was not solved.
     """
-    last = problem.periods - 1
     rows = problem.rows
-    on_path = rows.states.any(axis=1)
-    depends = (rows.times == last) & rows.controls.any(axis=1) & on_path
-    if depends.any() or (rows.times > last).any():
-        raise ValueError("constraints of the path must not depend on the last control")
-
-    before = rows.chosen((rows.times < last) | on_path)
+    on_path = np.asarray(rows.states.any(axis=1))
+    acting = (rows.times == problem.periods - 1) & rows.controls.any(axis=1)
+    late = acting | (rows.times == problem.periods)
+    early = rows.chosen(~late)
     for spare in _SPARES:
-        found = _solved(problem, window, before, spare)
-        if found.plan.excess <= 0.0:
-            return found
+        entered = ~on_path[~late]
+        while True:
+            found = _solved(problem, window, early.chosen(entered), spare)
+            broken = is_broken(found.plan.ranges_of(early), early)
+            if not (broken & ~entered).any():
+                break
+            entered = entered | broken
+        if broken.any():
+            continue
+        if not _follow(found, rows.chosen(late)):
+            raise LateConstraintError(
+                "constraints of the path depend on the last control, and do not follow from its "
+                "limits and the guarantee"
+            )
+        return found
     raise NoSolutionError("the solver's plan breaks constraints, also with a margin of 1e-5")
+
+
+def _follow(found: AnsweredPlan, rows: PathRows) -> bool:
+    """Whether constraints hold for every last control within its limits, and the guarantee."""
+    problem = found.plan.problem
+    last = problem.periods - 1
+    before = rows.chosen(rows.times == last)
+    limits = np.where(before.controls == 0.0, 0.0, problem.limits[-1])
+    push = (np.abs(before.controls) * limits).sum(axis=1)
+    states = found.plan.ranges_of(before._replace(controls=np.zeros_like(before.controls)))
+    with_push = Ranges(states.lower - push, states.upper + push)
+
+    # A normal a = goal' c has |a . (x(T) - target)| <= guarantee sum |c_i|.
+    at_end = rows.chosen(rows.times > last)
+    shares = np.linalg.lstsq(problem.goal.T, at_end.states.T, rcond=None)[0].T
+    apart = np.abs(shares @ problem.goal - at_end.states).max(axis=1, initial=0.0)
+    is_bounded = apart <= _SINGULAR * np.abs(at_end.states).max(axis=1, initial=0.0)
+    spread = np.where(is_bounded, found.guarantee * np.abs(shares).sum(axis=1), np.inf)
+    middle = at_end.states @ problem.aim
+    end = Ranges(middle - spread, middle + spread)
+    return not (is_broken(with_push, before).any() or is_broken(end, at_end).any())
 
 
 def _solved(

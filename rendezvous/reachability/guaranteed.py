@@ -9,7 +9,7 @@ import numpy as np
 
 from infoset.rendezvous._arrays import Flags, Floats, Places
 from infoset.rendezvous.reachability.conic import NoSolutionError
-from infoset.rendezvous.reachability.outputs import AffinePlan, OutputProblem, PathRows
+from infoset.rendezvous.reachability.outputs import AffinePlan, OutputProblem, PathRows, Ranges
 from infoset.rendezvous.reachability.robust import NoRobustPlanError
 from infoset.rendezvous.reachability.sparse_program import (
     Affine,
@@ -89,7 +89,8 @@ class PlanVariables:
         It is None if no control with an effect depends on p(s). The effect of several controls is
         a new variable, so that the rows of the errors are sparse.
         """
-        reacting = np.flatnonzero((self.gains[:, s, 0, 0] >= 0) & effects.any(axis=1))
+        reacts = (self.gains[:, s] >= 0).any(axis=(1, 2))
+        reacting = np.flatnonzero(reacts & effects.any(axis=1))
         if not len(reacting):
             return None
         count = self.gains.shape[3]
@@ -191,7 +192,7 @@ def plan_at_caps(problem: OutputProblem, window: int | None, every_row: bool = F
         entered = ~on_path
         while True:
             plan = _plan_with(problem, window, entered, spare)
-            broken = _broken(plan)
+            broken = is_broken(plan.row_ranges, rows)
             if not broken.any():
                 return plan
             if not (broken & ~entered).any():
@@ -200,9 +201,8 @@ def plan_at_caps(problem: OutputProblem, window: int | None, every_row: bool = F
     raise NoSolutionError("the solver's plan breaks constraints, also with a margin of 1e-5")
 
 
-def _broken(plan: AffinePlan) -> Flags:
-    rows = plan.problem.rows
-    ranges = plan.row_ranges
+def is_broken(ranges: Ranges, rows: PathRows) -> Flags:
+    """Return which of the rows their ranges violate, shape (k,)."""
     return np.asarray((ranges.upper > rows.upper) | (ranges.lower < rows.lower))
 
 

@@ -22,6 +22,7 @@ COMMANDS = {
     "pareto.run": ("pareto", "pareto-2008"),
     "multipoint.run": ("multipoint", "service-2"),
     "reachability.run": ("reach", "rendezvous-2021", "--select", "energy"),
+    "reachability.guarantee_report": ("reach", "approach-guaranteed", "--set", "periods=4"),
     "reachability.system": ("reach", "double-integrator"),
     "pursuit.run": ("pursuit", "leo-pursuit", "--feedback", "coast"),
     "pursuit.map": ("pursuit-map", "geo-pursuit", *SMALL_MAP),

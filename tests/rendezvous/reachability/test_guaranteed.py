@@ -15,6 +15,7 @@ from infoset.experiments.common.input_file import load_problem
 from infoset.geometry.polytope import Polytope
 from infoset.geometry.zonotope import Zonotope
 from infoset.rendezvous.reachability import (
+    LateConstraintError,
     NoRobustPlanError,
     OutputProblem,
     PathRows,
@@ -395,13 +396,50 @@ def test_constraints_that_no_plan_keeps_are_refused() -> None:
         affine_plan(replace(arch(4), path=rows))
 
 
-def test_answer_refuses_constraints_on_its_control() -> None:
+@pytest.mark.parametrize(
+    ("time", "state", "control", "end", "follows"),
+    [
+        # x(4) is at most the guarantee, 8.23 m.
+        (4, [1.0, 0.0, 0.0, 0.0], [0.0, 0.0], 8.3, True),
+        (4, [1.0, 0.0, 0.0, 0.0], [0.0, 0.0], 8.2, False),
+        # A velocity at the end is at most 8.23 times 0.05 m/min.
+        (4, [0.0, 0.0, 1.0, 1.0], [0.0, 0.0], 0.83, True),
+        (4, [0.0, 0.0, 1.0, 1.0], [0.0, 0.0], 0.82, False),
+        # The last control is at most 200 m/min along an axis.
+        (3, [0.0, 0.0, 0.0, 0.0], [1.0, -1.0], 400.0, True),
+        (3, [0.0, 0.0, 0.0, 0.0], [1.0, -1.0], 399.0, False),
+    ],
+)
+def test_constraints_of_the_answer_must_follow_from_its_limits_and_the_guarantee(
+    time: int, state: list[float], control: list[float], end: float, follows: bool
+) -> None:
     rows = PathRows(
-        np.array([4]), np.eye(4)[:1], np.zeros((1, 2)), np.array([-np.inf]), np.array([10.0])
+        np.array([time]),
+        np.array([state]),
+        np.array([control]),
+        np.array([-np.inf]),
+        np.array([end]),
     )
+    problem = replace(arch(4, limit=200.0), path=rows)
 
-    with pytest.raises(ValueError, match="must not depend on the last control"):
-        answered_plan(replace(arch(4), path=rows))
+    if follows:
+        assert answered_plan(problem, 3).guarantee == pytest.approx(8.2343, abs=PRINTED)
+        return
+    with pytest.raises(LateConstraintError, match="depend on the last control"):
+        answered_plan(problem, 3)
+
+
+def test_answered_plan_keeps_the_path_for_all_errors() -> None:
+    free = answered_plan(arch(10, 10.0, 6.0), 3)
+    speed = 0.9 * float(free.plan.state_ranges.largest[1:9, 2:].max())
+    times = np.repeat(np.arange(1, 9), 2)
+    ends = np.full(16, speed)
+    rows = PathRows(times, np.tile(np.eye(4)[2:], (8, 1)), np.zeros((16, 2)), -ends, ends)
+
+    found = answered_plan(replace(arch(10, 10.0, 6.0), path=rows), 3)
+
+    assert found.plan.state_ranges.largest[1:9, 2:].max() <= speed
+    assert found.guarantee >= free.guarantee * (1.0 - SOLVED)
 
 
 def test_target_moves_the_aim() -> None:

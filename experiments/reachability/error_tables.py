@@ -1,0 +1,89 @@
+"""Tables of a `reachable-rendezvous` file with bounded errors, and its problem.
+
+A file with `[sensor]` or `[initial_error]` asks for a guarantee: see
+`docs/guaranteed-rendezvous.md`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from infoset.arrays import Floats
+from infoset.experiments.reachability.vectors import Bound, HalfWidth, Vector
+from infoset.limits import Limits
+from infoset.rendezvous.reachability import ReachabilityProblem
+
+MAX_GUARANTEED_PERIODS = 60
+"""Maximum number of periods with bounded errors; chosen: the programs of 60 take a minute."""
+NO_ERROR = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class InitialError:
+    """Half-widths of the set of the active craft at t = 0, about `[initial]`."""
+
+    position_m: HalfWidth = NO_ERROR
+    velocity_m_s: HalfWidth = NO_ERROR
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExecutionError:
+    """Error of a control along each axis: at most a constant plus a part of the control.
+
+    The constant is `absolute_m_s` for impulses and `absolute_m_s2` for held thrust.
+    """
+
+    absolute_m_s: HalfWidth | None = None
+    absolute_m_s2: HalfWidth | None = None
+    relative: Annotated[float, Limits(minimum=0.0, below=1.0)] = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class PositionSensor:
+    """Position, and velocity if it has an error, measured at t = 0..T - 1 before the control.
+
+    The numbers are the largest errors along each axis.
+    """
+
+    position_error_m: HalfWidth
+    velocity_error_m_s: HalfWidth | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Goal:
+    """A hold point at t = T, and half-widths of the box about it.
+
+    The size of this box that contains the craft for all errors is minimised, with the proportions
+    of the box. Without `velocity_box_m_s` the velocity is free.
+    """
+
+    position_m: Vector = NO_ERROR
+    velocity_m_s: Vector = NO_ERROR
+    position_box_m: Bound
+    velocity_box_m_s: Bound | None = None
+
+
+def check_starts(problem: ReachabilityProblem, error: Floats) -> None:
+    """Raise `ValueError` if a start within half-widths, shape (6,), breaks a constraint."""
+    normals, offsets = problem.further
+    spread = np.concatenate([error, np.abs(normals) @ error])
+    states = np.concatenate([np.abs(problem.initial), normals @ problem.initial])
+    over = states + spread - np.concatenate([problem.state_bounds, offsets[0]])
+    # The start itself was checked, to rounding.
+    broken = np.flatnonzero((spread > 0.0) & (over > 0.0)).tolist()
+    if not broken:
+        return
+
+    listed = []
+    for row in broken:
+        if row < problem.states:
+            name = problem.state_name(row)
+        else:
+            name = problem.name_of(row - problem.states)
+        listed.append(f"{name} by {over[row]:.6g}")
+    raise ValueError(
+        f"initial_error: starts within it are outside their constraints: {', '.join(listed)}"
+    )

@@ -1,0 +1,222 @@
+"""`infoset reach` for a rendezvous with bounded errors: what it can guarantee."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from infoset.arrays import Floats
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.common.screen import BeginProgress
+from infoset.experiments.common.units import Unit
+from infoset.experiments.reachability.command import Reach
+from infoset.experiments.reachability.file import Rendezvous
+from infoset.rendezvous.reachability import (
+    AffinePlan,
+    LateConstraintError,
+    NoRobustPlanError,
+    OutputProblem,
+    PlanFlights,
+    ProblemPart,
+    affine_plan,
+    answered_plan,
+    fly_plan,
+    independent_parts,
+    information_radius,
+    lower_bound,
+    plan_of_parts,
+)
+
+WINDOW = 4
+"""Number of the last measurements that a control reacts to. In the table of
+`docs/guaranteed-rendezvous.md` more give no smaller guarantee."""
+FLIGHTS = 100
+"""Number of simulated flights without the option --flights."""
+_LAST_LIMITS = (np.inf, 2.0)
+"""Limits of the last control, tried in turn, as multiples of its largest value in the affine plan.
+Chosen: an answer is about as large as the affine reaction."""
+_RELAXED = 10.0
+"""Factor of the bounds of states that shows whether they are the conflict; chosen."""
+
+
+@dataclass(frozen=True, eq=False)
+class GuaranteeReport:
+    """Results of one command; guarantees are in units of the goal's box.
+
+    `open_loop` is the best plan without measurements, None if no such plan keeps the constraints.
+    `answered`, `bound` and `radius` are None without a sensor; `answered` is also None if `refusal`
+    says why there is none.
+    """
+
+    rendezvous: Rendezvous
+    plan: AffinePlan
+    open_loop: AffinePlan | None
+    answered: float | None
+    refusal: str | None
+    bound: float | None
+    radius: float | None
+    flights: PlanFlights
+
+    @cached_property
+    def by_measurements(self) -> Floats:
+        """The guarantees of affine plans that have only the first k = 0..T measurements.
+
+        NaN if none keeps the constraints. It takes a program for each.
+        """
+        problem = self.rendezvous.output_problem
+        guarantees = [np.nan if self.open_loop is None else self.open_loop.guarantee]
+        for count in range(1, problem.periods):
+            try:
+                guarantees.append(best_plan(first_measurements(problem, count)).guarantee)
+            except NoRobustPlanError:
+                guarantees.append(np.nan)
+        return np.array([*guarantees, self.plan.guarantee])
+
+    @property
+    def unit(self) -> Unit:
+        """The unit of printed guarantees: m if the box of positions is a cube."""
+        goal = self.rendezvous.goal
+        assert goal is not None
+        if np.ptp(goal.position_box_m) > 0.0:
+            return "boxes", 1.0
+        return "m", goal.position_box_m[0]
+
+    @property
+    def control_unit(self) -> Unit:
+        """The unit of printed controls."""
+        if self.rendezvous.has_impulses:
+            return "m/s", 1.0
+        return "m/s^2", self.rendezvous.unit_m_s2
+
+
+def solve_guarantee(
+    rendezvous: Rendezvous, options: Reach, begin: BeginProgress
+) -> GuaranteeReport:
+    """Return the certified plans, the bounds of all strategies, and the simulated flights."""
+    _check_options(options)
+    progress = begin(rendezvous.name)
+    problem = rendezvous.output_problem
+    open_loop = None
+    try:
+        open_loop = best_plan(first_measurements(problem, 0))
+    except NoRobustPlanError:
+        if rendezvous.sensor is None:
+            raise _conflict(rendezvous, progress) from None
+    progress(0.1)
+    if rendezvous.sensor is None:
+        assert open_loop is not None
+        plan = open_loop
+        answered, refusal, bound, radius = None, None, None, None
+    else:
+        try:
+            plans = plans_of_parts(problem)
+        except NoRobustPlanError:
+            raise _conflict(rendezvous, progress) from None
+        plan = plan_of_parts(problem, plans)
+        progress(0.3)
+        answered, refusal = _answered(plans)
+        progress(0.5)
+        bound = max((lower_bound(part.problem).value for part, _ in plans), default=0.0)
+        progress(0.6)
+        radius = max((information_radius(part.problem).value for part, _ in plans), default=0.0)
+    progress(0.7)
+    count = FLIGHTS if options.flights is None else options.flights
+    flights = fly_plan(rendezvous.problem, plan, rendezvous.errors, count, options.seed)
+    progress(1.0)
+    return GuaranteeReport(rendezvous, plan, open_loop, answered, refusal, bound, radius, flights)
+
+
+def _check_options(options: Reach) -> None:
+    given = {
+        "--select": options.select is not None,
+        "--replan": options.replan,
+        "--backward": options.backward,
+        "--html": options.html is not None,
+    }
+    for option, is_given in given.items():
+        if is_given:
+            raise InputError(f"{option}: is for problems without [sensor] and [initial_error]")
+
+
+def first_measurements(problem: OutputProblem, count: int) -> OutputProblem:
+    """Return the problem with the first `count` measurements only; the others are zero."""
+    output = problem.output.copy()
+    noise = problem.noise.copy()
+    output[count:] = 0.0
+    noise[count:] = 0.0
+    return replace(problem, output=output, noise=noise)
+
+
+def plans_of_parts(problem: OutputProblem) -> list[tuple[ProblemPart, AffinePlan]]:
+    """Return the parts of a problem with the best affine plan of each."""
+    return [(part, affine_plan(part.problem, WINDOW)) for part in independent_parts(problem)]
+
+
+def best_plan(problem: OutputProblem) -> AffinePlan:
+    """Return the best affine plan of a problem."""
+    return plan_of_parts(problem, plans_of_parts(problem))
+
+
+def _answered(plans: list[tuple[ProblemPart, AffinePlan]]) -> tuple[float | None, str | None]:
+    """Return the guarantee with a last control that answers all outputs, or why there is none."""
+    try:
+        found = [_best_answer(plan) for _, plan in plans]
+    except (LateConstraintError, NoRobustPlanError) as error:
+        return None, str(error)
+    return max(found, default=0.0), None
+
+
+def _best_answer(plan: AffinePlan) -> float:
+    """Return the guarantee of the best answer that keeps the constraints after the last control.
+
+    If they do not follow from its limits, the limits are those of `_LAST_LIMITS`. The problem of a
+    plan has the caps of errors that are proportional to controls.
+    """
+    problem = plan.problem
+    for factor in _LAST_LIMITS:
+        limits = problem.limits.copy()
+        limits[-1] = np.minimum(limits[-1], factor * plan.control_ranges.largest[-1])
+        try:
+            return answered_plan(replace(problem, control_limits=limits), WINDOW).guarantee
+        except LateConstraintError as error:
+            refused = error
+    raise refused
+
+
+def _conflict(rendezvous: Rendezvous, progress: Callable[[float], None]) -> InputError:
+    """Return the error of a rendezvous whose constraints no plan keeps, with what to change."""
+    found = []
+    for done, (name, relaxed) in enumerate(_relaxations(rendezvous)):
+        try:
+            best_plan(relaxed.output_problem)
+        except NoRobustPlanError:
+            continue
+        finally:
+            progress(1.0 - 0.5 ** (done + 1))
+        found.append(name)
+    told = "reduce the errors, or relax several constraints"
+    if found:
+        told = f"relax {' or '.join(found)}, or reduce the errors"
+    return InputError(
+        f"{rendezvous.name}: no plan with affine feedback keeps the constraints for all errors; "
+        f"{told}"
+    )
+
+
+def _relaxations(rendezvous: Rendezvous) -> Iterator[tuple[str, Rendezvous]]:
+    """Yield the rendezvous without one of its constraints each, and the name of it."""
+    bounds = rendezvous.bounds
+    for key in ("position_m", "velocity_m_s"):
+        x, y, z = (_RELAXED * value for value in getattr(bounds, key))
+        wider = replace(bounds, **{key: (x, y, z)})
+        yield f"bounds.{key}", replace(rendezvous, bounds=wider)
+    if rendezvous.cone is not None:
+        yield "[cone]", replace(rendezvous, cone=None)
+    for key in ("keep_in", "control_limits"):
+        tables = getattr(rendezvous, key)
+        for number in range(len(tables)):
+            rest = tables[:number] + tables[number + 1 :]
+            yield f"{key} #{number + 1}", replace(rendezvous, **{key: rest})

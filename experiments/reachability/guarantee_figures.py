@@ -1,0 +1,196 @@
+"""Figures of a rendezvous with bounded errors: guarantees, the tube in planes, and controls."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from infoset.arrays import Floats
+from infoset.experiments.common.figure_style import (
+    BOUND,
+    GAME,
+    INK,
+    MEASURED,
+    SET,
+    TICKS,
+    TRUTH,
+    first_panels,
+    label_axes,
+    legend_below,
+    letters,
+    plain_ticks,
+    style,
+    subplots,
+)
+from infoset.experiments.common.hill_axes import AXIS_TITLES, component_titles
+from infoset.experiments.common.units import length_unit, time_unit
+from infoset.experiments.reachability.figures import COLOUR_RANGE, draw_set
+from infoset.experiments.reachability.guarantee import GuaranteeReport
+from infoset.rendezvous.reachability import IMPULSE, AffinePlan
+
+_PLANES = ((1, 0), (1, 2), (4, 3), (4, 5))
+_AXES = (*AXIS_TITLES, *component_titles("v"))
+_NEAR_LIMIT = 0.7
+"""Part of a limit from which it is drawn, as in the figures without errors."""
+
+
+def draw_all(report: GuaranteeReport) -> Iterator[Figure]:
+    """Draw the figures of a report, one after the other."""
+    yield draw_guarantee(report)
+    yield draw_planes(report)
+    yield draw_controls(report)
+
+
+@style()
+def draw_guarantee(report: GuaranteeReport) -> Figure:
+    """Draw the guarantee by the number of measurements, and the tube of the position by time.
+
+    Without a sensor there is only the tube.
+    """
+    has_sensor = report.bound is not None
+    figure, (row,) = subplots(80.0, 1, 2 if has_sensor else 1)
+    panels = [*row]
+    if has_sensor:
+        _draw_by_measurements(panels[0], report)
+    _draw_widths(panels[-1], report)
+    letters(panels)
+    legend_below(figure, 3)
+    return figure
+
+
+def _draw_by_measurements(axes: Axes, report: GuaranteeReport) -> None:
+    unit, factor = report.unit
+    looks: list[tuple[str, float | None, dict[str, Any]]] = [
+        ("last control re-planned", report.answered, {"color": GAME, "linewidth": 1.2}),
+        ("no strategy guarantees less", report.bound, {**BOUND, "color": INK}),
+    ]
+    for name, value, look in looks:
+        if value is not None:
+            axes.axhline(factor * value, label=name, **look)
+    line: dict[str, Any] = {"color": TRUTH, "marker": "o", "markersize": 3.5, "linewidth": 1.2}
+    axes.plot(factor * report.by_measurements, label="affine feedback", **line)
+    axes.set_yscale("log")
+    plain_ticks(axes.yaxis, TICKS)
+    axes.xaxis.set_major_locator(MaxNLocator(8, integer=True))
+    axes.set_xlabel("measurements before the sensor fails")
+    axes.set_ylabel(f"certified distance at the end, {unit}")
+
+
+def _draw_widths(axes: Axes, report: GuaranteeReport) -> None:
+    """Draw the half-widths of the tubes of the position, the largest of the axes."""
+    rendezvous = report.rendezvous
+    name, per_second = time_unit(rendezvous.periods * rendezvous.period_s)
+    plans: list[tuple[str, AffinePlan | None, dict[str, Any]]] = [
+        ("without measurements", report.open_loop, {"color": MEASURED, "linestyle": (0, (5, 1.5))}),
+        ("affine feedback", report.plan, {"color": TRUTH, "marker": "o", "markersize": 3.5}),
+    ]
+    for label, plan, look in plans:
+        if plan is None or (plan is report.plan and report.bound is None):
+            continue
+        ranges = plan.state_ranges
+        widths = 0.5 * (ranges.upper - ranges.lower)[:, :3].max(axis=1)
+        times = per_second * rendezvous.period_s * np.arange(len(widths))
+        axes.plot(times, widths, label=label, linewidth=1.2, **look)
+    axes.set_yscale("log")
+    plain_ticks(axes.yaxis, TICKS)
+    axes.set_xlabel(f"time, {name}")
+    axes.set_ylabel("uncertainty of the position, ± m")
+
+
+@style()
+def draw_planes(report: GuaranteeReport) -> Figure:
+    """Draw the path without errors, and the tube of all errors, in planes.
+
+    A plane with a component that is always zero is left out.
+    """
+    largest = report.plan.state_ranges.largest.max(axis=0)
+    planes = [plane for plane in _PLANES if largest[plane[1]] > 0.0]
+    figure, grid = subplots(95.0 * ((len(planes) + 1) // 2), (len(planes) + 1) // 2, 2)
+    panels = first_panels(grid, len(planes))
+    for axes, plane in zip(panels, planes, strict=True):
+        _draw_plane(axes, report, list(plane))
+    letters(panels)
+    legend_below(figure, 4)
+    return figure
+
+
+def _draw_plane(axes: Axes, report: GuaranteeReport, states: list[int]) -> None:
+    plan = report.plan
+    unit, per_m = length_unit(float(plan.state_ranges.largest[:, :3].max()))
+    factors = np.array([per_m if state < 3 else 1.0 for state in states])
+    count = len(plan.nominal_states)
+    colours = mpl.colormaps["viridis_r"](np.linspace(*COLOUR_RANGE, count))
+    for t, colour in enumerate(colours):
+        centre = plan.nominal_states[t, states] * factors
+        columns = plan.state_columns[t][states].T * factors
+        points = centre + _corners(columns[columns.any(axis=1)])
+        shown = {0: "all states at the start", count - 1: "all states at the end"}
+        draw_set(axes, points, colour, shown.get(t, "_"))
+    path = _path(report)[:, states] * factors
+    axes.plot(*path.T, color=TRUTH, linewidth=0.9, label="path without errors", zorder=5)
+    goal = plan.problem.aim[states] * factors
+    star: dict[str, Any] = {"marker": "*", "markersize": 8.0, "color": INK, "linestyle": "none"}
+    axes.plot(*goal[:, None], label="hold point", zorder=7, **star)
+    label_axes(axes, [f"{_AXES[state]}, {unit if state < 3 else 'm/s'}" for state in states])
+
+
+def _corners(generators: Floats) -> Floats:
+    """Return the vertices of the sum of segments +-g in a plane, some of them twice.
+
+    An edge is parallel to a generator, and its ends are the sums that are extreme along its normal.
+    """
+    normals = np.column_stack([-generators[:, 1], generators[:, 0]])
+    signs = np.sign(normals @ generators.T)
+    np.fill_diagonal(signs, 0.0)
+    middles = signs @ generators
+    ends = np.concatenate([middles + generators, middles - generators])
+    return np.concatenate([ends, -ends, np.zeros((1, 2))])
+
+
+def _path(report: GuaranteeReport) -> Floats:
+    """Return the states without errors, also between the periods, shape (points, 6)."""
+    rendezvous = report.rendezvous
+    plan = report.plan
+    legs = []
+    for t, control in enumerate(plan.nominal):
+        state = plan.nominal_states[t]
+        legs.append(state[None])
+        if rendezvous.has_impulses:
+            legs.append((state + IMPULSE @ control)[None])
+        legs.append(rendezvous.instants[t] @ np.concatenate([state, control]))
+    return np.concatenate([*legs, plan.nominal_states[-1:]])
+
+
+@style()
+def draw_controls(report: GuaranteeReport) -> Figure:
+    """Draw the controls without errors, and their ranges over all errors."""
+    unit, per_control = report.control_unit
+    plan = report.plan
+    ranges = plan.control_ranges
+    limits = per_control * report.rendezvous.control_bounds
+    acting = np.flatnonzero(ranges.largest.any(axis=0))
+    figure, (row,) = subplots(75.0, 1, max(1, len(acting)))
+    for axes, j in zip(row, acting, strict=False):
+        low, high = per_control * ranges.lower[:, j], per_control * ranges.upper[:, j]
+        times = np.arange(len(low))
+        axes.bar(times, high - low, bottom=low, label="all errors", width=0.7, **SET)
+        dots: dict[str, Any] = {"marker": "o", "markersize": 3.0, "linestyle": "none"}
+        nominal = per_control * plan.nominal[:, j]
+        axes.plot(times, nominal, label="without errors", color=TRUTH, **dots)
+        if max(np.abs(low).max(), np.abs(high).max()) > _NEAR_LIMIT * limits[j]:
+            for sign in (-1.0, 1.0):
+                axes.axhline(sign * limits[j], label="limit", **BOUND)
+        axes.set_xlabel(f"time, periods of {report.rendezvous.period_s:g} s")
+        axes.set_ylabel(f"{component_titles('u')[j]}, {unit.replace('^2', '²')}")
+        axes.use_sticky_edges = False
+        axes.margins(y=0.08)
+        axes.xaxis.set_major_locator(MaxNLocator(8, integer=True))
+    letters(row)
+    legend_below(figure, 3)
+    return figure

@@ -1,0 +1,255 @@
+"""`infoset reach` for a rendezvous with bounded errors."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.common.input_file import read_text
+from infoset.experiments.reachability.file import Rendezvous
+from tests.built_in import problem_text
+from tests.experiments.command_line import Command
+
+ARCH = "approach-guaranteed"
+SHORT = ("--set", "periods=4", "--set", "max_impulse_m_s=5.0")
+"""Four periods without active limits: the known guarantees 8.5434 and 8.2343, and 5.7698."""
+PRINTED = 1e-4
+"""Half a unit of the last digit of the known numbers, and a little more."""
+
+
+def test_known_guarantees_of_the_arch_rendezvous_are_printed(infoset: Command) -> None:
+    code, out, _ = infoset("reach", ARCH)
+
+    assert code == 0
+    assert re.findall(r"^(.*?)  +([\d.]+) m ", out.replace("\n", " \n"), re.MULTILINE) == [
+        ("without measurements", "116.2"),
+        ("affine feedback", "6.4601"),
+        ("last impulse re-planned", "6.0496"),
+        ("no strategy guarantees less", "6.0496"),
+    ]
+    assert "reacts to the last 4 measurements" in out
+    assert "100 flights of affine feedback" in out
+    assert ": 0 outside, worst" in out
+
+
+def test_results_are_written_with_their_units(infoset: Command) -> None:
+    found = infoset.json("reach", ARCH, *SHORT, "--flights", "40")
+
+    assert found["affine"] == pytest.approx(8.5434, abs=PRINTED)
+    assert found["answered"] == pytest.approx(8.2343, abs=PRINTED)
+    assert found["bound"] == pytest.approx(8.2343, abs=PRINTED)
+    assert found["radius"] == pytest.approx(5.7698, abs=PRINTED)
+    assert found["answered_refusal"] is None
+    assert found["units"]["guarantees"].startswith("m, ")
+    assert found["units"]["controls"] == "m/s, along x, y, z"
+    states = np.array([found["states"][key] for key in ("min", "nominal", "max")])
+    assert states.shape == (3, 5, 6)
+    assert (np.diff(states, axis=0) >= 0.0).all()
+    assert found["box"]["max"] == found["states"]["max"][-1]
+    # The box at the end is that of the goal times the guarantee, in one component at least.
+    box = np.array([1.0, 1.0, 1.0, *[0.05 / 60.0] * 3])
+    assert (np.abs(states[:, -1]) / box).max() == pytest.approx(found["affine"], rel=1e-9)
+    assert np.array(found["controls"]["nominal"]).shape == (4, 3)
+    assert found["flights"]["number"] == 40
+    assert found["flights"]["outside"] == 0
+    assert found["flights"]["largest"] <= found["affine"]
+
+
+def test_gains_and_nominal_controls_fly_the_plan(infoset: Command) -> None:
+    """The plan as written: a flight with one error of the start, predicted by hand."""
+    found = infoset.json("reach", ARCH, *SHORT, "--flights", "0")
+    problem = read_text(
+        Rendezvous,
+        problem_text(ARCH).replace("periods = 10", "periods = 4"),
+        "arch",
+        [SHORT[3]],
+    ).problem
+    nominal = np.array(found["controls"]["nominal"])
+    error = np.array([20.0, -10.0, 0.0, 0.005, 0.0, 0.0])
+    states = np.array([problem.initial, problem.initial + error])
+    shown = []
+    for t in range(4):
+        shown.append(states[1, :3] - states[0, :3])
+        control = nominal[t].copy()
+        for gain in found["gains"]:
+            if gain["period"] == t:
+                control += np.array(gain["matrix"]) @ shown[gain["measurement"]]
+        # Purified outputs: the prediction has the controls of the flight, and no errors.
+        states = states @ problem.transition[t].T + control @ problem.control[t].T
+
+    end = states[1] / [1.0, 1.0, 1.0, *[0.05 / 60.0] * 3]
+    assert np.abs(end).max() <= found["affine"]
+
+
+def test_plan_is_written_as_csv(infoset: Command) -> None:
+    code, out, _ = infoset("reach", ARCH, *SHORT, "--csv", "-")
+
+    rows = list(csv.DictReader(io.StringIO(out)))
+    assert code == 0
+    assert [row["time_s"] for row in rows] == ["0.0", "600.0", "1200.0", "1800.0", "2400.0"]
+    assert float(rows[0]["x_m_min"]) == -925.0
+    assert float(rows[0]["y_m_max"]) == -375.0
+    assert rows[-1]["ux_m_s"] == rows[-1]["uz_m_s_max"] == ""
+
+
+def test_start_alone_gives_the_guarantee_of_dead_reckoning(infoset: Command) -> None:
+    text = problem_text(ARCH)
+    sensor = text[text.index("[sensor]") : text.index("[goal]")]
+    Path("blind.toml").write_text(text.replace(sensor, ""))
+
+    found = infoset.json("reach", "blind.toml")
+    code, out, _ = infoset("reach", "blind.toml")
+
+    assert found["without_measurements"] == pytest.approx(116.2046, abs=PRINTED)
+    assert found["affine"] == found["without_measurements"]
+    assert found["answered"] is found["bound"] is found["radius"] is None
+    assert code == 0
+    assert "no strategy" not in out
+
+
+def test_box_that_is_no_cube_gives_numbers_of_boxes(infoset: Command) -> None:
+    cube = infoset.json("reach", ARCH, *SHORT, "--set", "goal.position_box_m=2.0")
+    other = infoset("reach", ARCH, *SHORT, "--set", "goal.position_box_m=[2.0, 2.0, 1.0]")[1]
+
+    # Nothing acts along z.
+    boxes = float(re.findall(r"affine feedback +([\d.]+) boxes", other)[0])
+    assert boxes == pytest.approx(0.5 * cube["affine"], rel=1e-4)
+
+
+def test_held_thrust_has_its_own_unit(infoset: Command) -> None:
+    text = problem_text(ARCH).replace('engine = "impulses"\n', "")
+    text = text.replace("max_impulse_m_s = 0.1 ", "acceleration_m_s2 = 2e-4 ")
+    text = text.replace(
+        "absolute_m_s = [0.0003333333333, 0.0003333333333, 0.0]", "absolute_m_s2 = [5e-7, 5e-7, 0]"
+    )
+    Path("held.toml").write_text(text)
+
+    found = infoset.json("reach", "held.toml")
+    code, out, _ = infoset("reach", "held.toml")
+
+    assert found["units"]["controls"] == "m/s^2, along x, y, z"
+    assert np.abs(found["controls"]["max"]).max() <= 2e-4
+    assert found["bound"] <= found["answered"] <= found["affine"] < found["without_measurements"]
+    assert found["flights"]["outside"] == 0
+    assert code == 0
+    assert "last control re-planned" in out
+
+
+def test_errors_proportional_to_impulses_cost_guarantee(infoset: Command) -> None:
+    more = ("--set", "execution_error.relative=0.03")
+    exact, relative = (infoset.json("reach", ARCH, *each) for each in ((), more))
+
+    assert relative["affine"] > exact["affine"]
+    # A strategy may avoid them: they are not in the bound.
+    assert relative["bound"] == pytest.approx(exact["bound"], rel=1e-6)
+    assert relative["flights"]["outside"] == 0
+
+
+def test_last_impulse_with_constraints_on_it_has_no_number(infoset: Command) -> None:
+    # The position along the motion at the end is at most 5 m, less than 8.23 m.
+    text = problem_text(ARCH)
+    text += "[[keep_in]]\nnormals = [[0, 1, 0]]\noffsets_m = [5.0]\nfrom_period = 4\n"
+    Path("held.toml").write_text(text)
+
+    found = infoset.json("reach", "held.toml", *SHORT)
+    out = infoset("reach", "held.toml", *SHORT)[1]
+
+    assert found["answered"] is None
+    assert "depend on the last control" in found["answered_refusal"]
+    assert found["states"]["max"][-1][1] <= 5.0
+    assert re.search(r"last impulse re-planned +none +constraints of the path depend", out)
+
+
+def test_conflict_names_what_to_relax(infoset: Command) -> None:
+    # The position at t = 1 is known to 3 m at best, and the band is 2 m wide.
+    text = problem_text(ARCH)
+    text += (
+        "[[keep_in]]\nnormals = [[0, 1, 0], [0, -1, 0]]\noffsets_m = [-300.0, 302.0]\n"
+        "from_period = 1\nuntil_period = 1\n"
+        "[[keep_in]]\nnormals = [[1, 0, 0]]\noffsets_m = [500.0]\n"
+    )
+    Path("narrow.toml").write_text(text)
+
+    err = infoset.refused("reach", "narrow.toml", *SHORT)
+
+    assert err == (
+        "error: approach-guaranteed: no plan with affine feedback keeps the constraints for all "
+        "errors; relax keep_in #1, or reduce the errors\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ((ARCH, "--select", "energy"), "--select: is for problems without [sensor]"),
+        ((ARCH, "--replan"), "--replan: is for problems without [sensor]"),
+        ((ARCH, "--backward"), "--backward: is for problems without [sensor]"),
+        ((ARCH, "--flights", "-1"), "--flights"),
+        (("rendezvous-2021", "--flights", "5"), "--flights: is for problems with [sensor]"),
+        (("double-integrator", "--flights", "5"), "--flights: is for problems with [sensor]"),
+        ((ARCH, "--set", "sensor.range_error_m=1"), 'has no key "sensor.range_error_m"'),
+    ],
+)
+def test_options_that_do_not_fit_are_refused(
+    arguments: tuple[str, ...], told: str, infoset: Command
+) -> None:
+    assert told in infoset.refused("reach", *arguments)
+
+
+@pytest.mark.parametrize(
+    ("problem", "old", "new", "line"),
+    [
+        (ARCH, "[goal] ", "[gaol] ", "did you mean goal"),
+        (
+            "two-impulses",
+            "[orbit]",
+            "[goal]\nposition_box_m = 1.0\n[orbit]",
+            "goal: needs [sensor]",
+        ),
+        (
+            "two-impulses",
+            "[orbit]",
+            "[execution_error]\nrelative = 0.1\n[orbit]",
+            "execution_error: needs [sensor] or [initial_error]",
+        ),
+        (
+            "two-impulses",
+            "[orbit]",
+            "[sensor]\nposition_error_m = 1.0\n[orbit]",
+            "goal: is missing; [sensor] and [initial_error] need it",
+        ),
+        (ARCH, "periods = 10", 'periods = 10\nthrust = "ball"', 'thrust: must be "box"'),
+        (ARCH, "periods = 10\nperiod_min = 10.0", "periods = 61\nperiod_min = 1.0", "at most 60"),
+        (
+            ARCH,
+            "[sensor]",
+            "[navigation]\nposition_error_m = 1.0\nvelocity_error_m_s = 1.0\n[sensor]",
+            "navigation: must be omitted with [sensor]",
+        ),
+        (
+            ARCH,
+            "absolute_m_s = [0.0003333333333, 0.0003333333333, 0.0]",
+            "absolute_m_s2 = 1e-6",
+            "execution_error.absolute_m_s2: impulses need absolute_m_s",
+        ),
+        (ARCH, "position_m = 2000.0", "position_m = 910.0", "outside their constraints: x by 15"),
+        (
+            ARCH,
+            "[25.0, 25.0, 0.0]",
+            "[25.0, -25.0, 0.0]",
+            "initial_error.position_m: must be at least 0",
+        ),
+        (ARCH, "position_box_m = 1.0", "position_box_m = 0.0", "position_box_m"),
+    ],
+)
+def test_contradictions_are_refused(problem: str, old: str, new: str, line: str) -> None:
+    assert old in problem_text(problem)
+    with pytest.raises(InputError, match=re.escape(line)) as caught:
+        read_text(Rendezvous, problem_text(problem).replace(old, new, 1), "mine.toml")
+    assert str(caught.value).startswith("mine.toml: ")

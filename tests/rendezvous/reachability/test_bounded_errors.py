@@ -1,0 +1,124 @@
+"""A rendezvous with bounded errors: its constraints for all errors, and its flights."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from infoset.geometry.zonotope import Zonotope
+from infoset.rendezvous.reachability import (
+    IMPULSE,
+    ErrorBounds,
+    OutputProblem,
+    ReachabilityProblem,
+    ThrustShape,
+    affine_plan,
+    between_impulses,
+    fly_plan,
+    impulsive,
+    with_errors,
+)
+from infoset.rendezvous.relative_motion import ClohessyWiltshire
+
+MOTION = ClohessyWiltshire(0.00113)
+PERIODS = 4
+BOX = np.repeat([1.0, 0.02], 3)
+
+
+def approach(speed_m_s: float = 5.0) -> ReachabilityProblem:
+    """Four impulses a minute apart from 300 m behind; y is at most 20 m."""
+    transition, control = impulsive(MOTION, PERIODS, 60.0)
+    return ReachabilityProblem(
+        transition,
+        control,
+        np.array([0.0, -300.0, 0.0, 0.0, 0.0, 0.0]),
+        np.repeat([1000.0, speed_m_s], 3),
+        np.full(3, 4.0),
+        normals=np.eye(6)[1:2],
+        offsets=np.full((PERIODS + 1, 1), 20.0),
+        between=between_impulses(MOTION, PERIODS, 60.0, 1),
+        jump=IMPULSE,
+        control_normals=np.array([[0.0, -1.0, 0.0]]),
+        control_offsets=np.full((PERIODS, 1), 3.0),
+    )
+
+
+def errors(relative: float = 0.01) -> ErrorBounds:
+    return ErrorBounds(
+        np.repeat([5.0, 0.01], 3), np.full(3, 1e-3), np.full(3, relative), np.full(3, 0.5)
+    )
+
+
+def problem(speed_m_s: float = 5.0) -> OutputProblem:
+    return with_errors(approach(speed_m_s), errors(), np.zeros(6), BOX)
+
+
+def test_goal_is_the_box_and_free_components_do_not_count() -> None:
+    free = with_errors(approach(), errors(), np.zeros(6), np.repeat([2.0, np.inf], 3))
+
+    np.testing.assert_array_equal(free.goal, 0.5 * np.eye(3, 6))
+
+
+def test_thrust_in_a_ball_is_refused() -> None:
+    ball = replace(approach(), thrust=ThrustShape.BALL)
+
+    with pytest.raises(ValueError, match="needs a bound for each control"):
+        with_errors(ball, errors(), np.zeros(6), BOX)
+
+
+def test_constraints_hold_before_and_after_impulses_and_between_them_for_all_errors() -> None:
+    free = affine_plan(problem())
+    speed = 0.9 * float(free.state_ranges.largest[1:-1, 4].max())
+
+    plan = affine_plan(problem(speed))
+    flights = fly_plan(approach(speed), plan, errors(), 2000, 1)
+    unaware = fly_plan(approach(speed), free, errors(), 2000, 1)
+
+    assert plan.guarantee > free.guarantee
+    assert plan.excess <= 0.0
+    assert flights.outside == 0
+    # The plan without this constraint breaks it.
+    assert unaware.outside > 0
+
+
+def test_state_after_an_impulse_has_the_execution_error_too() -> None:
+    rows = problem().path
+    assert rows is not None
+    after = (rows.times == 0) & (rows.states[:, 4] == 1.0) & (rows.controls[:, 1] == 1.0)
+
+    # 5 m/s less 1 mm/s and 1 % of 4 m/s.
+    assert rows.upper[after] == pytest.approx([5.0 - 1e-3 - 0.04])
+    assert rows.lower[after] == pytest.approx([-5.0 + 1e-3 + 0.04])
+
+
+def test_flights_at_the_bounds_come_near_the_guarantee() -> None:
+    plan = affine_plan(problem())
+
+    flights = fly_plan(approach(), plan, errors(), 4000, 2)
+
+    assert flights.outside == 0
+    assert flights.distances.shape == (4000,)
+    assert 0.5 * plan.guarantee < flights.distances.max() <= plan.guarantee
+    # Half of the flights have errors at their bounds, and come farther than the others.
+    assert flights.distances[1::2].mean() > flights.distances[::2].mean()
+
+
+def test_flights_show_a_guarantee_that_is_too_small() -> None:
+    whole = problem()
+    assert isinstance(whole.start, Zonotope)
+    smaller = Zonotope(whole.start.centre, 0.1 * whole.start.generators)
+    plan = affine_plan(replace(whole, start=smaller))
+
+    assert fly_plan(approach(), plan, errors(), 1000, 3).outside > 0
+
+
+def test_flights_depend_on_the_seed_only() -> None:
+    plan = affine_plan(problem())
+    first, same, other = (
+        fly_plan(approach(), plan, errors(), 20, seed).distances for seed in (1, 1, 2)
+    )
+
+    np.testing.assert_array_equal(first, same)
+    assert (first != other).any()
