@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations
+from itertools import combinations, combinations_with_replacement
 
 import numpy as np
 
@@ -158,6 +158,7 @@ class AnsweredPlan:
 
     The last control minimises the maximum of |x(T) - target| over all states that agree with the
     outputs. This set must be exact: with a larger set only the guarantee of an affine plan holds.
+    `guided_flight` computes the control.
 
     Parameters
     ----------
@@ -305,6 +306,48 @@ def _maximum(
         total = total.plus(program.maxima(problem.errors, one).above)
         last = last.plus(variable_sum(columns.ravel(), -outputs))
     return total.plus(program.maxima(problem.errors, last).above)
+
+
+def last_answer(problem: OutputProblem) -> AffinePlan:
+    """Return the best control of a problem of one period without a path, whose start is known.
+
+    The maximum of |x(T) - target| over the start and the errors is a maximum of affine functions of
+    the control, and is computed at all points where m + 1 of them or of the limits are equal. No
+    solver is used.
+    """
+    resting = AffinePlan(
+        problem,
+        np.zeros((1, problem.controls)),
+        np.zeros((1, 1, problem.controls, problem.output.shape[1])),
+    )
+    count = len(problem.goal)
+    rows = PathRows(
+        np.ones(count, dtype=np.int64),
+        problem.goal,
+        np.zeros((count, problem.controls)),
+        np.full(count, -np.inf),
+        np.full(count, np.inf),
+    )
+    ranges = resting.ranges_of(rows)
+    aim = problem.goal @ problem.aim
+    heights = np.concatenate([ranges.upper - aim, aim - ranges.lower])
+    pulls = np.vstack([problem.goal, -problem.goal]) @ problem.control[0]
+
+    # Rows of (u, tau): heights + pulls u <= tau, and the limits.
+    limits = problem.limits[0]
+    limited = np.flatnonzero(np.isfinite(limits))
+    unit = np.eye(problem.controls)[limited]
+    sides = np.vstack([pulls, unit, -unit])
+    has_value = np.arange(len(sides)) < len(pulls)
+    matrix = np.column_stack([sides, -1.0 * has_value])
+    ends = np.concatenate([-heights, limits[limited], limits[limited]])
+    # A row may be repeated: fewer rows decide if a control has no effect.
+    bases = np.array(list(combinations_with_replacement(range(len(ends)), problem.controls + 1)))
+    points = (np.linalg.pinv(matrix[bases]) @ ends[bases][..., None])[:, :-1, 0]
+
+    controls = np.clip(points, -limits, limits)
+    worst = (heights + controls @ pulls.T).max(axis=1)
+    return replace(resting, nominal=controls[[np.argmin(worst)]])
 
 
 @dataclass(frozen=True, eq=False)

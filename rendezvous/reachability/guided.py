@@ -14,6 +14,7 @@ from infoset.geometry.polytope import Polytope
 from infoset.geometry.zonotope import Zonotope
 from infoset.observer.linear_observer import LinearObserver
 from infoset.rendezvous._arrays import Floats, Places
+from infoset.rendezvous.reachability.answer import AnsweredPlan, last_answer
 from infoset.rendezvous.reachability.conic import NoSolutionError
 from infoset.rendezvous.reachability.guaranteed import plan_at_caps
 from infoset.rendezvous.reachability.outputs import AffinePlan, OutputProblem
@@ -23,6 +24,9 @@ MAX_FACETS = 36
 """Facets of a set on board: that of `LinearObserver`."""
 _MAX_POLYTOPE_STATES = 4
 """Number of states up to which an observer has polytopes."""
+_ANSWER_RESERVE = 1e-6
+"""Relative increase of the guarantee of an answered plan in flight: sets on board are larger than
+the exact ones by 1e-7 of their widths, or less."""
 _ROUNDING = 1e-12
 """Relative increase of caps above the certified controls: more than a certificate is rounded."""
 
@@ -102,6 +106,11 @@ class LinearTruth:
             disturbance,
         )
 
+    @property
+    def distance(self) -> float:
+        """The present |x - target|, in units of the goal."""
+        return float(np.abs(self.problem.goal @ (self.state - self.problem.aim)).max())
+
     def measured(self) -> Floats:
         """Return the output y(t), shape (q,)."""
         problem = self.problem
@@ -172,29 +181,48 @@ class GuidedCraft:
 
     Parameters
     ----------
-    plan : AffinePlan
-        The plan before the flight, of `affine_plan`. Limits, caps and the path are those of its
-        problem.
+    plan : AffinePlan or AnsweredPlan
+        The plan before the flight. Limits, caps and the path are those of its problem. Until it is
+        replaced, an answered plan needs exact sets: none is reduced.
     window : int or None, optional
         The window of the programs, as in `affine_plan`.
     max_facets : int or None, optional
-        Maximum number of facets of the set of up to four states, as in `LinearObserver`.
+        Maximum number of facets of the set of up to four states, as in `LinearObserver`. None is
+        no maximum; it is not used with an answered plan.
 
     Notes
     -----
-    A program of up to four states begins in the polytope of the observer. Observers of five and six
-    states have no polytope; the program begins in one with given normals around the set.
+    A program of up to four states begins in the polytope of the observer. Observers of five and
+    more states have no polytope; programs begin in up to three parallelotopes around the set.
+
+    Half-spaces that are known only in flight, such as the wedge of a measured angle, cut `observer`
+    before `measure`.
+
+    Raises
+    ------
+    ArithmeticError
+        In `control`, if a set that is not reduced has more than 5000 vertices.
     """
 
     def __init__(
-        self, plan: AffinePlan, *, window: int | None = None, max_facets: int | None = MAX_FACETS
+        self,
+        plan: AffinePlan | AnsweredPlan,
+        *,
+        window: int | None = None,
+        max_facets: int | None = MAX_FACETS,
     ) -> None:
-        self.problem = plan.problem
-        self.guarantee = plan.guarantee
+        self._needs_answer = isinstance(plan, AnsweredPlan)
+        if isinstance(plan, AnsweredPlan):
+            self.guarantee = (1.0 + _ANSWER_RESERVE) * plan.guarantee
+            self._plan = plan.plan
+            self.observer = observer_of(self._plan.problem, None)
+        else:
+            self.guarantee = plan.guarantee
+            self._plan = plan
+            self.observer = observer_of(plan.problem, max_facets)
+        self.problem = self._plan.problem
         self.planned_at = -1
-        self.observer = observer_of(plan.problem, max_facets)
         self._window = window
-        self._plan = plan
         self._first = 0
         self._outputs = list[Floats]()
         self._applied = list[Floats]()
@@ -211,16 +239,24 @@ class GuidedCraft:
         if self.observer.estimate().is_empty:
             return
 
-        rest = _rest_of(self._plan.problem, self.time - self._first, self._start_set())
+        kept = self._plan.problem
+        since = self.time - self._first
+        for start in self._start_sets():
+            self._adopt_if_better(_rest_of(kept, since, start))
+
+    def _adopt_if_better(self, rest: OutputProblem) -> None:
+        is_answer = rest.periods == 1 and rest.path is None
         try:
-            plan = plan_at_caps(rest, self._window)
+            plan = last_answer(rest) if is_answer else plan_at_caps(rest, self._window)
         except (NoRobustPlanError, NoSolutionError):
             return
-        if plan.guarantee < self.guarantee:
+        # Without an answer, the last control of an answered plan does not exist.
+        if plan.guarantee < self.guarantee or (is_answer and self._needs_answer):
             self._plan = _with_smaller_caps(plan)
             self._first = self.time
             self.planned_at = self.time
             self.guarantee = self._plan.guarantee
+            self._needs_answer = False
 
     def control(self) -> Floats:
         """Return the control u(t), shape (m,), after the output; the next period begins."""
@@ -231,19 +267,23 @@ class GuidedCraft:
         self._applied.append(control)
         return control
 
-    def _start_set(self) -> Polytope:
-        """Return a polytope that contains the set on board."""
+    def _start_sets(self) -> list[Polytope | Zonotope]:
+        """Return sets that contain the set on board."""
         estimate = self.observer.estimate()
         if self.problem.states <= _MAX_POLYTOPE_STATES:
-            return estimate.polytopes[0]
+            return [estimate.polytopes[0]]
 
-        rows = _directions(self.problem, self.time)
-        lower, upper = estimate.output_hull(rows)
-        return Polytope.from_constraints(np.vstack([rows, -rows]), np.concatenate([upper, -lower]))
+        starts = list[Polytope | Zonotope]()
+        for rows in _bases(self.problem, self.time):
+            lower, upper = estimate.output_hull(rows)
+            columns = np.linalg.inv(rows)
+            centre = columns @ (lower + upper) / 2.0
+            starts.append(Zonotope(centre, (columns * (upper - lower) / 2.0).T))
+        return starts
 
 
 def guided_flight(
-    plan: AffinePlan,
+    plan: AffinePlan | AnsweredPlan,
     truth: TrueMotion,
     *,
     window: int | None = None,
@@ -261,7 +301,7 @@ def guided_flight(
     upper = []
     planned_at = []
     is_reduced = False
-    for _ in range(plan.problem.periods):
+    for _ in range(craft.problem.periods):
         craft.measure(truth.measured())
         estimate = craft.observer.estimate()
         is_reduced = is_reduced or bool(estimate.reduced)
@@ -283,25 +323,32 @@ def guided_flight(
     )
 
 
-def _directions(problem: OutputProblem, time: int) -> Floats:
-    """Return normals of a polytope around a set of five or more states, each of maximum size 1.
+def _bases(problem: OutputProblem, time: int) -> list[Floats]:
+    """Return normals of parallelotopes around a set of five or more states, shape (n, n) each.
 
-    They are the states, the goal carried back to the period, and the outputs of the period before
-    carried forward: without them the set loses what several outputs show together.
+    They are the goal carried back to the period, which makes the last answer exact, the states, and
+    the outputs of this period and of the one before.
     """
     goal = problem.goal
     for t in range(problem.periods - 1, time - 1, -1):
         goal = goal @ problem.transition[t]
-    rows = [np.eye(problem.states), goal]
+    candidates = [goal, np.eye(problem.states)]
     if time > 0:
-        rows.append(problem.output[time - 1] @ np.linalg.inv(problem.transition[time - 1]))
-    normals = np.vstack(rows)
-    sizes = np.abs(normals).max(axis=1, keepdims=True)
-    return np.asarray(normals / sizes)
+        before = problem.output[time - 1] @ np.linalg.inv(problem.transition[time - 1])
+        candidates.append(np.vstack([problem.output[time], before]))
+    bases = []
+    for rows in candidates:
+        if len(rows) == problem.states and np.linalg.matrix_rank(rows) == len(rows):
+            bases.append(rows)
+    return bases
 
 
 def observer_of(problem: OutputProblem, max_facets: int | None = MAX_FACETS) -> LinearObserver:
-    """Return an observer of the problem; the errors of a step are given with its control."""
+    """Return an observer of the problem; the errors of a step are given with its control.
+
+    Sets of up to four states have at most `max_facets` facets, if it is not None. Bounds of more
+    states follow from all outputs: a flight has few.
+    """
     noise = [Zonotope(np.zeros(len(matrix)), matrix.T) for matrix in problem.noise]
     return LinearObserver(
         problem.transition,
@@ -310,6 +357,7 @@ def observer_of(problem: OutputProblem, max_facets: int | None = MAX_FACETS) -> 
         noise=noise,
         input_matrix=problem.control,
         max_facets=max_facets,
+        window=None,
     )
 
 
@@ -322,7 +370,7 @@ def errors_of_step(problem: OutputProblem, time: int, control: Floats) -> Zonoto
     return Zonotope(np.zeros(problem.states), effects[:, acting].T)
 
 
-def _rest_of(problem: OutputProblem, time: int, start: Polytope) -> OutputProblem:
+def _rest_of(problem: OutputProblem, time: int, start: Polytope | Zonotope) -> OutputProblem:
     """Return the problem from a period on, whose output has cut the start."""
     output = problem.output[time:].copy()
     noise = problem.noise[time:].copy()
@@ -347,7 +395,8 @@ def _rest_of(problem: OutputProblem, time: int, start: Polytope) -> OutputProble
         acting = problem.path.controls.any(axis=1)
         remains = (problem.path.times > time) | ((problem.path.times == time) & acting)
         path = problem.path.chosen(remains)
-        rest = replace(rest, path=path._replace(times=path.times - time))
+        path = path._replace(times=path.times - time)
+        rest = replace(rest, path=path if len(path.times) else None)
     return rest
 
 
