@@ -52,6 +52,11 @@ from infoset.rendezvous.reachability.motion import (
     impulsive,
     motion_of,
 )
+from infoset.rendezvous.reachability.nonlinear import (
+    NonlinearPlan,
+    nonlinear_plan,
+    with_acceleration,
+)
 from infoset.rendezvous.reachability.optimum import EmptyTubeError
 from infoset.rendezvous.reachability.outputs import (
     AffinePlan,
@@ -126,6 +131,7 @@ __all__ = [
     "Multipliers",
     "NoRobustPlanError",
     "NonlinearMotion",
+    "NonlinearPlan",
     "OptimalControls",
     "OutputProblem",
     "PassiveSafety",
@@ -170,6 +176,7 @@ __all__ = [
     "motion_of",
     "multipliers",
     "nearest",
+    "nonlinear_plan",
     "optimal_controls",
     "plan_of_parts",
     "replan",
@@ -178,5 +185,6 @@ __all__ = [
     "solve",
     "tightened",
     "vertices",
+    "with_acceleration",
     "with_errors",
 ]

@@ -208,9 +208,11 @@ class CoastTube:
     errors : ErrorSet
         Errors of the problem, then the execution errors of the last impulse.
     middles : ndarray, shape (K, N + 1, 6)
+        States without errors, in m and m/s.
     columns : ndarray, shape (K, N + 1, 6, size)
+        Effects of the errors.
     shapes : ndarray, shape (K, N + 1, 6, 6)
-        Shapes of the ellipsoids.
+        Matrices of the ellipsoids.
     accelerations : ndarray, shape (K, N)
         The bounds of the accelerations that the ellipsoids are for, m/s^2.
     """
