@@ -15,6 +15,7 @@ from infoset.experiments.common.units import Unit
 from infoset.experiments.reachability.command import Reach
 from infoset.experiments.reachability.file import Rendezvous
 from infoset.rendezvous.reachability import (
+    IMPULSE,
     AffinePlan,
     LateConstraintError,
     NoRobustPlanError,
@@ -75,6 +76,43 @@ class GuaranteeReport:
                 guarantees.append(np.nan)
         return np.array([*guarantees, self.plan.guarantee])
 
+    def tube(self, time: int, states: list[int]) -> Floats:
+        """Return points in a plane whose hull are two states at a time for all errors, (k, 2).
+
+        It is a sum of segments +-g. An edge is parallel to a segment, and its ends are the sums
+        that are extreme along its normal.
+        """
+        columns = self.plan.state_columns[time][states].T
+        segments = columns[columns.any(axis=1)]
+        normals = np.column_stack([-segments[:, 1], segments[:, 0]])
+        signs = np.sign(normals @ segments.T)
+        np.fill_diagonal(signs, 0.0)
+        middles = signs @ segments
+        ends = np.concatenate([middles + segments, middles - segments])
+        corners = np.concatenate([ends, -ends, np.zeros((1, 2))])
+        return np.asarray(self.plan.nominal_states[time, states] + corners)
+
+    @cached_property
+    def path(self) -> Floats:
+        """The states without errors at `path_times_s`, shape (points, 6)."""
+        legs = []
+        for t, control in enumerate(self.plan.nominal):
+            state = self.plan.nominal_states[t]
+            after = state
+            if self.rendezvous.has_impulses:
+                after = state + IMPULSE @ control
+            inner = self.rendezvous.instants[t] @ np.concatenate([state, control])
+            legs.append(np.vstack([state, after, inner]))
+        return np.concatenate([*legs, self.plan.nominal_states[-1:]])
+
+    @property
+    def path_times_s(self) -> Floats:
+        """The times of `path`: that of each control twice, then times within its period."""
+        periods = self.plan.problem.periods
+        inner = np.linspace(0.0, 1.0, self.rendezvous.instants.shape[1] + 2)[:-1]
+        times = np.arange(periods)[:, None] + np.concatenate([[0.0], inner])
+        return self.rendezvous.period_s * np.concatenate([times.ravel(), [periods]])
+
     @property
     def unit(self) -> Unit:
         """The unit of printed guarantees: m if the box of positions is a cube."""
@@ -134,7 +172,6 @@ def _check_options(options: Reach) -> None:
         "--select": options.select is not None,
         "--replan": options.replan,
         "--backward": options.backward,
-        "--html": options.html is not None,
     }
     for option, is_given in given.items():
         if is_given:
@@ -220,3 +257,26 @@ def _relaxations(rendezvous: Rendezvous) -> Iterator[tuple[str, Rendezvous]]:
         for number in range(len(tables)):
             rest = tables[:number] + tables[number + 1 :]
             yield f"{key} #{number + 1}", replace(rendezvous, **{key: rest})
+
+
+def guarantee_lines(report: GuaranteeReport) -> Iterator[str]:
+    """Yield the certified guarantees, and the bound of all strategies, a line for each."""
+    unit, factor = report.unit
+
+    def line(title: str, value: float | None, note: str = "") -> str:
+        number = "none" if value is None else f"{factor * value:.5g} {unit}"
+        return f"{title:<29}{number:<10}  {note}".rstrip()
+
+    open_loop = None if report.open_loop is None else report.open_loop.guarantee
+    note = "certified" if report.open_loop else "no plan keeps the constraints for all errors"
+    yield line("without measurements", open_loop, note)
+    if report.bound is None:
+        return
+    yield line(
+        "affine feedback",
+        report.plan.guarantee,
+        f"certified; a control reacts to the last {WINDOW} measurements",
+    )
+    noun = "impulse" if report.rendezvous.has_impulses else "control"
+    yield line(f"last {noun} re-planned", report.answered, report.refusal or "certified")
+    yield line("no strategy guarantees less", report.bound)

@@ -11,7 +11,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from infoset.arrays import Floats
 from infoset.experiments.common.figure_style import (
     BOUND,
     GAME,
@@ -32,7 +31,7 @@ from infoset.experiments.common.hill_axes import AXIS_TITLES, component_titles
 from infoset.experiments.common.units import length_unit, time_unit
 from infoset.experiments.reachability.figures import COLOUR_RANGE, draw_set
 from infoset.experiments.reachability.guarantee import GuaranteeReport
-from infoset.rendezvous.reachability import IMPULSE, AffinePlan
+from infoset.rendezvous.reachability import AffinePlan
 
 _PLANES = ((1, 0), (1, 2), (4, 3), (4, 5))
 _AXES = (*AXIS_TITLES, *component_titles("v"))
@@ -127,44 +126,15 @@ def _draw_plane(axes: Axes, report: GuaranteeReport, states: list[int]) -> None:
     count = len(plan.nominal_states)
     colours = mpl.colormaps["viridis_r"](np.linspace(*COLOUR_RANGE, count))
     for t, colour in enumerate(colours):
-        centre = plan.nominal_states[t, states] * factors
-        columns = plan.state_columns[t][states].T * factors
-        points = centre + _corners(columns[columns.any(axis=1)])
+        points = report.tube(t, states) * factors
         shown = {0: "all states at the start", count - 1: "all states at the end"}
         draw_set(axes, points, colour, shown.get(t, "_"))
-    path = _path(report)[:, states] * factors
+    path = report.path[:, states] * factors
     axes.plot(*path.T, color=TRUTH, linewidth=0.9, label="path without errors", zorder=5)
     goal = plan.problem.aim[states] * factors
     star: dict[str, Any] = {"marker": "*", "markersize": 8.0, "color": INK, "linestyle": "none"}
     axes.plot(*goal[:, None], label="hold point", zorder=7, **star)
     label_axes(axes, [f"{_AXES[state]}, {unit if state < 3 else 'm/s'}" for state in states])
-
-
-def _corners(generators: Floats) -> Floats:
-    """Return the vertices of the sum of segments +-g in a plane, some of them twice.
-
-    An edge is parallel to a generator, and its ends are the sums that are extreme along its normal.
-    """
-    normals = np.column_stack([-generators[:, 1], generators[:, 0]])
-    signs = np.sign(normals @ generators.T)
-    np.fill_diagonal(signs, 0.0)
-    middles = signs @ generators
-    ends = np.concatenate([middles + generators, middles - generators])
-    return np.concatenate([ends, -ends, np.zeros((1, 2))])
-
-
-def _path(report: GuaranteeReport) -> Floats:
-    """Return the states without errors, also between the periods, shape (points, 6)."""
-    rendezvous = report.rendezvous
-    plan = report.plan
-    legs = []
-    for t, control in enumerate(plan.nominal):
-        state = plan.nominal_states[t]
-        legs.append(state[None])
-        if rendezvous.has_impulses:
-            legs.append((state + IMPULSE @ control)[None])
-        legs.append(rendezvous.instants[t] @ np.concatenate([state, control]))
-    return np.concatenate([*legs, plan.nominal_states[-1:]])
 
 
 @style()

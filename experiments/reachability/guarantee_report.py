@@ -12,7 +12,13 @@ from infoset.experiments.common.hill_axes import AXES
 from infoset.experiments.common.problem_command import ProblemCommand
 from infoset.experiments.common.screen import Part, number_table
 from infoset.experiments.reachability.file import STATE_NAMES, Rendezvous
-from infoset.experiments.reachability.guarantee import WINDOW, GuaranteeReport, solve_guarantee
+from infoset.experiments.reachability.guarantee import (
+    WINDOW,
+    GuaranteeReport,
+    guarantee_lines,
+    solve_guarantee,
+)
+from infoset.experiments.reachability.guarantee_page import guarantee_page
 from infoset.rendezvous.reachability import Ranges
 from infoset.sim.columns import Cell, csv_text
 
@@ -103,7 +109,7 @@ def report_lines(report: GuaranteeReport) -> Iterator[Part]:
     rendezvous = report.rendezvous
     noun = "impulses" if rendezvous.has_impulses else "periods of thrust"
     yield f"{rendezvous.name}: guaranteed rendezvous, {rendezvous.periods} {noun}, errors bounded"
-    yield from ("", *_guarantee_lines(report))
+    yield from ("", *guarantee_lines(report))
     yield from ("", _component_table(report))
     flights = report.flights
     if len(flights.distances):
@@ -113,28 +119,6 @@ def report_lines(report: GuaranteeReport) -> Iterator[Part]:
             f"their bounds: {flights.outside} outside, worst {100.0 * share:.0f} % of the guarantee"
         )
     yield f"axes: {AXES}"
-
-
-def _guarantee_lines(report: GuaranteeReport) -> Iterator[str]:
-    unit, factor = report.unit
-
-    def line(title: str, value: float | None, note: str = "") -> str:
-        number = "none" if value is None else f"{factor * value:.5g} {unit}"
-        return f"{title:<29}{number:<10}  {note}".rstrip()
-
-    open_loop = None if report.open_loop is None else report.open_loop.guarantee
-    note = "certified" if report.open_loop else "no plan keeps the constraints for all errors"
-    yield line("without measurements", open_loop, note)
-    if report.bound is None:
-        return
-    yield line(
-        "affine feedback",
-        report.plan.guarantee,
-        f"certified; a control reacts to the last {WINDOW} measurements",
-    )
-    noun = "impulse" if report.rendezvous.has_impulses else "control"
-    yield line(f"last {noun} re-planned", report.answered, report.refusal or "certified")
-    yield line("no strategy guarantees less", report.bound)
 
 
 def _component_table(report: GuaranteeReport) -> Table:
@@ -164,6 +148,7 @@ COMMAND = ProblemCommand(
     to_json=report_json,
     to_csv=guarantee_csv,
     lines=report_lines,
+    to_html=guarantee_page,
     csv_name="plan.csv",
     figures="infoset.experiments.reachability.guarantee_figures",
     figure_names=("figure-guarantee", "figure-planes", "figure-controls"),

@@ -12,10 +12,16 @@ import pytest
 
 from infoset.experiments.common.errors import InputError
 from infoset.experiments.common.input_file import read_text
+from infoset.experiments.reachability.command import Reach
 from infoset.experiments.reachability.file import Rendezvous
+from infoset.experiments.reachability.guarantee import guarantee_lines
+from infoset.experiments.reachability.guarantee_figures import draw_guarantee
+from infoset.experiments.reachability.guarantee_page import guarantee_page
+from infoset.experiments.reachability.guarantee_report import COMMAND
 from tests.built_in import problem_text
 from tests.experiments.command_line import Command
 
+ROOT = Path(__file__).resolve().parents[3]
 ARCH = "approach-guaranteed"
 SHORT = ("--set", "periods=4", "--set", "max_impulse_m_s=5.0")
 """Four periods without active limits: the known guarantees 8.5434 and 8.2343, and 5.7698."""
@@ -34,6 +40,9 @@ def test_known_guarantees_of_the_arch_rendezvous_are_printed(infoset: Command) -
         ("no strategy guarantees less", "6.0496"),
     ]
     assert "reacts to the last 4 measurements" in out
+    # The page shows the same lines; the other numbers depend on the solver's choice of a plan.
+    page = (ROOT / "docs" / "guaranteed-rendezvous.md").read_text(encoding="utf-8")
+    assert "\n".join(out.splitlines()[:6]) in page
     assert "100 flights of affine feedback" in out
     assert ": 0 outside, worst" in out
 
@@ -96,6 +105,36 @@ def test_plan_is_written_as_csv(infoset: Command) -> None:
     assert float(rows[0]["x_m_min"]) == -925.0
     assert float(rows[0]["y_m_max"]) == -375.0
     assert rows[-1]["ux_m_s"] == rows[-1]["uz_m_s_max"] == ""
+
+
+def test_page_has_the_numbers_and_all_states_around_the_path() -> None:
+    report = COMMAND.report(Reach(problem=ARCH, settings=[SHORT[1], SHORT[3]], flights=0))
+
+    page = guarantee_page(report)
+
+    assert "Guaranteed rendezvous approach-guaranteed" in page
+    for line in guarantee_lines(report):
+        assert line in page
+    assert len(report.path) == len(report.path_times_s)
+    # An impulse is a jump of the velocity, at two equal times.
+    (places,) = np.nonzero(np.diff(report.path_times_s) == 0.0)
+    jumps = report.path[places + 1] - report.path[places]
+    np.testing.assert_allclose(jumps[:, 3:], report.plan.nominal, atol=1e-12)
+    ranges = report.plan.state_ranges
+    for t in range(5):
+        corners = report.tube(t, [1, 0])
+        for end, by_plan in ((corners.min(axis=0), ranges.lower), (corners.max(0), ranges.upper)):
+            np.testing.assert_allclose(end, by_plan[t, [1, 0]], rtol=1e-9, atol=1e-9)
+
+
+def test_figure_shows_the_guarantee_by_the_number_of_measurements() -> None:
+    report = COMMAND.report(Reach(problem=ARCH, settings=[SHORT[1], SHORT[3]], flights=0))
+
+    # More measurements are never worse: a plan need not use them. Programs are solved to 1e-7.
+    assert len(report.by_measurements) == 5
+    assert (np.diff(report.by_measurements) <= 1e-5).all()
+    assert report.by_measurements[-1] == report.plan.guarantee
+    assert [len(axes.lines) for axes in draw_guarantee(report).axes] == [3, 2]
 
 
 def test_start_alone_gives_the_guarantee_of_dead_reckoning(infoset: Command) -> None:
