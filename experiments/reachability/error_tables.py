@@ -13,7 +13,7 @@ import numpy as np
 
 from infoset.arrays import Floats
 from infoset.experiments.reachability.vectors import Bound, HalfWidth, Vector
-from infoset.limits import Limits
+from infoset.limits import Limits, Positive
 from infoset.rendezvous.reachability import ReachabilityProblem
 
 MAX_GUARANTEED_PERIODS = 60
@@ -64,6 +64,19 @@ class Goal:
     velocity_m_s: Vector = NO_ERROR
     position_box_m: Bound
     velocity_box_m_s: Bound | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class KeepOut:
+    """If the engines fail after an impulse, the drift stays outside a ball about the target.
+
+    The engines may fail after each impulse until that of `until_period`, None for the last one, and
+    the drift is that of the next `drift_periods` periods.
+    """
+
+    keep_out_m: Positive
+    drift_periods: Annotated[int, Limits(minimum=1, maximum=MAX_GUARANTEED_PERIODS, whole=True)]
+    until_period: Annotated[int, Limits(minimum=0, whole=True)] | None = None
 
 
 def check_starts(problem: ReachabilityProblem, error: Floats) -> None:

@@ -19,6 +19,7 @@ from infoset.experiments.reachability.error_tables import (
     ExecutionError,
     Goal,
     InitialError,
+    KeepOut,
     PositionSensor,
     check_starts,
 )
@@ -27,6 +28,7 @@ from infoset.limits import Description, Limits, Name, Part, Positive
 from infoset.rendezvous.reachability import (
     IMPULSE,
     MAX_PERIODS,
+    Coasting,
     ErrorBounds,
     MotionModel,
     NonlinearMotion,
@@ -222,7 +224,9 @@ class Rendezvous:
     `max_impulse_m_s` along each axis, or in norm for thrust in a ball. The constraints hold at t =
     0..T, before and after an impulse, and at `checks_between_periods` instants within each period.
 
-    With `sensor` or `initial_error` the result is what a rendezvous can guarantee.
+    With `sensor` or `initial_error` the result is what a rendezvous can guarantee, with
+    `passive_safety` also if the engines fail, and with `nonlinear` for the motion about a central
+    body.
     """
 
     kind: ClassVar[str] = "reachable-rendezvous"
@@ -249,6 +253,8 @@ class Rendezvous:
     execution_error: ExecutionError | None = None
     sensor: PositionSensor | None = None
     goal: Goal | None = None
+    passive_safety: KeepOut | None = None
+    nonlinear: bool = False
 
     def __post_init__(self) -> None:
         self._check_engine()
@@ -276,9 +282,11 @@ class Rendezvous:
     def _check_errors(self) -> None:
         """Raise `ValueError` if the tables of the errors contradict others, or one is missing."""
         if not self.is_guaranteed:
-            for key in ("execution_error", "goal"):
+            for key in ("execution_error", "goal", "passive_safety"):
                 if getattr(self, key) is not None:
                     raise ValueError(f"{key}: needs [sensor] or [initial_error]")
+            if self.nonlinear:
+                raise ValueError("nonlinear: needs [sensor] or [initial_error]")
             return
         if self.goal is None:
             raise ValueError("goal: is missing; [sensor] and [initial_error] need it")
@@ -295,6 +303,7 @@ class Rendezvous:
                 "[initial_error]"
             )
         self._check_execution()
+        self._check_drifts()
         check_starts(self.problem, self.errors.start)
 
     def _check_execution(self) -> None:
@@ -305,6 +314,20 @@ class Rendezvous:
             raise ValueError("execution_error.absolute_m_s2: impulses need absolute_m_s")
         if not self.has_impulses and execution.absolute_m_s is not None:
             raise ValueError("execution_error.absolute_m_s: held thrust needs absolute_m_s2")
+
+    def _check_drifts(self) -> None:
+        key = "passive_safety" if self.passive_safety is not None else "nonlinear"
+        if self.passive_safety is None and not self.nonlinear:
+            return
+        if not self.has_impulses:
+            raise ValueError(f'{key}: needs engine = "impulses"')
+        if self.model is MotionModel.FROZEN and self.orbit.eccentricity > 0.0:
+            raise ValueError(f'{key}: needs model = "time-varying" on an ellipse')
+        last = None if self.passive_safety is None else self.passive_safety.until_period
+        if last is not None and last >= self.periods:
+            raise ValueError(
+                f"passive_safety.until_period: must be at most {self.periods - 1}, the last impulse"
+            )
 
     def _check_engine(self) -> None:
         if self.has_impulses:
@@ -427,6 +450,27 @@ class Rendezvous:
         box = goal.position_box_m + (goal.velocity_box_m_s or (np.inf,) * 3)
         target = np.array(goal.position_m + goal.velocity_m_s)
         return with_errors(self.problem, self.errors, target, np.array(box))
+
+    @property
+    def drifts(self) -> Coasting:
+        """The motion after each impulse after which the engines may fail."""
+        impulses = self.periods
+        periods = 1
+        if self.passive_safety is not None:
+            periods = self.passive_safety.drift_periods
+            if self.passive_safety.until_period is not None:
+                impulses = self.passive_safety.until_period + 1
+        acceleration_m_s2 = 0.0
+        if self.disturbance is not None:
+            acceleration_m_s2 = float(np.linalg.norm(self.disturbance.acceleration_m_s2))
+        return Coasting(
+            self.ellipse,
+            self.period_s,
+            impulses,
+            periods,
+            acceleration_m_s2=acceleration_m_s2,
+            semi_major_axis_m=self.orbit.semi_major_axis_m if self.nonlinear else None,
+        )
 
     def _problem(self, periods: int) -> ReachabilityProblem:
         between = None

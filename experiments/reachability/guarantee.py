@@ -17,18 +17,24 @@ from infoset.experiments.reachability.file import Rendezvous
 from infoset.rendezvous.reachability import (
     IMPULSE,
     AffinePlan,
+    DriftCertificate,
     LateConstraintError,
     NoRobustPlanError,
     OutputProblem,
+    PassiveSafety,
     PlanFlights,
     ProblemPart,
+    UnboundedCoastError,
     affine_plan,
     answered_plan,
+    drift_certificate,
     fly_plan,
     independent_parts,
     information_radius,
     lower_bound,
+    nonlinear_plan,
     plan_of_parts,
+    safe_plan,
 )
 
 WINDOW = 4
@@ -48,8 +54,9 @@ class GuaranteeReport:
     """Results of one command; guarantees are in units of the goal's box.
 
     `open_loop` is the best plan without measurements, None if no such plan keeps the constraints.
-    `answered`, `bound` and `radius` are None without a sensor; `answered` is also None if `refusal`
-    says why there is none.
+    `answered`, `bound` and `radius` are None without a sensor and for nonlinear motion; `answered`
+    is also None if `refusal` says why there is none. `drifts` are the certain distances if the
+    engines fail, None if the problem does not ask for them.
     """
 
     rendezvous: Rendezvous
@@ -60,6 +67,7 @@ class GuaranteeReport:
     bound: float | None
     radius: float | None
     flights: PlanFlights
+    drifts: DriftCertificate | None = None
 
     @cached_property
     def by_measurements(self) -> Floats:
@@ -144,10 +152,10 @@ def solve_guarantee(
         if rendezvous.sensor is None:
             raise _conflict(rendezvous, progress) from None
     progress(0.1)
+    answered, refusal, bound, radius = None, None, None, None
     if rendezvous.sensor is None:
         assert open_loop is not None
         plan = open_loop
-        answered, refusal, bound, radius = None, None, None, None
     else:
         try:
             plans = plans_of_parts(problem)
@@ -155,16 +163,57 @@ def solve_guarantee(
             raise _conflict(rendezvous, progress) from None
         plan = plan_of_parts(problem, plans)
         progress(0.3)
-        answered, refusal = _answered(plans)
-        progress(0.5)
-        bound = max((lower_bound(part.problem).value for part, _ in plans), default=0.0)
-        progress(0.6)
-        radius = max((information_radius(part.problem).value for part, _ in plans), default=0.0)
+        if rendezvous.nonlinear:
+            refusal = "only for linear motion"
+        else:
+            answered, refusal = _answered(plans)
+            progress(0.5)
+            bound = max((lower_bound(part.problem).value for part, _ in plans), default=0.0)
+            progress(0.6)
+            radius = max((information_radius(part.problem).value for part, _ in plans), default=0.0)
     progress(0.7)
+
+    plan, drifts = _checked_plan(rendezvous, plan)
+    if drifts is not None and refusal is None:
+        # Its last control, and so the drift after it, is not known before the flight.
+        answered, refusal = None, "not with [passive_safety]"
+    progress(0.9)
     count = FLIGHTS if options.flights is None else options.flights
     flights = fly_plan(rendezvous.problem, plan, rendezvous.errors, count, options.seed)
     progress(1.0)
-    return GuaranteeReport(rendezvous, plan, open_loop, answered, refusal, bound, radius, flights)
+    return GuaranteeReport(
+        rendezvous, plan, open_loop, answered, refusal, bound, radius, flights, drifts
+    )
+
+
+def _checked_plan(
+    rendezvous: Rendezvous, plan: AffinePlan
+) -> tuple[AffinePlan, DriftCertificate | None]:
+    """Return a plan whose drifts are safe and whose guarantee holds for nonlinear motion, as the
+    problem asks, and the distances of its drifts; `plan` if it asks for neither.
+
+    Raise `InputError` if none was found.
+    """
+    safety = rendezvous.passive_safety
+    if safety is None and not rendezvous.nonlinear:
+        return plan, None
+    drifts = rendezvous.drifts
+
+    def solve(problem: OutputProblem) -> AffinePlan:
+        if safety is None:
+            return best_plan(problem)
+        return safe_plan(problem, PassiveSafety(drifts, safety.keep_out_m), WINDOW).plan
+
+    try:
+        if rendezvous.nonlinear:
+            checked = nonlinear_plan(rendezvous.output_problem, drifts, solve).plan
+        else:
+            checked = solve(rendezvous.output_problem)
+    except (NoRobustPlanError, UnboundedCoastError) as error:
+        raise InputError(f"{rendezvous.name}: {error}") from None
+    if safety is None:
+        return checked, None
+    return checked, drift_certificate(checked, drifts)
 
 
 def _check_options(options: Reach) -> None:
@@ -270,7 +319,8 @@ def guarantee_lines(report: GuaranteeReport) -> Iterator[str]:
     open_loop = None if report.open_loop is None else report.open_loop.guarantee
     note = "certified" if report.open_loop else "no plan keeps the constraints for all errors"
     yield line("without measurements", open_loop, note)
-    if report.bound is None:
+    if report.rendezvous.sensor is None:
+        yield from _further_lines(report)
         return
     yield line(
         "affine feedback",
@@ -279,4 +329,21 @@ def guarantee_lines(report: GuaranteeReport) -> Iterator[str]:
     )
     noun = "impulse" if report.rendezvous.has_impulses else "control"
     yield line(f"last {noun} re-planned", report.answered, report.refusal or "certified")
-    yield line("no strategy guarantees less", report.bound)
+    note = "only for linear motion" if report.rendezvous.nonlinear else ""
+    yield line("no strategy guarantees less", report.bound, note)
+    yield from _further_lines(report)
+
+
+def _further_lines(report: GuaranteeReport) -> Iterator[str]:
+    """Yield what else is certain: for which motion, and what happens if the engines fail."""
+    rendezvous = report.rendezvous
+    if rendezvous.nonlinear:
+        yield "affine feedback and its ranges hold for the motion about a central body"
+    if report.drifts is None or rendezvous.passive_safety is None:
+        return
+    safety = rendezvous.passive_safety
+    yield (
+        f"engines failing after any impulse until t = {rendezvous.drifts.impulses - 1}: at least "
+        f"{report.drifts.least_distance:.4g} m from the target for {safety.drift_periods} periods "
+        f"(keep-out {safety.keep_out_m:g} m)"
+    )

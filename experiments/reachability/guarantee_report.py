@@ -49,6 +49,8 @@ def report_json(report: GuaranteeReport) -> dict[str, object]:
         "bound": in_unit(report.bound),
         "radius": in_unit(report.radius),
         "window": WINDOW,
+        "nonlinear": report.rendezvous.nonlinear,
+        "drifts": _drifts_json(report),
         "box": {"min": ranges.lower[-1], "max": ranges.upper[-1]},
         "states": _ranges_json(plan.nominal_states, ranges, 1.0),
         "controls": _ranges_json(plan.nominal, plan.control_ranges, per_control),
@@ -61,6 +63,18 @@ def report_json(report: GuaranteeReport) -> dict[str, object]:
             "outside": report.flights.outside,
             "largest": in_unit(float(report.flights.distances.max(initial=0.0))),
         },
+    }
+
+
+def _drifts_json(report: GuaranteeReport) -> dict[str, object] | None:
+    safety = report.rendezvous.passive_safety
+    if report.drifts is None or safety is None:
+        return None
+    return {
+        "keep_out_m": safety.keep_out_m,
+        "periods": safety.drift_periods,
+        "least_distance_m": report.drifts.least_distance,
+        "least_distance_by_impulse_m": report.drifts.distances.min(axis=1),
     }
 
 

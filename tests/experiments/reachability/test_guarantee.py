@@ -292,3 +292,52 @@ def test_contradictions_are_refused(problem: str, old: str, new: str, line: str)
     with pytest.raises(InputError, match=re.escape(line)) as caught:
         read_text(Rendezvous, problem_text(problem).replace(old, new, 1), "mine.toml")
     assert str(caught.value).startswith("mine.toml: ")
+
+
+def test_drifts_after_a_failure_of_the_engines_are_certified(infoset: Command) -> None:
+    options = ("--set", "periods=5", "--set", "passive_safety.drift_periods=2", "--flights", "10")
+    found = infoset.json("reach", "safe-approach", *options)
+    drifts = found["drifts"]
+    assert drifts["keep_out_m"] == 60.0
+    assert len(drifts["least_distance_by_impulse_m"]) == 5
+    assert drifts["least_distance_m"] == min(drifts["least_distance_by_impulse_m"]) >= 60.0
+    assert found["answered"] is None
+    assert found["answered_refusal"] == "not with [passive_safety]"
+    assert found["bound"] <= found["affine"]
+    assert found["flights"]["outside"] == 0
+    _, out, _ = infoset("reach", "safe-approach", *options)
+    assert "engines failing after any impulse until t = 4: at least " in out
+
+
+def test_guarantee_for_nonlinear_motion_is_greater(infoset: Command) -> None:
+    options = ("--set", "periods=3", "--set", "max_impulse_m_s=10", "--flights", "0")
+    linear = infoset.json("reach", ARCH, *options)
+    found = infoset.json("reach", ARCH, *options, "--set", "nonlinear=true")
+    assert found["nonlinear"]
+    assert found["bound"] is None
+    assert found["answered_refusal"] == "only for linear motion"
+    assert linear["affine"] < found["affine"] < 1.01 * linear["affine"]
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("passive_safety.until_period=12", "until_period: must be at most 11"),
+        ("orbit.eccentricity=0.01", 'needs model = "time-varying" on an ellipse'),
+        ("passive_safety.keep_out_m=0", "keep_out_m"),
+    ],
+)
+def test_passive_safety_that_contradicts_the_problem_is_refused(
+    infoset: Command, setting: str, message: str
+) -> None:
+    code, _, err = infoset("reach", "safe-approach", "--set", 'model="frozen"', "--set", setting)
+    assert code == 2
+    assert message in err
+
+
+def test_keep_out_that_no_plan_has_is_one_message(infoset: Command) -> None:
+    code, _, err = infoset(
+        "reach", "safe-approach", "--set", "periods=3", "--set", "passive_safety.keep_out_m=1100"
+    )
+    assert code == 2
+    assert "reduce the keep-out distance" in err
