@@ -21,7 +21,7 @@ from infoset.experiments.reachability.report import ReachabilityReport
 from infoset.rendezvous.reachability import SetKind
 
 _PROJECTION_TOLERANCE = 1e-2
-"""Relative error of a projection of the tube, see `Sets.projection`.
+"""Relative error of a projection of the tube, see `ReachableSets.projection`.
 
 It is a pixel of a set that is drawn 100 pixels wide. Sets with exact vertices do not use it.
 """

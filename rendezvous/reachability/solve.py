@@ -209,9 +209,10 @@ def _refusal(problem: ReachabilityProblem) -> str:
 def min_periods(problem: ReachabilityProblem) -> int | None:
     """Return the minimum number of periods in which zero can be reached, at most T, or None.
 
-    If the zero state satisfies all constraints, it can be held, and the minimum number is computed
-    by bisection; otherwise all numbers are tried, in ascending order, up to the first that reaches
-    zero. Each block and number needs the programs of `block_reaches_zero`.
+    If the zero state and the zero control satisfy all constraints, zero can be held, and the
+    minimum number is computed by bisection; otherwise all numbers are tried, in ascending order,
+    up to the first that reaches zero. Each block and number needs the programs of
+    `block_reaches_zero`.
 
     Raises
     ------
@@ -222,7 +223,10 @@ def min_periods(problem: ReachabilityProblem) -> int | None:
     def reached(periods: int) -> bool:
         return all(block_reaches_zero(block.first(periods)) for block in problem.blocks)
 
-    can_stay_at_zero = all((block.offsets >= 0.0).all() for block in problem.blocks)
+    can_stay_at_zero = all(
+        (block.offsets >= 0.0).all() and (block.control_offsets >= 0.0).all()
+        for block in problem.blocks
+    )
     if not can_stay_at_zero:
         numbers = range(1, problem.periods + 1)
         return next((periods for periods in numbers if reached(periods)), None)

@@ -96,8 +96,8 @@ def swept(
     The segment is from -along to along. Each facet moves, and each ridge between two facets that
     face opposite ends of the segment becomes a facet. A vertex moves to an end if it lies on a
     facet that faces this end. `along`, shape (n,), is not zero. The errors, shape (n,), are the
-    maximum rounding of a coordinate of the points; facets do not contain it
-    (`construction.enlarged`).
+    maximum rounding of a coordinate of the points. The facets do not allow for it: the caller
+    enlarges the result by it (`construction.enlarged`).
     """
     heights = sides(facets, np.append(along / size_of(along), 0.0))
     # Numba compiles a kernel again for a Python constant, but not for one of NumPy.
@@ -131,10 +131,10 @@ def swept(
                 errors[j] = max(errors[j], abs(low))
             count += 1
 
-    # Outward: the terms of the height of `along` may cancel, as in each new facet. The sum is then
-    # rounded twice, by EPS / 2 each.
+    # Outward: the terms of the height of `along` may cancel, as in each new facet. The two sums and
+    # the last addition are rounded by EPS / 2 each: 2 EPS.
     for k in range(len(facets)):
-        rounding = UNSURE * dot(np.abs(along), np.abs(facets[k]))
+        rounding = UNSURE * len(along) * dot(np.abs(along), np.abs(facets[k]))
         facets[k, -1] += abs(dot(along, facets[k])) + rounding
         facets[k, -1] += 2.0 * EPS * abs(facets[k, -1])
     return result[:count], facets, incidence[:count], errors

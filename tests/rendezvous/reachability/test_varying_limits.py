@@ -73,6 +73,11 @@ def test_least_number_of_periods_obeys_the_limits() -> None:
     assert min_periods(walk(np.full(8, 2.0), start=(-2.0, -2.0))) == 2
 
 
+def test_least_number_of_periods_is_found_if_zero_cannot_be_held() -> None:
+    # Each control moves down by at least 1: from (1, 1) one or two reach zero, and eight do not.
+    assert min_periods(walk(np.full(8, -1.0), start=(1.0, 1.0))) == 1
+
+
 def test_closed_loop_keeps_the_limits_of_later_times() -> None:
     limits = np.array([0.5, 1.0, 2.0, 1.0])
     later = walk(limits, start=(-2.0, -2.0)).rest(2, [-1.0, -1.0])
