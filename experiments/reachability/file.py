@@ -59,6 +59,11 @@ class Engine(Enum):
     IMPULSES = "impulses"
 
 
+_MAX_ANGLE_RAD = 0.25
+"""Maximum angle of the orbit at the perigee in an interval of a drift: bound (7) of
+docs/guaranteed-rendezvous.md exists up to 0.8, and is 1.4 times as large as needed at 0.25."""
+_MIN_INSTANTS = 4
+"""Minimum number of intervals of a period of a drift; the default of `Coasting`."""
 Period = Annotated[int, Limits(minimum=0, maximum=MAX_PERIODS, whole=True)]
 
 
@@ -460,15 +465,19 @@ class Rendezvous:
             periods = self.passive_safety.drift_periods
             if self.passive_safety.until_period is not None:
                 impulses = self.passive_safety.until_period + 1
+        ellipse = self.ellipse
+        fastest_rad_s = ellipse.semi_latus_rate_rad_s * (1.0 + ellipse.eccentricity) ** 2
+        instants = math.ceil(self.period_s * fastest_rad_s / _MAX_ANGLE_RAD)
         acceleration_m_s2 = 0.0
         if self.disturbance is not None:
             acceleration_m_s2 = float(np.linalg.norm(self.disturbance.acceleration_m_s2))
         return Coasting(
-            self.ellipse,
+            ellipse,
             self.period_s,
             impulses,
             periods,
-            acceleration_m_s2=acceleration_m_s2,
+            max(instants, _MIN_INSTANTS),
+            acceleration_m_s2,
             semi_major_axis_m=self.orbit.semi_major_axis_m if self.nonlinear else None,
         )
 

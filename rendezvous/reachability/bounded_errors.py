@@ -45,6 +45,11 @@ def with_errors(
 
     The norm of the goal is that of a `box` of half-widths, shape (n,), about the state `target`; a
     component whose half-width is infinite does not count. All constraints hold for all errors.
+
+    Raises
+    ------
+    ValueError
+        If the thrust is in a ball.
     """
     if problem.thrust is not ThrustShape.BOX:
         raise ValueError("a rendezvous with bounded errors needs a bound for each control")

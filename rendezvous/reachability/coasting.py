@@ -234,7 +234,13 @@ class CoastTube:
 
     @cached_property
     def sagittas(self) -> Floats:
-        """Bounds of the distance of the path from its chord in each interval, m, shape (K, N)."""
+        """Bounds of the distance of the path from its chord in each interval, m, shape (K, N).
+
+        Raises
+        ------
+        ValueError
+            If the intervals are too long for a bound.
+        """
         coasting = self.coasting
         h = coasting.interval_s
         blocks = coasting.rates.reshape(*self.accelerations.shape, 3, 2, 3)

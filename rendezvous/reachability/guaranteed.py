@@ -183,8 +183,15 @@ def affine_plan(
 def plan_at_caps(problem: OutputProblem, window: int | None, every_row: bool = False) -> AffinePlan:
     """Return the affine plan with the smallest guarantee at the caps of the problem.
 
-    Constraints on the path enter the program when they are broken, or at once if `every_row`.
-    Arguments and exceptions are those of `affine_plan`.
+    Constraints on the path enter the program when they are broken, or at once if `every_row`. The
+    arguments are those of `affine_plan`.
+
+    Raises
+    ------
+    NoRobustPlanError
+        If no affine plan satisfies the constraints for all errors.
+    NoSolutionError
+        If the program was not solved.
     """
     rows = problem.rows
     on_path = np.asarray(rows.states.any(axis=1)) & (not every_row)
