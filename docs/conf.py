@@ -59,7 +59,7 @@ nitpick_ignore_regex = [
     ),
     (
         "py:.*",
-        r"(ArrayLike|NDArray|Floats|Flags|Integers|Interval|RangeOrRanges|Callable|Sequence|Iterator|Mapping|Executor|Path"
+        r"(ArrayLike|NDArray|Floats|Flags|Integers|Places|Interval|RangeOrRanges|Callable|Sequence|Iterator|Mapping|Executor|Path"
         r"|Frozen|BaseGeometry|MaskedArray)",
     ),
 ]
