@@ -64,15 +64,15 @@ class Suspects:
         """Note new refutations, and split the members of their engagements if `wrong_images`, the
         maximum number of wrong images, is 1.
         """
-        lost = state.lost_step.reshape(-1, len(self._left_out)) >= 0
-        refuted = lost.sum(axis=1)
-        newly = np.flatnonzero(refuted > self._refuted)
-        self._refuted = refuted
+        refuted = self._is_refuted(state)
+        count = refuted.sum(axis=1)
+        newly = np.flatnonzero(count > self._refuted)
+        self._refuted = count
         self._last_step[newly] = state.elapsed
         for engagement in newly.tolist():
             if self.proof_step[engagement] < 0:
                 self.proof_step[engagement] = state.elapsed
-            if wrong_images == 1 and not lost[engagement].all():
+            if wrong_images == 1 and not refuted[engagement].all():
                 self._split(engagement, state)
 
     def steps(self, engagement: int, state: SetState) -> list[int]:
@@ -100,11 +100,14 @@ class Suspects:
             if member in self._groups[engagement]
         }
 
+    def _is_refuted(self, state: SetState) -> Flags:
+        """Whether each member is proved to be empty, shape (B, R)."""
+        refuted = (state.lost_step >= 0) & ~state.sections.unproved
+        return np.asarray(refuted.reshape(-1, len(self._left_out)))
+
     def _living(self, engagement: int, state: SetState) -> list[int]:
         """Return the members that are not refuted."""
-        first = engagement * len(self._left_out)
-        lost_step = state.lost_step[first : first + len(self._left_out)]
-        living: list[int] = np.flatnonzero(lost_step < 0).tolist()
+        living: list[int] = np.flatnonzero(~self._is_refuted(state)[engagement]).tolist()
         return living
 
     def _group(self, engagement: int, member: int) -> tuple[int, ...]:
@@ -135,11 +138,7 @@ class Suspects:
             return
 
         while True:
-            # A set that seems empty, but is not proved to be, is not used again: Phi is withheld.
-            doubtful = state.sections.unproved[first : first + members]
-            free = [
-                member for member in range(members) if member not in groups and not doubtful[member]
-            ]
+            free = [member for member in range(members) if member not in groups]
             largest = max(groups, key=lambda member: len(groups[member]))
             images = groups[largest]
             if len(images) < 2 or not free:
@@ -151,10 +150,17 @@ class Suspects:
             halves[free[1] if len(free) > 1 else largest] = images[middle:]
             nonempty = self._replace(halves, images, first, first + largest, state)
             is_kept = largest not in halves
-            if is_kept and any(doubtful[member] for member in halves if member not in nonempty):
-                # The group stays whole: one half is not proved to be empty.
-                for member in halves:
-                    state.retire(first + member)
+            # A half is cleared only if its set is proved to be empty.
+            doubtful = state.sections.unproved[first : first + members]
+            if any(doubtful[member] for member in halves if member not in nonempty):
+                if is_kept:
+                    # The group stays whole.
+                    for member in halves:
+                        state.retire(first + member)
+                else:
+                    # Phi is withheld: no set contains the doubtful half.
+                    del groups[largest]
+                    groups |= halves
                 break
             if not nonempty and len(groups) == 1:
                 # Every image is cleared: more than one is wrong, and the set goes on as it is.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import logging
 import os
 import subprocess
@@ -13,6 +14,9 @@ from typing import Any
 import pytest
 
 from infoset.kernels import VARIABLE, CompileNotice
+
+_REDUCTIONS = ("max", "min", "sum", "any", "all", "argmax", "argmin", "take", "copy")
+"""Methods of arrays that allocate memory in Numba."""
 
 
 @pytest.fixture(autouse=True)
@@ -106,3 +110,28 @@ def test_first_command_gives_the_notice_and_the_second_does_not(tmp_path: Path) 
     assert " of infoset pareto in " in last
     assert "(infoset.rendezvous)" in last
     assert said() == []
+
+
+def test_kernels_that_allocate_nothing_call_no_reduction_of_an_array() -> None:
+    """Numba compiles `max` of an array with memory that these kernels do not have.
+
+    It fails only if no other kernel of the process was compiled with the same method before.
+    """
+    root = Path(__file__).resolve().parents[2]
+    offenders = []
+    for folder in ("infoset", "rendezvous", "sim", "guidance"):
+        for path in sorted((root / folder).rglob("*.py")):
+            for function in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                if not isinstance(function, ast.FunctionDef):
+                    continue
+                decorators = [ast.unparse(decorator) for decorator in function.decorator_list]
+                if not any(name.endswith("allocation_free") for name in decorators):
+                    continue
+                offenders += [
+                    f"{path.name}: {function.name}: {ast.unparse(call)}"
+                    for call in ast.walk(function)
+                    if isinstance(call, ast.Call)
+                    and isinstance(call.func, ast.Attribute)
+                    and call.func.attr in _REDUCTIONS
+                ]
+    assert offenders == []

@@ -13,6 +13,7 @@ from infoset import InformationSet, SetStatus
 from infoset.arrays import Flags, Floats
 from infoset.covered_set import CoveredSet
 from infoset.engine.guaranteed_miss import TIGHT
+from infoset.engine.set_state import SetState
 from tests.infoset.test_covered_set import MODEL, X
 from tests.infoset.test_information_set import SENSOR, STEP, E
 
@@ -174,6 +175,44 @@ def test_set_whose_images_are_all_cleared_is_inconsistent(monkeypatch: pytest.Mo
     assert covered.inconsistent.all()
     assert covered.suspected_steps() == []
     assert covered.tracking.all()
+
+
+def test_half_whose_set_is_not_proved_to_be_empty_is_not_cleared(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    flight = flown(40, {0: [21]})
+    covered = CoveredSet(MODEL)
+    replaced = SetState.replace
+
+    def without_proof(state: SetState, row: int, source: int, applies: Flags) -> bool:
+        is_nonempty = replaced(state, row, source, applies)
+        state.sections.unproved[row] = not is_nonempty
+        return is_nonempty
+
+    monkeypatch.setattr(SetState, "replace", without_proof)
+    feed(covered, flight)
+
+    # The whole class of image 21 stays suspected, and its set contains the truth.
+    assert covered.proof_step.tolist() == [21]
+    assert covered.suspected_steps() == [1, 5, 9, 13, 17, 21]
+    assert covered.status == [SetStatus.TRACKING]
+
+
+def test_set_that_is_empty_without_a_proof_proves_no_wrong_image(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("infoset.engine.set_state.MAX_LEFT_OUT", 0)
+    flight = flown(FLIGHT_STEPS, {0: [21]})
+    covered = CoveredSet(MODEL)
+    feed(covered, Flown(*(values[:21] for values in flight)))
+    covered._state.sections.unproved[:] = True
+    feed(covered, Flown(*(values[21:] for values in flight)))
+    assert covered.emptied.sum() == 3
+    # Labels have left, but Phi is withheld: an emptied set may contain the truth.
+    assert covered._state.some_left.any()
+    assert covered.proof_step.count() == 0
+    assert covered.suspected_steps() == []
+    assert not covered.guaranteed_miss()[1].any()
 
 
 def test_wrong_images_of_two_classes_are_suspected_by_their_classes() -> None:

@@ -96,10 +96,17 @@ def _write_box(points: Floats, sides: Floats, rays: Floats, bits: Bits) -> None:
     """
     n = points.shape[1]
     for j in range(n):
+        # Methods such as `max` of an array allocate memory, which this kernel cannot.
+        highest = points[0, j]
+        lowest = points[0, j]
+        for i in range(1, len(points)):
+            highest = max(highest, points[i, j])
+            lowest = min(lowest, points[i, j])
+
         sides[j, j] = 1.0
-        sides[j, n] = points[:, j].max()
+        sides[j, n] = highest
         sides[n + j, j] = -1.0
-        sides[n + j, n] = -points[:, j].min()
+        sides[n + j, n] = -lowest
         for k in range(2**n):
             side = j + n * (k >> j & 1)
             rays[k, j] = sides[side, j] * sides[side, n]
