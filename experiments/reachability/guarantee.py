@@ -163,20 +163,13 @@ def solve_guarantee(
             raise _conflict(rendezvous, progress) from None
         plan = plan_of_parts(problem, plans)
         progress(0.3)
-        if rendezvous.nonlinear:
-            refusal = "only for linear motion"
-        else:
-            answered, refusal = _answered(plans)
-            progress(0.5)
+        answered, refusal = _answered(rendezvous, plans)
+        progress(0.5)
+        if not rendezvous.nonlinear:
             bound = max((lower_bound(part.problem).value for part, _ in plans), default=0.0)
-            progress(0.6)
             radius = max((information_radius(part.problem).value for part, _ in plans), default=0.0)
-    progress(0.7)
-
+    progress(0.6)
     plan, drifts = _checked_plan(rendezvous, plan)
-    if drifts is not None and refusal is None:
-        # Its last control, and so the drift after it, is not known before the flight.
-        answered, refusal = None, "not with [passive_safety]"
     progress(0.9)
     count = FLIGHTS if options.flights is None else options.flights
     flights = fly_plan(rendezvous.problem, plan, rendezvous.errors, count, options.seed)
@@ -246,8 +239,15 @@ def best_plan(problem: OutputProblem) -> AffinePlan:
     return plan_of_parts(problem, plans_of_parts(problem))
 
 
-def _answered(plans: list[tuple[ProblemPart, AffinePlan]]) -> tuple[float | None, str | None]:
+def _answered(
+    rendezvous: Rendezvous, plans: list[tuple[ProblemPart, AffinePlan]]
+) -> tuple[float | None, str | None]:
     """Return the guarantee with a last control that answers all outputs, or why there is none."""
+    if rendezvous.nonlinear:
+        return None, "only for linear motion"
+    if rendezvous.passive_safety is not None:
+        # The last control, and so the drift after it, is not known before the flight.
+        return None, "not with [passive_safety]"
     try:
         found = [_best_answer(plan) for _, plan in plans]
     except (LateConstraintError, NoRobustPlanError) as error:

@@ -9,13 +9,17 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 
 from infoset.experiments.common.figure_style import (
     BOUND,
     GAME,
+    IMPULSE,
     INK,
+    LIMIT,
     MEASURED,
+    REGION_FILL,
     SET,
     TICKS,
     TRUTH,
@@ -102,6 +106,10 @@ def _draw_widths(axes: Axes, report: GuaranteeReport) -> None:
     axes.set_ylabel("uncertainty of the position, ± m")
 
 
+_DRIFT: dict[str, Any] = {"color": IMPULSE, "linewidth": 0.6, "alpha": 0.7, "zorder": 3}
+_BALL: dict[str, Any] = {"facecolor": REGION_FILL, "edgecolor": LIMIT, "zorder": 2}
+
+
 @style()
 def draw_planes(report: GuaranteeReport) -> Figure:
     """Draw the path without errors, and the tube of all errors, in planes.
@@ -115,7 +123,7 @@ def draw_planes(report: GuaranteeReport) -> Figure:
     for axes, plane in zip(panels, planes, strict=True):
         _draw_plane(axes, report, list(plane))
     letters(panels)
-    legend_below(figure, 4)
+    legend_below(figure, 3)
     return figure
 
 
@@ -129,12 +137,25 @@ def _draw_plane(axes: Axes, report: GuaranteeReport, states: list[int]) -> None:
         points = report.tube(t, states) * factors
         shown = {0: "all states at the start", count - 1: "all states at the end"}
         draw_set(axes, points, colour, shown.get(t, "_"))
+    if states[0] < 3:
+        _draw_drifts(axes, report, states, per_m)
     path = report.path[:, states] * factors
     axes.plot(*path.T, color=TRUTH, linewidth=0.9, label="path without errors", zorder=5)
     goal = plan.problem.aim[states] * factors
     star: dict[str, Any] = {"marker": "*", "markersize": 8.0, "color": INK, "linestyle": "none"}
     axes.plot(*goal[:, None], label="hold point", zorder=7, **star)
     label_axes(axes, [f"{_AXES[state]}, {unit if state < 3 else 'm/s'}" for state in states])
+
+
+def _draw_drifts(axes: Axes, report: GuaranteeReport, states: list[int], per_m: float) -> None:
+    """Draw the drifts after failures of the engines, without errors, and the keep-out ball."""
+    safety = report.rendezvous.passive_safety
+    if report.drifts is None or safety is None:
+        return
+    for drift in report.drifts.tube.middles[:, :, states]:
+        axes.plot(*(per_m * drift).T, label="drifts after a failure, without errors", **_DRIFT)
+    ball = Circle((0.0, 0.0), per_m * safety.keep_out_m, label="keep-out ball", **_BALL)
+    axes.add_patch(ball)
 
 
 @style()
