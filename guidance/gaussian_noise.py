@@ -11,8 +11,8 @@ from infoset.arrays import Floats
 from infoset.guidance.scripted_noise import RandomNoise
 
 _SMALLEST = 2.0**-54
-"""Half of the smallest distance of a random number from an end of [0, 1]: the quantile of a
-Gaussian is finite.
+"""Minimum probability of a tail. Random numbers in [0, 1) are multiples of 2^-53, so that only a
+tail of zero, whose quantile is infinite, is below this.
 """
 
 

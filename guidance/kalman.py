@@ -32,8 +32,9 @@ VARIANCE_ROUNDING = 64.0 * 2.0**-52
 """Rounding error of the variance of a component, relative to it: since the last measurement each
 element has gone through three products of matrices of up to 5 x 5, some 50 roundings."""
 PRECISE = 2.0**-36
-"""Variance of a precise measurement, relative to the maximum variance of its expected value. A less
-precise measurement leaves at least 16 of the 52 bits of the covariance."""
+"""Variance of a measurement, relative to the maximum variance of its expected value, below which
+the measurement counts as precise. A less precise one reduces the covariance by a factor of at most
+2^36, and leaves at least 16 of its 52 bits."""
 
 
 class KalmanBank:

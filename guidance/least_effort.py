@@ -27,7 +27,8 @@ NO_DEMAND_M = 1e200
 share, at most 1e9, is finite.
 """
 TRIALS = 60
-"""Maximum number of trials of an impulse. Bisections alone need 43 for `IMPULSE_TOLERANCE`."""
+"""Maximum number of trials of an impulse, a guard: bisections alone end after 44 of them, by
+`IMPULSE_TOLERANCE`."""
 IMPULSE_TOLERANCE = 1e-13
 """Change of a trial, in units of the maximum impulse, at which the search ends: some roundings.
 The miss of a flight of ten seconds is the same to 1e-8 from 1e-15 to 1e-8 (measured)."""

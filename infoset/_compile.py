@@ -9,6 +9,8 @@ import numpy as np
 
 from infoset.kernels import Kernels
 
+# No number is NaN, and the sign of a zero decides nothing. All other liberties would change bits:
+# sums in another order, and products that are not rounded (see `rendezvous._compile`).
 _kernels = Kernels("nnan", "nsz")
 compiled = _kernels.compiled
 entry = _kernels.entry
@@ -39,8 +41,8 @@ def constants(number: int) -> tuple[int, ...]:
 
 
 (ZERO,) = constants(1)
-"""Start of a count that is passed from kernel to kernel."""
+"""Start of a count that is passed from kernel to kernel; a variable, see `constants`."""
 FALSE = cast(bool, np.bool_(False))
-"""A flag for arguments of kernels, for the same reason."""
+"""A flag for arguments of kernels; a variable, see `constants`."""
 TRUE = cast(bool, np.bool_(True))
-"""A flag for arguments of kernels, for the same reason."""
+"""A flag for arguments of kernels; a variable, see `constants`."""

@@ -25,6 +25,7 @@ def steps_between(start_s: float, time_s: float, step_s: float) -> int:
     step_s : float
         Time between two steps, s.
     """
+    # With `ceil` and - 0.5, not `round`: of two steps that are equally near the earlier one.
     nearest = math.ceil((start_s - time_s) / step_s - 0.5 - STEP_ROUNDING)
     last = math.ceil(start_s / step_s - STEP_ROUNDING) - 1
     return min(nearest, last)

@@ -244,7 +244,7 @@ class CoveredSetView(InformationSetView):
         )
 
     def sections(self, engagement: int = 0) -> list[Section]:
-        """Return the nonempty sections of all members that count, one member after the other."""
+        """Return the nonempty sections of all members, one member after the other."""
         self._need_engagement(engagement)
         rows = engagement * len(self.left_out) + np.flatnonzero(
             self._nonempty_members()[engagement]
@@ -311,7 +311,11 @@ class CoveredSet(CoveredSetView, InformationSet):
         return phi_m, np.asarray(exists & is_proved & ~self.inconsistent)
 
     def measure_angle(self, alpha_rad: ArrayLike, where: ArrayLike = True) -> None:
-        """Cut the members that use this image. Its number is the number of periods so far."""
+        """Cut the members that use this image.
+
+        The number of the image, which gives its class, is the number of periods of the camera since
+        the start: it also counts images that were not taken.
+        """
         state = self._state
         every = self.model.steps_in(self.model.angle_sensor.period_s)
         image_class = (state.elapsed // every) % self.left_out.shape[1]

@@ -34,9 +34,14 @@ It is far above the rounding of a range, 1e-16 of the label, and far below a ran
 _APPROACH = Limits(below=0.0)
 _SECTIONS = Limits(minimum=1, maximum=MAX_SECTIONS, whole=True)
 _WRONG_IMAGES = Limits(minimum=0, maximum=3, whole=True)
+"""Number q of wrong images. The default classes, 2q + 2, give more than `MAX_SETS` sets from q = 4
+on."""
 _IMAGE_CLASSES = Limits(minimum=3, maximum=16, whole=True)
+"""Number G of classes, at least q + 2. The maximum is chosen: with q = 1 there are G sets, and the
+time of a flight grows with them."""
 MAX_SETS = 64
-"""Maximum number C(G, q) of sets of an engagement: 3 wrong images and 8 classes give 56."""
+"""Maximum number C(G, q) of sets of an engagement, to limit the time and the memory of a flight.
+Chosen: q = 3 with its default of 8 classes gives 56."""
 
 
 class Model(Enum):

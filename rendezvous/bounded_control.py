@@ -37,13 +37,16 @@ GAP = 1e-8
 """Maximum difference of the cost from its lower bound, and maximum error of an effect, relative:
 visits are printed with nine digits."""
 _RULE_NODES = 12
-"""Nodes of Gauss and Legendre's rule in an interval of a quarter of a radian, as in `piecewise`."""
+"""Number of nodes of Gauss and Legendre's rule in an interval. `piecewise` has as many on a panel
+of a radian; intervals are at most a quarter of a panel (`_PARTS`), on which the rule integrates a
+smooth control to rounding."""
 _NODES, _WEIGHTS = (
     rule.astype(np.float64) for rule in np.polynomial.legendre.leggauss(_RULE_NODES)
 )
 _PARTS = 4
-"""Parts of a panel of a radian at whose nodes the control is compared with the bound. Two switches
-between neighbouring nodes, at most 0.03 rad apart, are missed; intervals are then halved."""
+"""Number of equal parts of a panel of a radian. At the nodes of each part the control is compared
+with the bound, to find its switching times. Two switches between neighbouring nodes, which are at
+most 0.03 rad apart, are missed; the interval with them is then halved (`_resolved`)."""
 _EXACT = 1e-11
 """Error of the effects, relative, at which no more rounds are needed."""
 _MAX_ROUNDS = 12
@@ -53,7 +56,8 @@ _MAX_NEWTON_STEPS = 200
 """Maximum number of Newton steps in a round. With it, 285 of 289 random bounds, from 3e-5 above the
 smallest possible bound, relative, were solved; the other four were within 1e-4 of it."""
 _SHORTEST = 1e-9
-"""Minimum part of a Newton step: shorter steps change the value by its rounding only."""
+"""Part of a Newton step down to which the step is halved: shorter steps change the value by its
+rounding only."""
 _SETTLED = 1e-13
 """Error of the effect, relative, at which a round ends: rounding of the sums."""
 _FARTHEST = 1e12
@@ -65,8 +69,9 @@ _ARMIJO = 0.1
 """Part of the decrease of the linear model that a Newton step must attain (Armijo's rule). Chosen:
 12 random arcs have the same energy from 1e-4 to 0.4 (measured)."""
 _DAMPING = 1e-13
-"""Added to the curvature, relative: the curvature is singular if all of a control is at the bound
-and keeps its direction."""
+"""Part of the mean curvature that is added to the curvature of all directions. Without it the
+curvature is singular if all of a control is at the bound and keeps its direction. Chosen: some 500
+roundings of the curvature."""
 _BISECTIONS = 50
 """Bisections of a switching time: its error is then below the rounding of times."""
 _RULE_TOLERANCE = 1e-12
@@ -393,6 +398,7 @@ class _Dual:
         for _ in range(_MAX_NEWTON_STEPS):
             if np.linalg.norm(slope) <= settled:
                 break
+            # 1e-300 keeps the damping positive if the curvature is zero.
             damping = _DAMPING * max(float(np.trace(curvature)) / max(len(point), 1), 1e-300)
             step = -np.linalg.solve(curvature + damping * np.eye(len(point)), slope)
             decrease = -float(slope @ step)

@@ -242,8 +242,9 @@ def generator(seed: int, run: int, stream: int) -> np.random.Generator:
 def max_number_of_steps(scenario: Scenario) -> int:
     """Return a number of steps after which every start has passed its closest approach.
 
-    The time at the lowest closing speed is increased by the share of it that gravity can take away,
-    at least by 1 %.
+    The time at the lowest closing speed is increased by the share of this speed that gravity can
+    take away, at least by 1 %. Two steps are added for flights of few steps, whose 1 % is less than
+    a step.
     """
     box = scenario.dispersion
     slowest = -box.vx_m_s[1]

@@ -136,7 +136,7 @@ def simulate_tasks(
     stopped = threading.Event()
     if executor is None:
         pool: Executor = ThreadPoolExecutor(workers or cores)
-        at_once = (workers or cores) + 1
+        at_once = (workers or cores) + 1  # one waits, so that no thread is idle
         check = stopped.is_set
     else:
         pool = executor

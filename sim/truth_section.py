@@ -22,8 +22,8 @@ from infoset.set_queries import MaskedFloats
 from infoset.sim.kepler import Sight
 
 MARGIN_ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
-"""Rounding error of a margin, relative to the terms of z: a quarter of `ROUNDING` of the section
-laws, by which each cut widens the set.
+"""Rounding error of a margin, relative to the terms of z: a quarter of `CUT_SLACK` of the sections,
+by which each cut is widened.
 """
 
 

@@ -16,10 +16,13 @@ from infoset.sensors import Sensor
 from infoset.sensors.sensor import Geometry
 
 MAX_NUMBER = 1000
+"""Maximum number of wrong images of a flight. Chosen: far more than the 3 that a set allows for."""
 MAX_ANGLE_RAD = 1.5
 """Maximum size of a wrong angle: less than a right angle, which no camera sees."""
 _NUMBER = Limits(minimum=0, maximum=MAX_NUMBER, whole=True)
 _SIZE = Limits(minimum=1.0, maximum=1e6)
+"""Limits of an error of a wrong image in bounds: below 1 it would not be wrong; 1e6 is chosen, and
+far beyond `MAX_ANGLE_RAD` for a bound of an angle."""
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,8 @@ EPSILON = float(np.finfo(np.float64).eps)
 where two of them are compared, 4 ulp allow for both, and for the two origins."""
 CAPACITY = 256
 """Maximum number of vertices of a section, a power of two. The sections of a flight of 4 h with
-10 000 steps have 110 vertices on average (docs/measured/performance.md)."""
+10 000 steps have 110 vertices on average (docs/measured/performance.md). A section that would
+exceed it is enlarged to `REDUCED` vertices."""
 MAX_ADDED = 4
 """Maximum number of vertices that one step adds: two at each of its two turns."""
 REDUCED = 160
@@ -364,6 +365,7 @@ def cut(section: SectionView, tau: float, lower: float, upper: float) -> tuple[b
     right, left, rings, _ = section
     minimum, maximum = heights(section, tau)
     overlap = min(maximum - lower, upper - minimum)
+    # With `<`: a section that only touches the band is not empty, and the true state may be there.
     if overlap < 0.0 or lower > upper:
         return False, min(overlap, upper - lower)
 

@@ -24,12 +24,12 @@ def line_at(x: float, x0: float, y0: float, x1: float, y1: float) -> float:
 def bound_between(
     labels: Floats, values: Floats, first: int, p: float, q: float, slope: float
 ) -> float:
-    """Upper bound on [p, q] of a concave function with given values, plus a line through zero at
-    its middle, by (12).
+    """Upper bound of f(x) + slope (x - c) for all x of the interval [p, q] with the middle c, where
+    f is a concave function: (12) of docs/guarantee-miss.md.
 
-    `values` are the values at increasing `labels`, of which `first` are at most p and the others at
-    least q. Outside of two of its points, a concave function lies below the line through them. The
-    bound is infinite if neither side has two points.
+    `values` are the values of f at increasing `labels`. The first `first` labels are at most p, and
+    the others at least q: none is between p and q. Outside of two of its points, a concave function
+    lies below the line through them. The bound is infinite if neither side has two labels.
     """
     has_left = first >= 2
     has_right = labels.size - first >= 2

@@ -63,8 +63,9 @@ class KnownLabels(NamedTuple):
 def list_known_labels(
     b: int, limit_below: float, limit_above: float, sections: Sections, past: Past
 ) -> KnownLabels:
-    """Write the limits and the stored labels between them to the workspace. When the limits empty
-    is not known yet.
+    """Write the limits and the stored labels between them to the workspace.
+
+    The limits have only their labels: whether they are feasible is not known yet.
     """
     known = past.room.known
     known[0].label = limit_below
@@ -218,6 +219,7 @@ def fill_slot(
             row = UPPER
     slot.label = labels.lower + share * (labels.upper - labels.lower)
     if row == UPPER:
+        # Bit for bit the label whose section is stored; the sum above is rounded.
         slot.label = labels.upper
 
     if row == LAST_REPLAY:
@@ -252,9 +254,9 @@ def refine_all(
 
     Return the number of vertices that every new section may gain. If no label is feasible, the
     engagement has no feasible section afterwards; `sections.unproved` is then whether that is not
-    proved. The limits of the labels, each of shape (B,), are
-    narrowed to infeasible labels, except where other labels may be feasible beyond them: with
-    rates, and with an error bound that rises with range in the paper's model.
+    proved. The limits of the labels, each of shape (B,), are narrowed to infeasible labels, except
+    where other labels may be feasible beyond them: with rates, and with an error bound that rises
+    with range in the paper's model.
     """
     spare = CAPACITY
     slots = sections.slots

@@ -49,17 +49,20 @@ from infoset.engine.workspace import (
 )
 
 LABELS = 3
-"""Labels replayed for one piece: its ends and its middle. One more on each side serves for
-extrapolation by Lemma 7, which needs two labels on a side."""
+"""Labels replayed for one piece: its ends and its middle."""
 MAX_LABELS = LABELS + 2
+"""The same with one more label on each side of the piece: Lemma 7 extrapolates from two labels on a
+side."""
 PIECES = LABELS + 1
-"""Maximum number of pieces into which a piece is divided."""
+"""Maximum number of pieces into which a piece is divided: between the labels there are LABELS - 1,
+and one more on each side goes on to an infeasible label."""
 NEAREST_OUTSIDE = 0.005
 """Minimum distance of a label below the others, in their spacing: a nearer one amplifies the
 rounding errors of supports 200 times. Chosen: Phi of flights of ten seconds is the same from
 0.00125 to 0.08 (measured)."""
 SLACK = 1e-9
-"""Relative enlargement of a bound; the rounding errors of supports and lines are far smaller."""
+"""Relative enlargement of a bound of Phi, for the rounding errors of supports and of lines through
+them, which are far smaller."""
 PIECE = np.dtype(
     [
         ("near", np.float64),
@@ -300,7 +303,7 @@ def replay_labels(feasible: FeasibleLabels, past: Past, outlines: Outlines) -> P
         write_outline(outlines, ZERO, feasible.lower, LOWER, past)
         return PieceLabels(ZERO + 1, ZERO, ZERO)
 
-    # Labels are feasible outside if the limit is.
+    # Beyond a limit of the piece labels can be feasible only if the limit itself is feasible.
     inner = ZERO
     if past.errors is None and feasible.below == feasible.lower:
         label = feasible.lower - spacing

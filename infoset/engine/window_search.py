@@ -90,6 +90,7 @@ def search_windows(
             new = windows[count]
             new.near = half_near
             new.far = half_far
+            # Emptied before every event: the first of the labels below replaces it.
             new.emptied_at = -1
             new.overlap = -np.inf
             for label in (past.room.bracket[MIDDLE].label, half_near, half_far):

@@ -25,7 +25,8 @@ from infoset.geometry.polygon import Point, Points, vertex
 from infoset.geometry.tolerances import EPS
 
 LEAST_LENGTH = 1e-300
-"""Divisor in place of a length that underflows to zero: the vertices of a side are different."""
+"""Minimum divisor, a guard against zero. The vertices of a side are different, and of coordinates
+above 1e-140 (see `polygon_exact`) no length is nearly as short."""
 
 
 @compiled

@@ -23,7 +23,8 @@ from infoset.model import MAX_SETS
 Values = TypeVar("Values", Floats, Integers)
 
 _WRONG_MEASUREMENTS = Limits(minimum=0, maximum=3, whole=True)
-"""As for images: with more, the classes by default give more than `MAX_SETS` sets."""
+"""Number q of wrong measurements. The default classes, 2q + 2, give more than `MAX_SETS` sets from
+q = 4 on."""
 _NEVER = np.iinfo(np.int64).max
 """Step of a member that is not empty, later than all steps."""
 

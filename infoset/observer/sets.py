@@ -27,9 +27,9 @@ from infoset.observer.steps import (
 Set = ConvexPolygons | Polytope | Zonotope
 
 POLYTOPE_SLACK = SNAP
-"""Enlargement of polytopes, relative to the terms of normal . x of a measurement, or to the widths
-of a prediction: the distance from a facet within which points are its vertices, so that the tip of
-a sharp corner may be missing."""
+"""Enlargement of a polytope: of the strip of a measurement relative to the terms of normal . x, and
+of a predicted set relative to its widths. It is SNAP, the distance from a facet within which points
+count as its vertices: by this much the tip of a sharp corner may be missing."""
 MAX_POLYTOPE_VERTICES = 5000
 """Maximum number of vertices of an exact polytope: a step with more takes minutes."""
 _MAX_VERTICES = 700
@@ -39,7 +39,8 @@ four states has at most 36 * 33 / 2 = 594 (upper bound theorem).
 _TINY = float(np.finfo(np.float64).tiny)
 """Minimum distance of a strip from a set that it leaves empty, so that the strip is found."""
 _MIN_TERM = 1e-50
-"""Minimum terms in whose unit a row is written: squares of normals up to 1e60 do not overflow."""
+"""Minimum of the terms by which a row is divided. A normal is at most 1e60, so that an entry of the
+divided row is at most 1e110, whose square does not overflow."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,16 +19,17 @@ from infoset.geometry import polygon, polygon_exact, polygon_reduction, polygon_
 from infoset.geometry.polygon import Points
 
 MAX_VERTICES = 512
-"""Polygons with more vertices are reduced outward, so that the time of a step is bounded: twice the
-limit of a section of an engagement.
+"""Maximum number of vertices of a polygon; polygons with more are reduced outward, so that the time
+of a step is bounded. Chosen: twice the maximum of a section of an engagement.
 """
 _SHARP = 2.0
-"""Slope of both edges at an extreme vertex, relative to its axis, above which the vertex is
-divided: it would move by more than 1 + 2 * 2 = 5 boxes.
+"""Slope of the edges at a vertex that is extreme along an axis, relative to the other axis, in
+units of the box, above which the vertex is divided into two. Undivided it would move by more than
+1 + 2 * 2 = 5 half-widths of the box along the axis (`move_along_axis`). Chosen.
 """
 _SHARP_CORNER = 0.5
-"""The same slope at a vertex that is extreme along two axes: it would move by more than
-1.5 / 0.5 = 3 boxes along each.
+"""The same slope at a vertex that is extreme along two axes: undivided it would move by more than
+(1 + 0.5) / (1 - 0.5) = 3 half-widths along each axis (`move_along_corner`). Chosen.
 """
 
 
@@ -276,7 +277,9 @@ def tip_move(
 def move_along_axis(a: float, b: float, c: float, d: float) -> tuple[float, float]:
     """Move of a vertex that is extreme along an axis u, along u and along v; zero if it is sharp.
 
-    The edge to the vertex has the normal a u - b v, the edge from it the normal c u + d v.
+    The edge to the vertex has the normal a u - b v, the edge from it the normal c u + d v. A move
+    by f u + s v must be at least a + b along the first normal and c + d along the second one, the
+    supports of the box: s = -1 makes the second one an equality with f = 1 + 2 d / c.
     """
     if min(a, b) < 0.0 or min(c, d) < 0.0:
         return 0.0, 0.0

@@ -19,8 +19,8 @@ from infoset.observer.sets import Motion, Set, Sets, sizes_of
 from infoset.observer.steps import Strips
 
 ORDER = 5
-"""Generators of a carried zonotope for each state. More are not tighter: on chains of masses, 30
-gave wider sets.
+"""Maximum number of generators of a carried zonotope for each state. More do not make it tighter:
+on chains of masses, sets were wider with 30.
 """
 WINDOW = 10
 """Steps of a program. For up to 20 states the widths are then within 6 % of the widths of the whole
@@ -284,7 +284,7 @@ class Windows:
     def chebyshev_centres(self) -> Floats:
         """Refuse with a ValueError: the facets are not known."""
         raise ValueError(
-            "the largest ball of a set of 7 and more states is not known: use the bounds of the "
+            "the largest ball of a set of 5 and more states is not known: use the bounds of the "
             "states"
         )
 

@@ -13,6 +13,7 @@ from infoset.sensors.bearing import BearingSensor
 from infoset.sensors.sensor import Apart, Cuttable, Geometry, Measurements, Sensor
 
 _WRONG = Limits(minimum=0, maximum=3, whole=True)
+"""Number of wrong ranges, with the maximum of wrong images (`infoset.model`)."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,8 @@ class RateSensor(Checked, Sensor):
     def share(self, apart: Apart) -> Floats:
         """Return half of the maximum difference of the rates, in units of the bound, shape (n,).
 
-        The rate is the derivative of z/x times cos^2(alpha), which depends on z.
+        The rate is the derivative of z/x times cos^2(alpha), which depends on z. This is the term
+        with 4 q^2 in Lemma 20 of docs/guarantee-bound.md, where q is `slope`.
         """
         change_m = np.abs(apart.predicted_miss_m) + 4.0 * apart.slope**2 * np.abs(apart.offset_m)
         return np.asarray(

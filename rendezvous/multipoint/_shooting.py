@@ -26,29 +26,33 @@ SMALLEST_COSTATE = 1e-300
 MAX_PATH_STEPS = 50_000
 """Largest number of steps of a segment: some 800 revolutions."""
 MIN_RADIUS = 0.02
-"""A trajectory nearer to the centre, relative to its initial distance, counts as falling into
-it.
+"""A trajectory nearer to the centre than this, relative to the distance at its start, counts as
+falling into the centre. Chosen: there the steps are some 350 times shorter than at the start.
 """
 RESIDUAL_TOLERANCE = 1e-11
 """Largest residual of a trajectory, in units of its block: ten times the errors of the steps."""
 ON_THE_WAY = 1e-4
-"""Largest residual of the trajectories from which others are continued."""
+"""Largest residual of the trajectories from which others are continued; chosen: they are only
+guesses."""
 RESIDUAL_ROUNDING = 1e-8
-"""A smaller residual that no longer decreases is rounding."""
+"""Residual below which a residual that no longer decreases is accepted as rounding. Chosen: on long
+trajectories rounding can be greater than `RESIDUAL_TOLERANCE`."""
 MIN_STEP = 1.0 / 64.0
-"""Smallest part of the residual that is removed in a step; chosen: beyond, the search has
-failed.
+"""Smallest part of the first residual that a step removes; chosen: a search that needs shorter
+steps has failed.
 """
 MIN_STEP_FROM_NEAR = 1.0 / 8.0
-"""The same from a trajectory of other times: if it is not near, coasting is the better start."""
+"""The same for a search that starts from a trajectory of other times; chosen: if that one is not
+near, the coasting orbit is the better start."""
 _ROUNDS = 12
 """Largest number of rounds of Newton's method, whose digits double in each with new derivatives."""
 _FAST = 0.2
-"""Ratio of two residuals up to which derivatives are used again."""
+"""Ratio of a residual to the one before up to which the same derivatives are used again; chosen."""
 _MAX_CORRECTION = 0.5
-"""Largest residual, in units of the block: beyond it Newton's method diverges."""
+"""Largest residual, in units of the block, from which Newton's method goes on; chosen: from greater
+ones it mostly diverges."""
 _FIRST_STEP = 0.3
-"""Residual that is removed in the first step, below `_MAX_CORRECTION`."""
+"""Largest residual that the first step removes; chosen, below `_MAX_CORRECTION`."""
 
 
 @allocation_free
@@ -147,6 +151,7 @@ def propagate(z: Floats, duration: float) -> bool:
         if not column_size(z, R) > MIN_RADIUS:
             return False
         step = min(left, longest_step(z))
+        # No tiny last step, which rounding of `left` would leave.
         if left - step < 1e-3 * step:
             step = left
         _step(0.0, step, 0, no_y, z, (), no_slopes, slopes, no_y, z_next)
@@ -424,6 +429,7 @@ def _follow(block: Block, initial: Floats, min_step: float) -> Floats | None:
         if share == 1.0:
             return unknowns
         done = share
+        # Longer steps after fast convergence; both factors are chosen.
         if rounds <= 2:
             step *= 2.0
         elif rounds <= 4:
@@ -448,6 +454,7 @@ def _newton(
         if residual is None:
             return None
         size = float(np.abs(residual - goal).max())
+        # With new derivatives a residual above rounding falls to less than 0.3 of the one before.
         is_rounding = fresh and size <= RESIDUAL_ROUNDING and size > 0.3 * before
         if size <= enough or is_rounding:
             return unknowns, rounds

@@ -22,20 +22,25 @@ from infoset.rendezvous.multipoint.times import MIN_SHARE, Grid, TimeLimits, roo
 from infoset.rendezvous.multipoint.tour import Meet, Tour
 
 TIMES_PER_RADIAN = 4.0
-"""25 times a revolution: the lowest cost is then mostly within 5 % of the minimum near it."""
+"""Times of the grid in a radian, 25 in a revolution: the lowest cost on the grid is then mostly
+within 5 % of the minimum near it."""
 MIN_TIMES = 32
-"""Times of a short grid: the transitions from nearly no gap to long ones need some at any angle."""
+"""Smallest number of times. Chosen: also over a small angle the cost changes much from nearly no
+gap to long gaps."""
 MAX_TIMES = 400
-"""The legs between so many times of a time-varying motion take 70 MB."""
+"""Largest number of times for a given order: the legs between them take 70 MB in a time-varying
+motion."""
 MAX_ORDER_TIMES = 72
-"""Times of a grid of all orders; their best ones are searched again on a finer one."""
+"""Largest number of times for all orders. Chosen: the best orders of this grid are searched again,
+each on a finer grid."""
 MAX_TRIPLES = 1e8
-"""Largest number of compared sequences of three times, which take 60 to 100 ns each.
+"""Largest number of compared sequences of three times, which take 60 to 100 ns each: at most 10 s.
 
 The grid of nine targets then has 40 times.
 """
 APART_RAD = 1.5
-"""Quarter of a revolution: minima of the cost are half a revolution apart or more."""
+"""Turn of the motion, about a quarter of a revolution, by which the deciding times of two kept ways
+differ at least (`extend`): minima of the cost are half a revolution apart or more."""
 RANKS = 4
 """Number of quadratics that are kept for two times of a given order.
 
@@ -44,6 +49,7 @@ With one, the valley of the minimum was lost in 1 of 90 cases.
 START = -1
 """Number of the chaser's coasting orbit among the targets."""
 _NONE = -2
+"""Number in place of a target where there is no visit."""
 
 
 class Candidate(NamedTuple):
@@ -162,6 +168,7 @@ class _TimeGrid:
             self._pairs(visits) * (self._ranks if visits > 3 else 1)
             for visits in range(3, self._count + 1)
         )
+        # Of G times, about G^3 / 6 sequences of three increase.
         most = MAX_TIMES if self._order is not None else MAX_ORDER_TIMES
         return most if passes == 0 else min(most, int(np.cbrt(6.0 * MAX_TRIPLES / passes)))
 
@@ -277,6 +284,7 @@ class _TimeGrid:
         for last, visits in ends.items():
             arrive_s = self._arrive_s(complete & ~(1 << last))
             cost = visits.cost + self._limits.price_per_s * (arrive_s - start_s)
+            # A sum of gaps may exceed the latest time by its rounding.
             cost[:, arrive_s - self._latest_s > 1e-12 * (self._latest_s - start_s)] = np.inf
             for row, at in np.argwhere(self._lowest(cost, visits.back)).tolist():
                 order, times = self._way(complete, last, row, at)

@@ -22,23 +22,27 @@ MIN_SHARE = 1e-6
 _POLISH_ROUNDS = 8
 """Largest number of rounds of Newton's method, which starts near a minimum."""
 _DIFFERENCE = 1e-5
-"""Step of the differences of the gradient, by the smallest gap: near the cube root of rounding."""
+"""Step of the central differences of the gradient, as a share of the smallest gap: near the cube
+root of the rounding of doubles, where rounding and truncation are similar."""
 _HELD = 1e-3
 """Excess of a gap over the minimum, as a share of it, up to which the gap is held at the
 minimum.
 """
 _WALL = 20.0
-"""Logarithm of the objective at times without a path, above the start's: a wall for the descent."""
+"""Logarithm of the objective at times without a path, above its value at the start of the descent:
+a wall for the line search. Chosen."""
 _MAX_WALLS = 6
 """Number of times without a path after which a descent stops; chosen: its line search is lost."""
 _MAX_RESTARTS = 4
 """Largest number of descents from the end of the last one; chosen: later ones change little."""
 _SETTLED = 1e-3
-"""Residual of a minimum, see `_unsettled`, above which the times are refused."""
+"""Residual of a minimum above which the times are refused: another gap would save this share of the
+objective (`_unsettled`). Chosen."""
 _WELL_SETTLED = 1e-6
-"""Residual of a minimum below which no further descent is made."""
+"""Residual of a minimum down to which the descent is repeated; chosen."""
 _OBJECTIVE_ROUNDING = 1e-26
-"""Square of a relative error of states of 1e-13, some 450 roundings: its cost counts as zero."""
+"""Square of 1e-13, a relative error of states by some 450 roundings: a cost that such an error
+causes counts as zero."""
 _MIN = float(np.finfo(float).tiny)
 """Smallest divisor."""
 _CLOCK = 1e-9
@@ -361,10 +365,12 @@ def _spread(count: int, scale: float, minimum: float, bounded: bool, most: int) 
     shapes = (np.ones(count), rising, rising[::-1])
     shares = [length * shape / shape.sum() for shape in shapes for length in lengths]
     for point in halton(count + 1, most):
+        # Shares of -log(point) would be uniform over all shares; 0.2, chosen, avoids tiny gaps.
         weights = 0.2 - np.log(point)
         if bounded:  # the last weight is that of the time that is left at the end
             shares.append((weights / weights.sum())[:count])
         else:
+            # Lengths from 0.5 to 8, as in `lengths`, with uniform logarithms.
             shares.append(0.5 * 16.0 ** point[count] * weights[:count] / weights[:count].sum())
     return [minimum + extra * share for share in shares[:most]]
 
@@ -392,6 +398,7 @@ def _descend(
     """
     if start.objective < enough:
         return start
+    # Keeps the logarithm finite where a path costs nothing.
     floor = 1e-30 * max(start.objective, 1e-270)
     shares = np.broadcast_to(scale, start.gaps.shape) / trials.total
     walls = 0
@@ -441,6 +448,7 @@ def _polish(trials: _Trials, best: _Trial) -> _Trial:
     """Newton's method on the gaps above the minimum gap; at the latest time their sum is fixed."""
     minimum = trials.minimum
     total = trials.total
+    # An end this near to the latest time is moved onto it; chosen.
     near = 1e-5 * trials.scale
     gaps = best.gaps
     full = total - gaps.sum() <= near
@@ -471,6 +479,7 @@ def _polish(trials: _Trials, best: _Trial) -> _Trial:
         outside = bool(
             (moved < minimum * (1.0 - 1e-12)).any() or moved.sum() > total * (1.0 + 1e-12)
         )
+        # Newton's method is for the neighbourhood of a minimum: a tenth of a gap, chosen.
         if outside or np.abs(move).max() > 0.1 * float(here.gaps.min()):
             break
 

@@ -27,12 +27,14 @@ _MAX_PARTS = 4
 `geo-pursuit` 62 are solved with 1, 73 with 4 and 81 with 16, which takes twice the time (measured).
 """
 _SHORT = 1e-7
-"""Distance by which the end of another direction may be farther, the error of `_CONVERGED`. From
+"""Distance by which the end of another direction may be farther along a direction although its
+extremal is the farthest: above the errors of ends, the square of `_CONVERGED` and `COARSE`. From
 2.5e-8 to 4e-7 the same directions of `geo-pursuit` are kept (measured)."""
 _GAIN = 1e-6
-"""Distance by which another branch must be better, ten times `_SHORT`."""
+"""Minimum gain of distance for which another branch replaces a branch: ten times `_SHORT`."""
 _LONGEST = 40.0
-"""Radians, some six revolutions: longest duration that is scanned for a branch."""
+"""Longest duration, in radians, that is scanned for another branch: some six revolutions; chosen: a
+scan takes at least 0.5 s a revolution, and longer ones minutes."""
 _MAX_ITERATIONS = 8
 """Twice the iterations of Newton's method between neighbours: with half of them 71 of 73 directions
 of `geo-pursuit` are solved, and with twice as many no other (measured)."""

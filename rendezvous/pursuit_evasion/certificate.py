@@ -34,17 +34,24 @@ from infoset.rendezvous.pursuit_evasion.solution import CaptureSolution
 from infoset.rendezvous.pursuit_evasion.steering import Policy
 
 MAX_HAMILTONIAN_DRIFT = 1e-8
-"""Relative: the Hamiltonian is constant to the errors of propagation, ten times `MAX_RESIDUAL`."""
+"""Maximum relative change of the Hamiltonian along the paths. It is constant except for the errors
+of propagation; chosen: ten times `MAX_RESIDUAL`."""
 MAX_INTEGRATOR_GAP = 1e-7
-"""In units of length: some 4 m in a geostationary orbit. Chosen: the gaps of `leo-pursuit` and
-`geo-pursuit` are 1e-11 and 3e-12 (measured)."""
+"""Maximum distance of the ends of the two integrators, in units of length: some 4 m in a
+geostationary orbit. Chosen: the gaps of `leo-pursuit` and `geo-pursuit` are 1e-11 and 3e-12
+(measured)."""
 MAX_GAIN_S = 1e-2
-"""Difference of capture times by which a deviation must be better: above their rounding."""
+"""Maximum difference of the capture times of a game and of a deviation, s, that is not a gain of
+the player who deviates. Chosen: in `leo-pursuit` and `geo-pursuit` the pursuer alone captures
+within 1e-9 s of the capture time, and deviations of the evader cost it minutes (measured)."""
 MAX_EXCESS = 1e-6
-"""In units of length: the scan is less accurate than the solution of the game."""
+"""Maximum distance beyond the capture radius, in units of length, that another direction may keep:
+the gain for which the scan changes the branch (`_scan`). In `leo-pursuit` and `geo-pursuit` the
+excess is 3e-11 and 1e-10 (measured)."""
 MAX_UNDECIDED = 0.5
-"""Share of the directions that may be undecided in a claim: a scan that compares less than half of
-them has not looked at most of the alternatives. `geo-pursuit` leaves 47 of 120 undecided."""
+"""Maximum share of the directions of a scan that may be undecided if a saddle point is claimed: a
+scan that decides less than half of them has not looked at most of the alternatives. `geo-pursuit`
+leaves 47 of 120 undecided."""
 
 _PANELS = 32
 """Number of panels of the integral of the Hamiltonian: one in half a revolution of the longest
@@ -58,11 +65,13 @@ _MAX_CHANGES = 3
 seconds.
 """
 _BEYOND = 1.0 + 1e-6
-"""Duration until which responses are followed, by the capture time: includes the capture itself."""
+"""Duration up to which responses to deviations are followed, in capture times of the game. It is
+above 1 by more than rounding, so that a response that captures at the capture time is found."""
 _SECOND_TOLERANCE = 1e-12
 """Tolerance of the second integrator, as small as LSODA allows."""
 _MAX_WORK = 2.0 * MAX_WORK
-"""Limit of the work of all deviations together: twice the limit of the game."""
+"""Maximum work of the responses to all deviations together, in the unit of `MAX_WORK`. Chosen:
+twice the work that a game may take."""
 
 
 @dataclass(frozen=True)
@@ -248,6 +257,7 @@ def certify(solution: CaptureSolution, *, all_directions: bool = False) -> Certi
         if np.isfinite(excess):
             max_excess_m = float(excess) * units.length_m
 
+    # The last duration of the curve is the capture itself, to rounding.
     earlier_m = solution.curve.distance_m[solution.curve.duration_s < capture.time_s * (1.0 - 1e-9)]
     return Certificate(
         residual=capture.residual,

@@ -21,7 +21,8 @@ from infoset.rendezvous.pursuit_evasion.steering import Steering
 PathNow = Callable[[float], Floats]
 
 HIT_M = 100.0
-"""Distance that counts as capture of a point: the accuracy of a last leg without observation."""
+"""Distance up to which the closest approach to a point counts as a capture. Chosen: in the last leg
+the evader is not observed."""
 
 _OUTPUT_TIMES = 65
 """Number of times in a leg at which the distance is computed, before its minimum or the first time
@@ -38,12 +39,13 @@ _WIDE = 2.0
 Chosen: the pursuits of `_OUTPUT_TIMES` end alike from 0.5 to 8 (measured); a large one costs time.
 """
 _PATIENCE = 1.0
-"""Delay of a capture, by the time to it, up to which a plan from scratch replaces the last one.
+"""Delay of the capture by a plan from scratch, relative to the time to the capture of the last
+plan, up to which it replaces the last plan.
 
 Chosen: the pursuits of `_OUTPUT_TIMES` end alike from 0.25 to 4 (measured).
 """
 _MAX_PLANS = 10_000
-"""Largest number of plans: five times the default of the command, `MAX_PLANS`."""
+"""Largest number of plans; chosen: five times the default of the command, `MAX_PLANS`."""
 _LONGEST = 1e3
 """Longest game of a plan, in radians; chosen: above the longest duration of any game by default."""
 

@@ -56,6 +56,7 @@ class RandomSteering:
 
     def __call__(self, time_s: float, _state: Floats) -> Floats:
         """Return the direction at a time, which is the same in every call."""
+        # A time that is a whole number of holds belongs to the next direction, also if rounded.
         return _drawn(self.seed, self.run, max(0, int(time_s / self.hold_s + 1e-9)))
 
 

@@ -26,7 +26,8 @@ the other two."""
 _SOLVER_TOLERANCE = 1e-10
 """Tolerance at which Clarabel stops, relative: a tenth of `MAX_VIOLATION`."""
 _SIZE_FACTOR = 2.0
-"""Size of a solution beside the size of the point found, in the lower bound by weak duality."""
+"""Assumed maximum size of a solution, in sizes of the point that the solver found. The lower bound
+by weak duality contains it (`violation_and_gap`). Chosen."""
 
 
 class SolverSettings(NamedTuple):

@@ -20,9 +20,10 @@ _PANELS = 16
 """Parts of a period in which the effect of an acceleration is bounded: the effect on the position
 is 0.2 % too large for straight motion."""
 _MAX_ROUNDS = 8
-"""Maximum number of assumed distances; most plans end after one or two."""
+"""Maximum number of rounds, each with larger assumed distances; most plans end after one or two."""
 _RADIUS_RESERVE = 1.02
-"""Factor of the assumed distances beside those that were found: the next plan has others."""
+"""Ratio of the assumed distances of a round to the distances that the round before found. It is
+above 1 because the plan of the next round has other distances. Chosen."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,8 +19,9 @@ from infoset.sim.results import Results
 from infoset.sim.scenario import Scenario
 
 STEPS_BEYOND = 2
-"""Maximum number of simulated steps after the step with x = 0. Chosen: a flight that takes longer
-raises IndexError. The pairs of dart-2022 and asteroid-1997-single end with 0 to 8 (measured).
+"""Number of steps after the step with x = 0 for which the target has an acceleration. Chosen: a
+flight that needs more raises IndexError. The flights of the pairs of dart-2022 and
+asteroid-1997-single need none: they end with 0 as with 8 (measured).
 """
 
 

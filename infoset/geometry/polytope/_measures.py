@@ -10,8 +10,8 @@ from infoset.arrays import Flags, Floats, Integers
 from infoset.geometry.polytope.errors import SolverError
 
 HIGHS = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
-"""Options of HiGHS for linear programs on the scale of a polytope: feasibility tolerances of
-1e-10.
+"""Options of HiGHS for linear programs on the scale of a polytope: 1e-10 is the smallest tolerance
+that HiGHS accepts.
 """
 
 
@@ -77,7 +77,8 @@ def largest_ball(rows: Floats, limits: Floats) -> tuple[Floats, float]:
         If the linear program (HiGHS) was not solved, for example because the set has balls of any
         size.
     """
-    # The program has rows of size one; the radius is in units of the shortest one.
+    # The program has rows of size one; the radius is in units of the shortest row. A row of zeros
+    # must not be divided by zero: hence 1e-300.
     units = np.abs(rows).max(axis=1, initial=1e-300)
     minimum = float(units.min(initial=1.0))
     matrix = np.column_stack([rows / units[:, None], minimum / units])

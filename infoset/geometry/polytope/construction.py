@@ -50,28 +50,32 @@ from infoset.geometry.tolerances import ON, REDUCED, SNAP, UNSURE
 Ends = tuple[Floats, Floats]
 """Minimum and maximum coordinates, each of shape (n,)."""
 FINE = 2.0**14
-"""Ratio of widths from which a part of a set is computed in its own coordinates: one rounding of
-the whole set, UNSURE, is then 2 SNAP of the part.
+"""Width of a set, in widths of a part of it, from which the part is computed in its own
+coordinates: UNSURE, one rounding of the whole set, is then 2 SNAP of the part, whose facets could
+no longer be told from a flat set.
 """
 _GOOD_WIDTH_RATIO = 2.0**6
-"""Ratio of widths up to which coordinates are as good as coordinates in which the set is one wide:
-two digits are lost.
+"""Coordinates are good if the set is at most this wide in them, and at least its inverse: up to two
+digits are lost then, compared with coordinates in which the set is one wide.
 """
 _MAX_FRAMES = 3
-"""Number of coordinates in which half-spaces are tried before integers decide: of the given box, of
-the set found in these, and of the set found in those, whose ends are then known.
+"""Number of systems of coordinates in which half-spaces are tried before integers decide: those of
+the given box, those of the set found in the first ones, and those of the set found in the second
+ones, which knows the ends of the set.
 """
 _LEAST_WIDTH = 64.0 * UNSURE / SNAP
-"""Scale of an axis, relative to the coordinates from which limits were computed, in which 64 of
-their roundings are flat.
+"""Minimum scale of an axis, relative to the coordinates from which limits were computed: 64
+roundings of these coordinates are then SNAP in the scale, so that a set as thin as this is flat.
+64 is chosen.
 """
 _PIVOT_GROWTH = 64.0
-"""Growth of distances from a plane in the pivots of a flat set. For complete pivoting in R^6 it is
-at most 11 (Wilkinson's bound); chosen: several times this.
+"""Factor by which elimination (`pivots`) may enlarge the distances of points from the plane of a
+flat set. For complete pivoting in R^6 it is at most 11 (Wilkinson's bound for 7 columns); chosen:
+several times this.
 """
 _MEETING = 16.0 * SNAP
-"""Distance from a vertex of computed facets that meet in it; up to 6 SNAP were measured in
-observers of four states.
+"""Maximum distance of a vertex from the computed facets that meet in it. Up to 6 SNAP were measured
+in observers of four states; chosen: more than twice this.
 """
 
 

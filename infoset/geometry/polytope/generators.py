@@ -32,9 +32,10 @@ PARALLEL = SNAP
 relative to them.
 """
 _NEARLY_PARALLEL = 1.0 - 1e-6
-"""Cosine from which the angle is computed: a cosine of 1 - 5e-23 is rounded to 1.
+"""Cosine of two generators above which their sine is computed, to compare it with `PARALLEL`.
 
-Chosen: the sine is 1.4e-3 there, and generators with a smaller cosine are certainly not parallel.
+The cosine itself cannot decide: of parallel generators it is 1 - 3e-23, which is rounded to 1.
+Chosen: at this cosine the sine is 1.4e-3, so that generators below it are certainly not parallel.
 """
 COPLANAR = 128.0 * UNSURE
 """Determinant of three generators of length one that count as coplanar: 500 roundings.
@@ -43,12 +44,15 @@ It is 60 times below the determinant of two generators that just count as parall
 at right angles.
 """
 _BLUNT = 0.1
-"""Cosine of the angle between the mean normal of a vertex and the normals of its facets, down to
-which the vertex moves along the mean normal: by at most ten roundings.
+"""Minimum cosine of the angles between the mean normal of a vertex and the normals of its facets
+for which the vertex moves along the mean normal.
+
+To move by a rounding across a facet, the vertex moves by a rounding over the cosine: by at most ten
+roundings. Chosen; at smaller cosines, in sharp corners, `push_out` finds shorter moves.
 """
 SHORT = ON
-"""Sum of the sizes of generators, in scaled coordinates, that only move facets and vertices
-outward.
+"""Sum of the lengths of the shortest generators, in scaled coordinates, up to which they are left
+out; facets and vertices move outward by them instead.
 """
 
 
@@ -512,6 +516,7 @@ def _ahead(points: Floats, facets: Floats, faces: Faces) -> tuple[Floats, Flags]
 
     slopes = (units * means[vertex]).sum(axis=1)
     products = units * points[vertex]
+    # A sum of n products, and six more roundings: of the lengths, the units, the ends and the move.
     rounding = (points.shape[1] + 6) * EPS * (np.abs(products).sum(axis=1) + np.abs(ends))
     gaps = ends - products.sum(axis=1) + rounding
     needs = np.maximum.reduceat(gaps / np.maximum(slopes, _BLUNT), first)

@@ -16,23 +16,24 @@ from infoset.kernels import Kernels
 _kernels = Kernels()
 
 _MAX_PAIRS = 1000
-"""Number of pairs of vertices that Wolfe's algorithm may add: it ends after a few of each hull: 10
-are enough for 23 random pairs (measured)."""
+"""Maximum number of pairs of vertices that Wolfe's algorithm adds, a guard: it ends after a few
+vertices of each hull. For 23 random pairs of hulls 10 are enough (measured)."""
 _PRECISION = 64.0 * EPS
 """Decrease of x . d, relative to the sizes of x and of the hulls, that a new pair must offer: 64
 roundings.
 """
 _REFINEMENTS = 3
-"""Corrections of the shares, each of which divides their error by 1e16 over the squared condition
-of the edges. One is enough for 23 random pairs, and without any distances are wrong (measured).
+"""Maximum number of corrections of the shares. Each multiplies their error by 1e-16 times the
+squared condition number of the edges. For 23 random pairs of hulls one is enough, and without any
+correction distances are wrong (measured).
 """
 _SMALL_STEP = 0.5 * EPS
 """Change of the shares that is their rounding."""
 _DEPENDENT = ON
 """Part of an edge, relative to it, that is orthogonal to others, below which it is rounding."""
 _SMALLEST = 1e-90
-"""Size of the hulls, relative to the coordinates, below which they count as points: squares do not
-overflow.
+"""Size of the hulls, relative to the coordinates, up to which they count as points. In units of
+larger hulls coordinates are at most 1e90, whose squares do not overflow.
 """
 
 
@@ -89,7 +90,8 @@ def _shares_of_nearest(one: Floats, two: Floats) -> tuple[Integers, Integers, Fl
                 shares = target
                 break
 
-            # Go toward the minimizer until a share is zero; drop that pair.
+            # Go toward the minimizer until a share is zero; drop that pair. A share that is zero
+            # already does not decrease: 1e-300 is a divisor in place of zero.
             below = target <= 0.0
             decrease = np.maximum(shares[below] - target[below], 1e-300)
             part = float(np.min(shares[below] / decrease))

@@ -13,8 +13,8 @@ from infoset.geometry.polytope.polytope import Polytope
 from infoset.geometry.tolerances import ON, REDUCED
 
 _MAX_ROUNDS = 200
-"""Number of enlargements of the hull, a guard: each adds a point beyond every facet that the set
-exceeds, so that a set with at most `max_facets` facets is found after few.
+"""Maximum number of enlargements of the hull, a guard: each adds a point beyond every facet that
+the set exceeds, so that a set with at most `max_facets` facets is found after few enlargements.
 """
 _FLAT = 4.0 * REDUCED
 """Thickness of a flat set of points that a solver of linear programs found: 1.2e-7. HiGHS satisfies
@@ -56,6 +56,8 @@ def polytope_from_support(
             raise ArithmeticError(f"the projection has over {max_facets} facets")
         new = []
         for row, limit in zip(rows, limits, strict=True):
+            # Unit normals that agree in 10 digits are the same facet, computed again. The sum makes
+            # -0.0 to 0.0.
             key = tuple((row + 0.0).round(10))
             if key in known:
                 continue

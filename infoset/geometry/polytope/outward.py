@@ -27,21 +27,22 @@ from infoset.kernels import Kernels
 
 _kernels = Kernels()
 _LEAST_WIDTH = 2.0**-10
-"""Minimum scale of a coordinate of an image, relative to its terms: their rounding, EPS, is then at
-most a quarter of ON in the coordinate.
+"""Minimum scale of a coordinate of an image, relative to the terms of the products that it is a sum
+of. The rounding of these terms, EPS, is then at most a quarter of ON in the scaled coordinate.
 """
 MAX_MOVE = 32.0
 """Maximum move of a vertex, relative to the move of its facets. Where two facets that move by 1
 meet at an angle of 3.6 degrees, their corner moves by 32. Chosen: the points of 24 enlarged images
 lack 2e-10 of their facets from 32 to 128, and 7e-8 with 8 (measured)."""
 _MAX_CROSSINGS = 60
-"""Number of moves across single facets, after which a corner counts as too sharp for them.
-Chosen: the images of `MAX_MOVE` are the same from 15 to 240 (measured).
+"""Maximum number of moves across single facets. A corner that needs more counts as too sharp for
+such moves, and its vertex moves away from the centre. Chosen: the images of `MAX_MOVE` are the same
+from 15 to 240 (measured).
 """
 _BEYOND = 0.25
-"""Part of the need of a facet by which a move goes too far, so that later moves rarely bring the
-point back inside by rounding. Chosen: volumes of the images of `MAX_MOVE` are 0.02 % smaller
-without, and 0.07 % greater with 1 (measured).
+"""Part of the distance to a facet by which a move goes beyond the facet, so that later moves rarely
+bring the point back inside by rounding. Chosen: compared with 0.25, the volumes of the images of
+`MAX_MOVE` are 0.02 % smaller with 0, and 0.07 % greater with 1 (measured).
 """
 
 
@@ -73,7 +74,8 @@ def image(
     result, errors = affine_image(points, scaled, shift[0])
     errors += middle_errors / new_scale
 
-    # Whether the matrix is regular does not depend on the units of its columns.
+    # Whether the matrix is regular does not depend on the units of its columns. A column of zeros
+    # is divided by 1e-300, not by zero.
     units = np.array([size_of(column) for column in scaled.T]) + 1e-300
     if not m == n == len(pivots(scaled / units, REDUCED, np.int64(-1))[0]):
         return result, facets[:0], new_centre, new_scale, errors
@@ -237,9 +239,10 @@ def _cross_facets(
 ) -> bool:
     """Enlarge a step until it moves a point across its facets by `needs`; return whether it does.
 
-    Each move is across the facet that is missed most, and along the facets of the moves before in
-    its sweep. At sharp corners, longer sweeps would move farther, shorter ones more often; it may
-    fail. `basis`, shape (3, n), is for work: the orthonormal normals of a sweep.
+    Moves are grouped in sweeps of up to three. Each move is across the facet that is missed most,
+    and parallel to the facets of the earlier moves of its sweep. At sharp corners, longer sweeps
+    would move farther, and shorter sweeps need more moves. `basis`, shape (3, n), is for work: the
+    orthonormal normals of a sweep.
     """
     size = 0
     for _ in range(_MAX_CROSSINGS):

@@ -46,8 +46,8 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
 _WIDE = 2.0**6
-"""Coordinates of a sum, in the coordinates of a term that is one wide, from which it gets its own:
-two digits are lost.
+"""Maximum coordinate of a sum, in the coordinates in which one of its terms is one wide, from which
+the sum gets its own coordinates: up to it at most two digits are lost.
 """
 
 
@@ -308,6 +308,8 @@ class Polytope(PolytopeArrays, ConvexSet):
         found = self._of(construction.of_half_spaces(mapped, limits))
         if found.dimension < found.space or not (rounded.any() or moved.any()):
             return found
+        # The entries and the limits of the mapped rows are rounded once each, relative to
+        # themselves: a facet moves by less than this.
         return found.enlarged(2.0 * EPS * np.abs(found.vertices).max(axis=0))
 
     def _exact_preimage(self, matrix: Floats, offset: Floats) -> Polytope:

@@ -14,6 +14,8 @@ from infoset.geometry.polytope.incidence import Bits, unpacked
 from infoset.geometry.tolerances import ON
 from infoset.kernels import Kernels
 
+# Unlike other kernels of sets, which need the bits of each operation: here rounding decides only
+# which facets are used, and `construction.settled` checks the result.
 _kernels = Kernels("contract", "nnan", "nsz")
 
 

@@ -19,8 +19,8 @@ from infoset.kernels import Kernels
 
 _kernels = Kernels()
 _FAR = 16.0
-"""Coordinates, in scales, from which a centre is used: nearer to the origin at most four bits are
-lost.
+"""Distance of a set from the origin, in scales, above which a centre is used. Up to it at most four
+of the 53 bits are lost without a centre.
 """
 
 
