@@ -354,7 +354,7 @@ def test_polytopes_of_many_states_are_refused() -> None:
         _ = estimate.polytopes
     with pytest.raises(ValueError, match=r"not two: use \.lower, \.upper or \.output_hull"):
         _ = estimate.polygons
-    with pytest.raises(ValueError, match="of 5 and more states .* use the bounds of the states"):
+    with pytest.raises(ValueError, match=r"of 5 and more states .* use the bounds of the states"):
         estimate.chebyshev_centre()
     with pytest.raises(ValueError, match="window"):
         WideSystem.random(7, 1).observer(window=0)
