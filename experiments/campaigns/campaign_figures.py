@@ -39,15 +39,21 @@ from infoset.sim.storage import CampaignFolder
 CONVERGING = {0.5: "-", 0.9: (0, (5, 1.5)), 0.99: (0, (1.5, 1.2))}
 """Levels of the quantiles over the number of runs, with their lines."""
 RUNS_A_BIN = 100
-"""Minimum mean number of runs in a bin of the initial state: ten runs are above its quantile."""
+"""Minimum mean number of runs in a bin of the initial state: on average ten of them are above the
+90 % quantile that is drawn for the bin.
+"""
 _BINNED = (0.5, 0.9)
 """Levels of the quantiles in the bins."""
 _BINS = 24
 """Maximum number of bins of the initial state: narrower ones cannot be seen in a panel."""
 _LOOKS = 28
-"""Number of sizes of a sample at which its quantiles are estimated: a smooth line in a panel."""
+"""Number of sizes n of the first n runs whose quantiles are drawn, at equal ratios from 10 to all
+runs; chosen: more points change a line of 70 mm no more.
+"""
 _DECADES_FROM = 1000
-"""Number of runs from which the axis of the number of runs has labels at powers of ten only."""
+"""Number of runs from which the axis of the number of runs has labels at powers of ten only: from
+there on it has three of them, 10, 100 and 1000; a shorter axis has labels at 2 and 5, too.
+"""
 _QUANTITIES = {"miss_m": "miss, m", "impulse_m_s": "impulse spent, m/s"}
 
 
@@ -121,6 +127,7 @@ def draw_convergence(by_noise: dict[str, pd.DataFrame]) -> Figure:
     The quantities are the miss and the impulse. A quantile is drawn from the number of runs on that
     shows it (`infoset.sim.statistics.shows`). Each noise has a row.
     """
+    # Millimetres: a row of panels, and the legend; chosen.
     figure, panels = subplots(62.0 * len(by_noise) + 14.0, len(by_noise), 2)
     for row, (noise, runs) in zip(panels, by_noise.items(), strict=True):
         for axes, (quantity, label) in zip(row, _QUANTITIES.items(), strict=True):
@@ -139,6 +146,7 @@ def draw_convergence(by_noise: dict[str, pd.DataFrame]) -> Figure:
 
 
 def _draw_quantiles(axes: Axes, sample: Floats, colour: str) -> None:
+    # Quantiles of fewer than ten runs are not of interest: only the median would be known.
     counts = np.unique(
         np.geomspace(min(10, sample.size), sample.size, _LOOKS).astype(np.int64)
     ).tolist()
@@ -158,6 +166,7 @@ def _draw_quantiles(axes: Axes, sample: Floats, colour: str) -> None:
             found.index, found["lower"], found["upper"], color=colour, alpha=0.18, linewidth=0.0
         )
 
+    # A tenth of room at both ends, so that a single point is not on the frame; chosen.
     axes.set(xlim=(0.9 * counts[0], 1.1 * counts[-1]), xscale="log")
     plain_ticks(axes.xaxis, TICKS if sample.size < _DECADES_FROM else TICKS[:1])
     # From zero, unless the quantiles would be in the upper half of the axis.
@@ -178,6 +187,7 @@ def draw_dispersion(by_noise: dict[str, pd.DataFrame]) -> Figure:
     # In a plane x, z and their rates; in space three positions above three velocities.
     columns = 4 if start.shape[1] == 4 else 3
     rows = len(by_noise) * (start.shape[1] // columns)
+    # Millimetres: a row of panels, and the legend; chosen.
     figure, panels = subplots(50.0 * rows + 12.0, rows, columns, sharey="row")
 
     over = [(noise, name) for noise in by_noise for name in start]
@@ -211,7 +221,9 @@ def _draw_cloud(axes: Axes, name: str, runs: pd.DataFrame, colour: str) -> None:
     axes.set_ylim(0.0, limit)
     _note_beyond(axes, int((miss_m > limit).sum()))
 
-    # Fewer points are larger and darker.
+    # At most `MAX_POINTS` runs are drawn, every `step`-th one. Fewer points are larger and darker,
+    # by the fourth root of their number and at most 2.2 times (0.4 * 2.2 is still not opaque);
+    # chosen.
     step = -(-miss_m.size // MAX_POINTS)
     size = 1.0
     if step == 1:
@@ -257,6 +269,6 @@ def _draw_bins(axes: Axes, start: Floats, miss_m: Floats) -> None:
 def _look(noise: str) -> dict[str, Any]:
     """Return the line style of a noise.
 
-    Game noise is dark and solid, the others are light and dashed: they differ without colours too.
+    Game noise is light and dashed, the others are dark and solid: they differ without colours too.
     """
     return CURVE_LOOKS[4 if noise == "game" else 1]

@@ -23,7 +23,11 @@ from infoset.sim import Campaign, RunsUntil
 from infoset.sim.requirement import AnyRequirement
 
 MAX_RUNS_A_CELL = 2000
-"""Default limit of the runs of a cell that is undecided."""
+"""Default of --max-runs with --until decided: the runs after which a cell stays undecided.
+
+If a share of hits of 95 % is required, cells with shares from 93.0 to 96.5 % then stay undecided,
+after 400 runs (the default of --runs) those from 90.5 to 97.7 %, after 10 000 from 94.1 to 95.7 %.
+"""
 
 
 def run(options: Options) -> None:

@@ -13,8 +13,8 @@ from infoset.sim.columns import columns_of
 from infoset.sim.storage import CampaignFolder
 
 PASS_BYTES = 160_000_000
-"""Memory of the columns that are read together: two columns of numbers of ten million runs, all of
-a million.
+"""Memory of the columns that are read together, bytes: of ten million runs two columns of numbers,
+of a million runs all columns.
 
 A pass needs up to four times as much, with the Parquet files and the work on one column. Every pass
 opens all files, which takes as long as reading a few of their columns, so the columns of small

@@ -59,15 +59,17 @@ QUANTITY_NAMES = {
     "cause": "probability of no miss by this cause",
 }
 _PANEL_MM = 66.0
-"""Height of a row of panels."""
+"""Height of a row of panels; chosen: a panel of two in a row is then about as high as wide."""
 _LEGEND_MM = 24.0
-"""Height of the legend with its title."""
+"""Height of the legend: up to three rows of entries and the title; chosen."""
 _TICK_LETTERS = 32
 """Maximum number of letters of all tick labels of an axis: more would touch each other."""
 _LABEL_LETTERS = 40
 """Maximum number of letters of a line of an axis label: the width of a panel."""
 _DARK = 0.55
-"""Part of the scale of colours from which numbers are white: black is hard to read there."""
+"""Part of the scale of colours, from 0 (light) to 1 (dark), above which numbers are white: black is
+hard to read there. Chosen by eye.
+"""
 _NO_VALUE = "\N{EN DASH}"
 """Text in the cells whose runs do not show the quantile."""
 
@@ -266,7 +268,8 @@ def _draw_heat(figure: Figure, axes: Axes, values: Floats) -> None:
     """
     low = float(np.nanmin(values))
     high = float(np.nanmax(values))
-    norm = Normalize(low, max(high, low + 1e-9))  # equal values need a scale, too
+    # Equal values need a scale with a length, too; any length gives them one colour.
+    norm = Normalize(low, max(high, low + 1e-9))
     if high > 10.0 * low > 0.0:
         norm = LogNorm(low, high)
     bar = figure.colorbar(_draw_cells(axes, values, cmap="Blues", norm=norm), ax=axes)
@@ -293,6 +296,8 @@ def _write_numbers(axes: Axes, values: Floats, is_dark: Any, **look: Any) -> Non
     """Write the values into the cells of a map, unless there are too many cells."""
     if values.size > MAX_NUMBERS:
         return
+    # Points: as the labels, or in more than seven columns as much as the width of a cell leaves to
+    # four digits; chosen.
     size = min(7.0, 54.0 / values.shape[1])
     place: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": size, "zorder": 4.0}
     for (row, column), value in np.ndenumerate(values):
@@ -310,7 +315,8 @@ def _number(value: float) -> str:
 
 def _name_values(one: MatplotlibAxis, axis: Axis) -> None:
     """Label an axis with its key, and some of its positions 0, 1, 2, ... with their values."""
-    # Very large and very small values have a power of ten in the label.
+    # Values have the power of ten of the largest one in the label if without it the labels of the
+    # ticks would have zeros before (below 0.01) or more than five digits; chosen.
     maximum = max(map(abs, axis.values))
     power = 0
     factor = ""

@@ -9,8 +9,8 @@ from collections.abc import Iterator, Sequence
 LONGEST_SHOWN = 60
 """Maximum length of a value in a message; chosen: a message stays a few lines long."""
 _LONGEST_WORD = 100
-"""Number of letters of a word that are compared: the time grows as their square. No name of a key
-or an option has as many."""
+"""Number of letters of a word that are compared with the known names, none of which is as long: the
+time of the comparison grows as the square of this number."""
 
 
 def on_a_screen(message: str) -> str:

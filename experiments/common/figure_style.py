@@ -1,6 +1,10 @@
 """The style of all figures: the sheet `infoset.mplstyle`, colours and lines.
 
 Colours and lines differ in grey, too.
+
+Functions that draw have sizes as numbers: heights in millimetres, sizes of marks and lines in
+points, margins as shares or multiples of what is drawn. Where no other reason stands at such a
+number, it was chosen by eye, and nothing depends on it.
 """
 
 from __future__ import annotations
@@ -23,11 +27,13 @@ from numpy.typing import NDArray
 
 STYLE: list[Any] = [Path(__file__).with_name("infoset.mplstyle")]
 WIDTH_MM = 170.0
-"""Width of a figure over two columns of a page."""
+"""Width of a figure over two columns of a page, mm: A4 with margins of 20 mm."""
 _MM_PER_INCH = 25.4
 TICKS = (1.0, 2.0, 5.0)
 """Multiples of powers of ten at a logarithmic axis."""
 
+# Colours, named after their main use; the true state dark blue, sets light blue with a blue edge.
+# Others use them too, so a change of one colour is seen in several figures.
 INK = "#1a1a1a"
 TRUTH = "#08306b"
 MEASURED = "#e6842a"
@@ -55,7 +61,10 @@ CURVE_LOOKS: dict[int, dict[str, Any]] = {
     3: {"color": GAME, "linestyle": "-"},
     4: {"color": "#f08a24", "linestyle": (0, (4, 1.5))},
 }
-"""Dark and solid without the range sensor, light and dashed with it; blue random, brown game."""
+"""Lines of the curves of the paper of 1997, by their number (`study.Curve`): dark and solid without
+the range sensor (1, 3), light and dashed with it (2, 4); blue random noise (1, 2), brown and orange
+game noise (3, 4).
+"""
 
 LINE_LOOKS: tuple[dict[str, Any], ...] = (
     {"color": TRUTH, "linestyle": "-", "marker": "o"},

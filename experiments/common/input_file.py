@@ -53,8 +53,11 @@ KeyPath = tuple[str, ...]
 Kind = TypeVar("Kind")
 
 _UNTRAPPED = Context(prec=60, traps=[])
-"""Products beyond the range of decimal numbers are infinite, which is refused as any infinite
-value. With 60 digits, products of a number of 40 digits and a factor of a unit are exact.
+"""Arithmetic of the products of a number and the factor of its unit.
+
+Products beyond the range of decimal numbers are infinite, which is refused as any infinite value. A
+factor has at most 28 digits (`si_factor`), so that with 60 digits the product with a number of 32
+digits is exact; it is rounded once, to a float.
 """
 _MAX_FAULTS = 50
 """Maximum number of faults in a message: two screens."""

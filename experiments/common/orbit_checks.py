@@ -9,9 +9,13 @@ from infoset.arrays import Floats
 from infoset.rendezvous.two_body import OrbitalElements, flight_fault, orbit_fault
 
 MAX_RADIANS = 1000.0
-"""Maximum angle of the orbit during a problem: 160 turns, after which linear motion is far off."""
+"""Maximum angle of the orbit during a problem, rad: 160 turns, after which linear motion is far
+off; chosen.
+"""
 MIN_RADIANS = 1e-9
-"""Minimum angle of the orbit during a problem: a smaller one is a wrong unit."""
+"""Minimum angle of the orbit during a problem, rad: a microsecond in a low orbit of the Earth. A
+smaller one is a wrong unit; chosen.
+"""
 EARTH_M3_S2 = 3.986004418e14
 """Gravitational parameter of the Earth (WGS 84)."""
 EARTH_RADIUS_M = 6378137.0

@@ -13,11 +13,14 @@ from infoset.experiments.common.page_document import page
 from infoset.experiments.common.units import Unit, time_unit
 
 _SPEEDS = (5, 30, 60, 120)
-"""Speeds that the reader can choose, steps a second."""
+"""Speeds that the reader can choose, steps a second; chosen: the pages have 100 to 400 steps, which
+take from a minute or so down to some seconds.
+"""
 _FLAT = np.cos(np.radians(4.0))
-"""Cosine of the angle between normals up to which triangles are one face.
+"""Cosine of the angle between normals, 4 degrees, up to which triangles are one face; chosen.
 
-Rounding turns the normals of tiny triangles by some degrees.
+Rounding turns the normals of tiny triangles by some degrees; with a larger angle, edges of a round
+set would be lost.
 """
 
 
@@ -145,11 +148,13 @@ def faces_of(points: Floats) -> list[Floats]:
     if points.shape[1] == 2 or len(points) < 4:
         return [outline(points)]
     try:
+        # Points in one place have no size; 1e-300 instead keeps the division defined, and Qhull
+        # refuses them.
         hull = ConvexHull(points / max(float(np.ptp(points, axis=0).max()), 1e-300))
     except QhullError:
         return [outline(points)]
 
-    # Triangles of one plane are one face: equal normals, to a few degrees where facets are tiny.
+    # Triangles of one plane are one face: their normals are equal up to `_FLAT`.
     faces: list[tuple[Floats, set[int]]] = []
     for simplex, equation in zip(hull.simplices, hull.equations, strict=True):
         mine = next((corners for normal, corners in faces if normal @ equation[:3] > _FLAT), None)
@@ -165,6 +170,7 @@ def outline(points: Floats) -> Floats:
     """Return the vertices of a flat convex set in order; in a plane, without interior points."""
     if points.shape[1] == 2 and len(points) > 3:
         try:
+            # 1e-300 as in `faces_of`: an axis without extent keeps the division defined.
             return np.asarray(
                 points[ConvexHull(points / np.maximum(np.ptp(points, axis=0), 1e-300)).vertices]
             )

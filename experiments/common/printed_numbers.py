@@ -213,7 +213,8 @@ def interval(digits: str, units: float, beyond: float = 0.0) -> tuple[float, flo
 
     `beyond` is added to the half width.
     """
-    # A few ulp more, so that a number on the boundary is inside.
+    # A billionth more: a number on the boundary is inside although both are rounded in binary (for
+    # digits up to six; with more, the rounding is greater than this billionth).
     half_width = (units * last_digit(digits) + beyond) * (1.0 + 1e-9)
     return float(digits) - half_width, float(digits) + half_width
 

@@ -31,14 +31,20 @@ Clock = Callable[[], float]
 """The time, s, from any origin."""
 Part = str | Text | Table
 """A line or a table of a result on the screen."""
-NUMBER_WIDTH = 8
-"""Width of a column of numbers: 999999.9 and -1.23e10 fit."""
+NUMBER_WIDTH = 11
+"""Minimum width of a column of numbers, letters: 999999999.9, the longest number of `number` that
+is not negative. A longer one would be cut off in a `RowByRow`.
+"""
 LINE_EVERY_S = 30.0
-"""Time between two lines of progress in a log."""
+"""Time between two lines of progress in a log; chosen: an hour has 120 lines."""
 LONG_S = 10.0
-"""Time, s, from which a command is long: its estimate is printed."""
+"""Time, s, from which a command is long: its estimate is printed. Chosen: one waits so long without
+asking.
+"""
 ESTIMATE_AFTER_S = 2.0
-"""Time, s, over which the rate of an estimate is measured."""
+"""Time, s, over which the rate of an estimate is measured; chosen: the rate of a shorter time
+depends on how the first runs end.
+"""
 NOT_FINITE = (
     "the numbers of the scenario are so large or so small that the results are not finite; "
     "check its units with: infoset scenarios check FILE"
@@ -103,8 +109,8 @@ def number_table(*titles: str, left: int = 1) -> Table:
 class RowByRow:
     """A table of numbers whose rows are printed one after another, as they are known.
 
-    The first column is as wide as the longest name, and the others as a large number or as their
-    titles.
+    The first column is as wide as the longest name, and the others as the longest number or as the
+    longest word of their titles, because the later rows are not known yet.
     """
 
     def __init__(self, titles: Sequence[str], names: Iterable[str], quiet: bool) -> None:

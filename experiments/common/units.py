@@ -8,6 +8,7 @@ from __future__ import annotations
 from decimal import Decimal
 
 _DEGREE = Decimal("0.017453292519943295769236907684886127134428718885417")
+"""π/180 to 50 digits; `si_factor` rounds it to 28 digits, the precision of Python's decimals."""
 
 UNITS = {
     "m": ("length", Decimal(1)),
@@ -87,7 +88,7 @@ S_PER_HOUR = SECONDS["h"]
 
 
 def time_unit(span_s: float) -> Unit:
-    """Return the unit for times up to a span."""
+    """Return the unit for times up to a span; the limits are chosen: numbers have few digits."""
     if span_s > 10.0 * SECONDS["d"]:
         return "days", 1.0 / SECONDS["d"]
     if span_s > 4.0 * S_PER_HOUR:
@@ -114,7 +115,11 @@ def length_text(length_m: float) -> str:
 
 
 def length_unit(size_m: float) -> Unit:
-    """Return the unit for lengths up to a size."""
+    """Return the unit for lengths up to a size.
+
+    A larger unit is taken from a few of it on (3 km, 2 Mm, 0.05 au); chosen: numbers have few
+    digits before and after the point.
+    """
     for name, metres, minimum in (
         ("au", float(UNITS["au"][1]), 7.5e9),
         ("Mm", 1e6, 2e6),

@@ -129,7 +129,8 @@ def _remedy(task: Task, results: Results, cause: MissCause, key: str) -> Remedy:
         # The factor 1.005 lets the three digits be rounded up.
         enough = _rounded(1.005 * now * float(needed.max()))
     else:
-        # A stronger engine is a remedy, and smaller errors and a shorter cut-off are.
+        # A greater impulse or budget can be a remedy: these are doubled. Of the errors and of the
+        # time of the last impulse before the arrival smaller values can be: these are halved.
         factor = 2.0 if key in (IMPULSE, BUDGET) else 0.5
         not_enough, enough = _search(lambda value: cause in simulated(value).causes, now, factor)
         if enough is None:

@@ -32,21 +32,27 @@ FEW_STEPS = 20
 Flights with free impulse times have 200 and more in the built-in scenarios.
 """
 MANY_STEPS = 20_000
-"""Number of steps above which a warning reports the step: a run takes more than 0.2 s."""
+"""Number of steps above which a warning reports the step: by `STEP_COST_S` a run takes more than
+0.2 s an axis.
+"""
 MANY_SECTIONS = 100
 """Number of sections above which a warning reports them: built-in scenarios have up to 41."""
 FEW_TIMES = 3
 """Number of times of a key that a line lists; JSON has all of them. Chosen: they fit a line."""
 STEP_COST_S = 1e-5
-"""Typical time of a step of a run along one axis, s."""
+"""Typical time of a step of a run along one axis, s, for the warning about too many steps.
+
+Measured on one core: 1.2e-5 s in dart-2022 and 1.6e-5 s in asteroid-1997, in batches of 100 and
+1000 runs. A single run takes some times as long a step.
+"""
 LARGEST_BODY_M = 20_000.0
 """Radius, m, above which a warning reports it.
 
 The largest near-Earth asteroid, (1036) Ganymed, has a radius of about 18 km.
 """
 SMALL_ANGLE_RAD = 0.01
-"""Largest line-of-sight angle for the model `paper`, which replaces tangents by their angles: they
-differ by 3e-5 there."""
+"""Largest line-of-sight angle, rad, without a warning in the model `paper`, which replaces tangents
+by their angles: here a tangent is greater than its angle by 3e-5 of it."""
 
 
 def load_scenario(

@@ -103,6 +103,7 @@ def draw_path(report: MultipointReport) -> Figure:
 
 def _centre(report: MultipointReport) -> str:
     parameter = getattr(report.problem.tour, "gravitational_parameter_m3_s2", 0.0)
+    # Within 1 %: files round the parameter, and no other body has it so nearly.
     return "Sun" if abs(parameter / _SUN_M3_S2 - 1.0) < 0.01 else "centre of gravity"
 
 

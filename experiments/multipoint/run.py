@@ -102,6 +102,8 @@ def _within_bound(
                 f"{key}: no control of at most {bound:g} m/s^2 makes the visits {where}; at least "
                 f"{least:.6g} m/s^2 is needed; raise it, or give the visits more time"
             ) from None
+        # The search with a bound needs some room above the smallest possible one; a thousandth is
+        # advised.
         raise InputError(
             f"{key}: {bound:g} m/s^2 is too close to the smallest possible bound {where}, "
             f"{least:.6g} m/s^2; raise it to {1.001 * least:.6g} m/s^2, or give the visits more "

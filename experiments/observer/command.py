@@ -12,6 +12,9 @@ import typer
 from infoset.experiments.common.options import FileOptions, Html, ProblemName, Seed, Settings
 
 MAX_STEPS = 10_000
+"""Maximum number of steps of a run, measured or simulated; chosen: the sets of two states then take
+some ten seconds, and their JSON file 10 MB.
+"""
 
 
 class Errors(Enum):

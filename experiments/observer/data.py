@@ -28,9 +28,13 @@ SEPARATORS = (",", ";", "\t")
 _SHOWN_STEPS = 10
 """Maximum number of steps in a text: a line of the screen."""
 _WRONG_STREAM = 1
-"""Number of the stream of random numbers of the wrong measurements; the others have none."""
+"""Second part of the seed of the wrong measurements: another number, another stream. The motion and
+the other errors have the seed of the command alone.
+"""
 MAX_STATE = 1e40
-"""Largest state of which sets are computed: products of seven such numbers are finite."""
+"""Largest modulus of a component of a state of which sets are computed; chosen: even products of
+seven such numbers are finite.
+"""
 
 
 @dataclass(frozen=True, eq=False)

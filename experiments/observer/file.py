@@ -157,7 +157,7 @@ class ObserverProblem:
     ----------
     name, description : str
         Name of the results, and a line about the problem.
-    system : SystemTable
+    system : ObserverTable
         The system.
     initial : SetTable
         Set of the state before the first measurement.

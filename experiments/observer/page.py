@@ -19,8 +19,10 @@ from infoset.observer.estimate import MAX_POLYTOPE_STATES, Estimate
 
 
 def _centre(estimate: Estimate) -> Floats | None:
-    """Return the centre of a largest ball in a set; None if it is empty or has no known facets, or
-    if the possible states are in several sets.
+    """Return the centre of a largest ball in a set.
+
+    None if the set is empty or of too many states for known facets, or if the possible states are
+    in several sets.
     """
     if estimate.is_empty or estimate.states > MAX_POLYTOPE_STATES or estimate.members > 1:
         return None

@@ -243,7 +243,10 @@ def _draw_excesses(
 
 
 def _widest_pair(excess: Floats) -> tuple[int, int]:
-    """Return the two craft whose excesses are least correlated: they show the front best."""
+    """Return the two craft of three whose excesses are least correlated.
+
+    Over a strongly correlated pair the front would look like a line.
+    """
     pairs = list(combinations(range(excess.shape[1]), 2))
     correlation = np.abs(np.corrcoef(excess.T))
     return min(pairs, key=lambda pair: float(correlation[pair]))

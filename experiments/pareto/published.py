@@ -66,10 +66,11 @@ def results(solution: EncounterSolution, paper: Paper) -> dict[str, Sequence[flo
 
 
 def _fitted(solution: EncounterSolution, numbers: Sequence[PrintedNumber]) -> list[float]:
-    """Return coefficients fitted over two orbits.
+    """Return coefficients of the paper's controls and laws of motion, fitted to ours at 200 times.
 
-    In the 30 s of the flight the terms are nearly dependent. The name of a number is ``CRAFT,
-    QUANTITY, TERM``.
+    The times are from 0 to two orbits, beyond the flight: in its 30 s the terms are nearly
+    dependent, and their coefficients have no digits. The name of a number is ``CRAFT, QUANTITY,
+    TERM``.
     """
     motion = solution.encounter.craft[0].motion
     assert isinstance(motion, ClohessyWiltshire)

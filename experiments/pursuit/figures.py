@@ -46,9 +46,11 @@ _STAR: dict[str, Any] = {"marker": "*", "markersize": 9.0, "color": IMPULSE, "li
 _ARROWS = 14
 """Number of arrows of thrust on a path; chosen: arrows do not overlap."""
 _ARROW_LENGTH = 0.17
-"""Length of an arrow, as a share of the orbit's radius."""
+"""Length of an arrow, as a share of the orbit's radius; chosen: long enough to show directions."""
 _MIN_HEIGHT = 0.15
-"""Smallest half height of the box of the orbits, as a share of their size."""
+"""Smallest half height of the box of the orbits, as a share of their size; chosen: the small
+inclination of an orbit is not stretched to the height of the panel.
+"""
 
 
 def draw_all(report: PursuitReport) -> Iterator[Figure | None]:
@@ -93,6 +95,7 @@ def draw_orbits(sampled: CaptureHistory) -> Figure:
     label_axes(space, titles)
     label_axes(flat, titles[:2])
     space.set_zlim(middle - half, middle + half)
+    # The heights are not to scale. The direction of view, in degrees, is chosen.
     space.set_box_aspect((1.0, 1.0, 0.6), zoom=0.85)
     space.view_init(elev=28.0, azim=-62.0)
     letters([flat, space], ["seen along the planet's axis", "paths and thrust (arrows)"])
@@ -158,7 +161,7 @@ def draw_distance(solution: CaptureSolution) -> Figure:
 
     Parameters
     ----------
-    solution : Solution
+    solution : CaptureSolution
         The solution of a game, with or without a capture.
     """
     curve = solution.curve
@@ -194,6 +197,7 @@ def draw_feedback(solution: CaptureSolution, flights: Sequence[PursuitFlight]) -
         {"linewidth": 0.6, "alpha": 0.5} if len(flights) > 1 else {"marker": "o", "markersize": 2.0}
     )
     unit, per_s = time_unit(float(np.ptp(flights[0].planned_s)))
+    # More than a hundred lines would cover each other.
     for flight in flights[:100]:
         left.plot(flight.planned_s * per_s, flight.predicted_s * per_s, color=TRUTH, **look)
     if solution.capture is not None:

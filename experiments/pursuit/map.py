@@ -165,6 +165,7 @@ def read_axis(option: str, text: str) -> MapAxis:
         count = int(count_text)
     except ValueError:
         low, high, count = 0.0, 0.0, 0
+    # The limit excludes infinity and NaN; chosen: beyond all values for orbits around the Earth.
     if not (-1e15 <= low < high <= 1e15 and 2 <= count <= MAX_POINTS):
         raise InputError(
             f"{option}: must be KEY=FROM:TO:N with FROM less than TO and at least 2 values, found "

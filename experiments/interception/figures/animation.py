@@ -27,7 +27,7 @@ COLOURS = 16
 """Number of colours of an image: the panels have few, and more would make the file larger."""
 
 _SECTIONS = 7
-"""Maximum number of sections of a set."""
+"""Maximum number of sections of a set; chosen: more would hide each other."""
 
 
 @style()
@@ -39,7 +39,7 @@ def animate(
     """Return a GIF animation of engagements, side by side, of eight seconds and 16 colours.
 
     Frames are evenly distributed over the steps, and take about 0.2 s of computing each. A frame is
-    425 pixels wide, or 640 for two planes.
+    425 pixels wide, or 320 for each of several planes: the file stays small enough for a web page.
     """
     clock = Clock.of(records)
     chosen = _frame_times(records, clock, max_frames)
@@ -79,13 +79,14 @@ def animate(
         for line, (record, _) in zip(lines, traces, strict=True):
             line.set_xdata(clock.at(record, [time, time]))
         canvas.draw()
-        figure.set_layout_engine("none")  # after the first frame, so that nothing moves
+        # After the first frame: the panels keep the places of this frame, and do not jump.
+        figure.set_layout_engine("none")
         image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
         frames.append(image.quantize(COLOURS, dither=Image.Dither.NONE))
         progress((index + 1) / len(chosen))
 
     content = BytesIO()
-    frame_ms = round(1000 * DURATION_S / len(frames))
+    frame_ms = round(1000 * DURATION_S / len(frames))  # the unit of GIF
     frames[0].save(
         content,
         "gif",

@@ -57,8 +57,8 @@ _END: dict[str, Any] = {
     "linestyle": "none",
 }
 _MIN_SHOWN = 1e-3
-"""Minimum miss of a logarithmic axis, as a multiple of the minimum possible miss; chosen: smaller
-misses are the rounding of a curve that passes zero."""
+"""Start of the logarithmic axis of misses, as a multiple of the smallest half diagonal of a box of
+predicted misses; chosen: smaller misses of the true state belong to a curve that passes zero."""
 
 
 @style()
@@ -70,6 +70,7 @@ def draw_approach(records: Sequence[Record]) -> Figure:
     sections. After an impulse that centres the box it is half the diagonal of the box. Both end
     when the first section leaves at the range threshold.
     """
+    # Millimetres: the legend, and each record; chosen.
     figure = new_figure(25.0 + 75.0 * len(records))
     rows = figure.subfigures(len(records), 1, squeeze=False)[:, 0]
     for row, record, title in zip(rows, records, record_titles(records), strict=True):
@@ -102,13 +103,15 @@ def _draw_possible(axes: Axes, record: Record) -> None:
     centred = modulus(0.5 * (misses[..., 1] - misses[..., 0]).T)
     true = modulus(true_predicted_misses(record).T)
 
-    # The axis shows all of them, and small values down to a share of the possible ones.
+    # The axis shows all curves and levels; of the smallest values, which may be 0, only those down
+    # to `_MIN_SHOWN` and to a micrometre. Its margins are factors of 2.
     levels = [
         level for level in (max_guarantee_m(record.result), record.scenario.radius_m) if level
     ]
     top = max([*maximum, *true, *levels])
     bottom = max(min([*centred, *true, *levels]), _MIN_SHOWN * min([*centred, top]), 1e-6)
     axes.set(yscale="log", ylim=(0.5 * bottom, 2.0 * top), ylabel="miss, m")
+    # From 1e-9 m, below every axis: a logarithmic one has no zero.
     axes.fill_between(
         times[known], np.full(len(known), 1e-9), maximum, color=SET_FILL, linewidth=0.0
     )

@@ -190,7 +190,7 @@ def _half_width(clouds: Sequence[Cloud], radius_m: float | None) -> float:
     for size in (radius_m, *(each.guaranteed_m for each in clouds)):
         if size is not None and size <= RADIUS_SHOWN * maximum:
             half = max(half, size)
-    return 1.08 * half
+    return 1.08 * half  # a margin, so that the farthest point is not on the frame; chosen
 
 
 def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) -> list[str]:
@@ -225,7 +225,7 @@ def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) ->
 def _draw_points(axes: Axes, each: Cloud) -> list[str]:
     """Draw the misses with circles and ellipses, and return the quantiles that the sample shows.
 
-    Each quantile is one text. Many points are smaller and paler.
+    Each quantile is one text. The more points, the smaller and paler they are (`_MARKER_PT`).
     """
     count = len(each.miss_m)
     point: dict[str, Any] = {

@@ -42,7 +42,9 @@ _WIDE = 8.0
 On a linear axis the bound would be in the first tenth.
 """
 _SECONDS_SHOWN = 3.0
-"""Length of the time axis, in durations between the last equal measurement and the arrival."""
+"""Length of the time axis of (b), in units of the time from the last equal measurement to the
+arrival; chosen: this time then has a third of the axis.
+"""
 
 
 @style()
@@ -57,6 +59,7 @@ def draw_bound(
     the direction of their difference at x = 0. A bound by a single motion has its offset from the x
     axis.
     """
+    # Each panel with its labels, mm; a strategy is a line of 6 mm. Chosen.
     heights_mm = [75.0, 85.0]
     if worst_m:
         heights_mm.append(20.0 + 6.0 * len(worst_m))
@@ -92,7 +95,7 @@ def _draw_labels(axes: Axes, lower: LowerBound) -> None:
     star: dict[str, Any] = {"marker": "*", "markersize": 9.0, "linestyle": "none"}
     axes.plot(label_km, pair.bound_m, color=INK, zorder=5, **star)
     place: dict[str, Any] = {"xytext": (7.0, 3.0), "ha": "left"}
-    if 2e-3 * pair.label_m > sum(axes.get_xlim()):  # in the right half
+    if 2.0 * label_km > sum(axes.get_xlim()):  # in the right half
         place = {"xytext": (-7.0, 3.0), "ha": "right"}
     axes.annotate(
         f"{pair.bound_m:.1f} m",
@@ -174,7 +177,8 @@ def _draw_strategies(axes: Axes, bound_m: float, worst_m: Mapping[str, float]) -
     for place, miss_m in zip(places, misses, strict=True):
         axes.annotate(f"{number(miss_m)} m", (miss_m, place), fontsize="small", **beside)
 
-    # Room for the numbers on the right.
+    # Room for the numbers on the right: three tenths of the longest bar, or four tenths of the
+    # decades between the bound and the maximum; chosen.
     if bound_m > 0.0 and maximum > _WIDE * bound_m:
         axes.set(xscale="log", xlim=(0.6 * bound_m, maximum * (maximum / bound_m) ** 0.4))
         axes.xaxis.set_major_formatter("{x:g}")
@@ -193,7 +197,7 @@ def _draw_equal_measurements(
     Return the largest limit, m.
     """
     model = scenario.set_model
-    fine = np.linspace(0.0, shown, 200)
+    fine = np.linspace(0.0, shown, 200)  # for smooth curves
     ranges = -pair.vx_m_s * fine
     bounds = np.array([model.angle_sensor.axis(name).error_bound(ranges) for name in model.axes])
     corridor = np.abs(_direction(pair)) @ bounds * ranges

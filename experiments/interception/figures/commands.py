@@ -92,6 +92,7 @@ def _default_times(records: Sequence[Record]) -> tuple[float, ...]:
         return DEFAULT_TIMES
     arrival_s = records[0].scenario.nominal_arrival_s
     step_s = records[0].scenario.set_model.step_s
+    # Three times, as in the figure of the paper: those between the start and the last step.
     return tuple((arrival_s - np.geomspace(arrival_s, step_s, 5)[1:4]).tolist())
 
 

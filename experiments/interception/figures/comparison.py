@@ -47,6 +47,8 @@ def draw_comparison(compared: Sequence[Comparison], radius_m: float | None = Non
     """
     names = list(dict.fromkeys(each.strategy for each in compared))
     noises = {each.noise: each.noise_title for each in compared}
+    # Millimetres: 8 a strategy, 12 for the title and the labels of a row, 21 for the legend;
+    # chosen.
     height = len(noises) * (12.0 + 8.0 * len(names)) + 21.0
     figure, grid = subplots(height, len(noises), 2, sharex="col", sharey=True)
     misses = [each.worst("miss_m") for each in compared]
@@ -79,11 +81,14 @@ def draw_comparison(compared: Sequence[Comparison], radius_m: float | None = Non
 def _logarithmic(samples: Sequence[Floats]) -> Floats:
     """Return the edges of the bins of misses.
 
-    A few small values may be below the first edge.
+    The first edge is the smallest 2 % quantile of a sample, or a tenth of the last edge if that is
+    smaller: misses can be arbitrarily small, and the axis spans at least a decade. Both, and the
+    margin of a quarter beyond the maximum, are chosen. Values below the first edge are counted in
+    the first bin.
     """
     positive = [sample[sample > 0.0] for sample in samples if (sample > 0.0).any()]
     if not positive:
-        return np.geomspace(0.1, 1.0, _BINS + 1)
+        return np.geomspace(0.1, 1.0, _BINS + 1)  # all misses are 0: any decade
     right = 1.25 * max(float(sample.max()) for sample in positive)
     left = min(float(np.quantile(sample, 0.02)) for sample in positive)
     return np.geomspace(min(left, 0.1 * right), right, _BINS + 1)

@@ -33,7 +33,9 @@ from infoset.experiments.interception.study import Curve, max_guarantee_m
 from infoset.sim.statistics import shows
 
 _DECADES = 4.0
-"""Maximum extent of the axis of impulses, decades."""
+"""Maximum extent of the axis of impulses, decades; chosen: with more, the large impulses, which
+decide about the budget, would look alike.
+"""
 _IMPULSES: tuple[tuple[float, str, dict[str, Any]], ...] = (
     (0.9, "impulse: 90 %", {"color": "#d9a39e", "linewidth": 0.9}),
     (0.5, "impulse: median", {"color": IMPULSE, "linewidth": 1.3}),
@@ -56,6 +58,7 @@ def draw_corridor(curves: Sequence[Curve], courses: Sequence[Courses]) -> Figure
     """
     rows = -(-len(curves) // 2)
     columns = min(2, len(curves))
+    # Millimetres: the legend, and a row of two panels; chosen.
     figure, grid = subplots(
         20.0 + 75.0 * rows, 2 * rows, columns, sharex=True, height_ratios=[2.4, 1.0] * rows
     )
@@ -106,6 +109,8 @@ def _draw_possible(axes: Axes, course: Courses) -> None:
 def _draw_impulses(axes: Axes, course: Courses) -> None:
     maximum = float(course.impulse_m_s.max()) or 1.0
     minimum = float(course.impulse_m_s[course.impulse_m_s > 0.0].min(initial=maximum))
+    # A factor of 2 below the smallest impulse shown, and above the largest one: a short bar is
+    # seen.
     bottom = 0.5 * max(minimum, 10.0**-_DECADES * maximum)
     runs = len(course.impulse_m_s)
     drawn = [each for each in _IMPULSES if shows(runs, each[0])]
@@ -114,6 +119,7 @@ def _draw_impulses(axes: Axes, course: Courses) -> None:
     for level, name, look in drawn:
         sizes = np.quantile(course.impulse_m_s, level, axis=0)
         given = sizes > bottom
+        # From 1e-12 m/s, below every axis: a logarithmic one has no zero.
         axes.vlines(course.before_arrival_s[given], 1e-12, sizes[given], label=name, **look)
     axes.set(yscale="log", ylim=(bottom, 2.0 * maximum))
     plain_ticks(axes.yaxis)

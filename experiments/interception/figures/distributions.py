@@ -39,7 +39,8 @@ _RUN: dict[str, Any] = {
 }
 _BAND = "95 % confidence band (Dvoretzky-Kiefer-Wolfowitz)"
 _LOGARITHMIC_FROM = 50.0
-"""Ratio of the end of the axis of the miss to the smallest median above which it is logarithmic.
+"""Ratio of the end of the axis of the miss to the smallest median above which it is logarithmic; on
+a linear axis this median would be in the first 2 % of it.
 
 The radius of the body counts as a median.
 """
@@ -166,9 +167,11 @@ def scale_misses(axes: Axes, samples: Sequence[Floats], radius_m: float | None) 
 def axis_limit(samples: Sequence[Floats]) -> float:
     """Return the end of an axis: beyond all values, or of all but a few very large ones.
 
-    It is the maximum value, if this is at most twice the farthest upper fence of the samples: the
-    upper quartile and three times the distance between the quartiles. Otherwise it is the maximum
-    value within 1.5 times this fence.
+    The upper fence of a sample is its upper quartile plus three times the distance between its
+    quartiles, beyond which values are far out (Tukey). If the maximum of all values is at most
+    twice the farthest fence, the axis ends there; otherwise at the greatest value within 1.5 times
+    this fence. The factors are chosen: the axis is not cut off for a few values that would only
+    double it.
     """
     quartiles = [np.quantile(sample, (0.25, 0.75)) for sample in samples]
     fence = max(float(upper + 3.0 * (upper - lower)) for lower, upper in quartiles)

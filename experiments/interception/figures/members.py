@@ -31,8 +31,8 @@ from infoset.experiments.interception.member_course import MemberCourse, member_
 from infoset.sim import Record
 
 LINEAR_M = 10.0
-"""The axis is linear to this difference of misses, m, and logarithmic beyond, as for predicted
-misses."""
+"""The axis is linear to this difference of misses, m, and logarithmic beyond, as the axis of
+`level_predicted_miss`, which has the same number; chosen."""
 
 
 @style()

@@ -73,6 +73,7 @@ def draw_process(records: Sequence[Record]) -> Figure:
     grids = []
 
     for part, record, title in zip(parts, records, record_titles(records), strict=True):
+        # So many letters fit above a column of half the width of a page.
         part.suptitle(plain(f"{title}\n{textwrap.fill(outcome_title(record), 44)}"))
         traces = traces_of([record])
         grid = part.subplots(4, len(traces), squeeze=False, sharex=True, sharey="row")
@@ -183,7 +184,7 @@ def _draw_angle_error(axes: Axes, trace: Trace, clock: Clock) -> None:
     axes.axhline(0.0, **_ZERO)
     band: dict[str, Any] = {"facecolor": MEASURED, "alpha": 0.18, "linewidth": 0.0}
     axes.fill_between(times, -bounds, bounds, label="bound of the angle error", **band)
-    # `_measured` and `_true` are in mrad.
+    # `_measured` and `_true` are in mrad, and the axis is in µrad.
     errors = 1e3 * (values - _true(trace, "angle")[steps])
     _dots(axes, times, errors, "error of the measured angle")
 
@@ -259,7 +260,10 @@ def draw_predicted_miss(axes: Axes, trace: Trace, clock: Clock) -> None:
 
 
 def level_predicted_miss(row: Sequence[Axes]) -> None:
-    """Give axes of predicted misses the same limits: linear to ten metres, logarithmic beyond."""
+    """Give axes of predicted misses the same limits: linear to ten metres, logarithmic beyond.
+
+    The ten metres, the same as `members.LINEAR_M`, are chosen.
+    """
     maximum = max(10.0, *(float(np.abs(axes.dataLim.intervaly).max()) for axes in row))
     for axes in row:
         axes.set_yscale("symlog", linthresh=10.0)
@@ -276,7 +280,7 @@ def _level(row: Sequence[Axes], traces: Sequence[Trace], sensor: str) -> None:
         values += [_true(trace, sensor)[shown], measured[shown[steps]]]
 
     far = np.concatenate(values)
-    # Values without extent have a margin, too.
+    # Values without extent have a margin, too: a tenth of them, or 1 if they are 0.
     margin = 0.12 * float(np.ptp(far)) or 0.1 * float(np.abs(far).max()) or 1.0
     low = float(far.min()) - margin
     high = float(far.max()) + margin

@@ -205,7 +205,10 @@ def choose_sections(sections: Sequence[Section], most: int) -> list[Section]:
 
 
 def draw_plane(axes: Axes, plane: Plane) -> None:
-    """Draw sections and the true state, and name the axes; `level_planes` draws the measurement."""
+    """Draw sections and the true state, and name the axes; `level_planes` draws the measurement.
+
+    The sections have the dark 55 % of the colours; lighter ones could not be seen.
+    """
     colours = mpl.colormaps["Blues_r"](np.linspace(0.0, 0.55, len(plane.chosen)))
     for number, (outline, colour) in enumerate(zip(plane.outlines, colours, strict=True)):
         _draw_outline(axes, outline, colour, zorder=3.0 - 0.01 * number)
@@ -262,8 +265,8 @@ def level_planes(row: Sequence[Axes], planes: Sequence[Plane]) -> None:
             boxes[:] = low, high
 
         for (axes, plane), (low, high) in zip(same, boxes, strict=True):
-            margin = 0.07 * (high - low)
-            # A set without extent has a margin, too.
+            margin = 0.07 * (high - low)  # chosen
+            # A set without extent has a margin, too: a part of its numbers, or any if they are 0.
             margin = np.where(margin > 0.0, margin, np.maximum(0.05 * np.abs(high), 1e-6))
             axes.set(
                 xlim=(low[0] - margin[0], high[0] + margin[0]),

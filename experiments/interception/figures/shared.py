@@ -26,7 +26,7 @@ _TICKS_S = (0.01, *SECONDS.values())
 _MORE_TICKS_S = (0.1, 10.0, 10.0 * SECONDS["min"], 6.0 * SECONDS["h"], 10.0 * SECONDS["d"])
 """Ticks that have a label only in a short flight: in a long one the labels would overlap."""
 _LONG = 1000.0
-"""Ratio of the first and the last time from which a flight is long."""
+"""Ratio of the first and the last time of the axis from which a flight is long; chosen."""
 _BEFORE_START = 1.1
 """Start of the axis, by the first time: a margin, so that the first points are not on its edge.
 
@@ -98,7 +98,7 @@ def draw_body(
 
 
 def ring(radius: float) -> Any:
-    """Return points of a circle around the origin, shape (2, 181)."""
+    """Return points of a circle around the origin, shape (2, 181): one in 2 degrees, and closed."""
     turn = np.linspace(0.0, 2.0 * np.pi, 181)
     return radius * np.array([np.cos(turn), np.sin(turn)])
 
@@ -137,9 +137,10 @@ def count_down(column: Sequence[Axes], scenario: Scenario) -> None:
 
 
 def name_events(axes: Axes, scenario: Scenario) -> None:
-    """Write the names of the times of the schedule along their lines.
+    """Write the names of the times of the schedule along their lines, below the upper frame.
 
-    They are in turn to the left and to the right of the lines.
+    The names are in turn to the left and to the right of their lines, so that those of two near
+    lines do not overlap.
     """
     look: dict[str, Any] = {
         "xycoords": axes.get_xaxis_transform(),
