@@ -71,6 +71,42 @@ FilesIn = Annotated[
 Out = Annotated[
     Path, typer.Option("--out", metavar="FILE", help="The scenario file to write; - is stdout.")
 ]
+ActiveCraft = Annotated[
+    Path, typer.Argument(metavar="CHASER", help="OEM file of the active craft.")
+]
+PassiveCraft = Annotated[
+    Path, typer.Argument(metavar="TARGET", help="OEM file of the passive craft.")
+]
+EpochText = Annotated[
+    str,
+    typer.Option(
+        "--epoch",
+        metavar="EPOCH",
+        help="t = 0, for example 2026-03-01T12:00:00; without UTC, TAI, TT, TDB or GPS after it, "
+        "in the time scale of the files.",
+    ),
+]
+LikeProblem = Annotated[
+    str,
+    typer.Option(
+        "--like",
+        metavar="NAME",
+        help="The problem of infoset reach, built in or a file, whose other values it takes.",
+    ),
+]
+CentralParameter = Annotated[
+    float | None,
+    typer.Option(
+        "--gravitational-parameter",
+        metavar="M3_S2",
+        min=1e-6,
+        max=1e21,
+        help="Of the centre, m^3/s^2; known for the Earth, the Moon, Mars and the Sun.",
+    ),
+]
+ProblemOut = Annotated[
+    Path, typer.Option("--out", metavar="FILE", help="The problem file to write; - is stdout.")
+]
 NewFile = Annotated[Path, typer.Argument(metavar="FILE", help="The file to write; - is stdout.")]
 
 
@@ -269,8 +305,51 @@ scenarios.command(
 )(command_of(FromStates, _from_states))
 
 
+@dataclass(frozen=True)
+class FromOrbits:
+    """Make a rendezvous from two OEM files: its start, the orbit of the passive craft, and the
+    motion about it.
+    """
+
+    chaser: ActiveCraft
+    target: PassiveCraft
+    epoch: EpochText
+    out: ProblemOut
+    like: LikeProblem = "elliptic-guaranteed"
+    settings: Settings = None
+    gravitational_parameter: CentralParameter = None
+    overwrite: Overwrite = False
+    quiet: Quiet = False
+
+
+def _from_orbits(options: FromOrbits) -> None:
+    from infoset.experiments.common.screen import say_warnings
+    from infoset.experiments.reachability.from_states import problem_of
+
+    found = problem_of(
+        options.chaser,
+        options.target,
+        options.epoch,
+        options.like,
+        options.settings,
+        options.gravitational_parameter,
+    )
+    text = _named(found.text, options.out.stem, options.like)
+    note = f"with the values of {options.like}; change them, then: infoset reach {options.out}"
+    _write(options.out, text, note, options.overwrite, options.quiet)
+    say_warnings(found.warnings, options.quiet, found.notes)
+
+
 problems = _commands(
     "problem",
     "A problem is one of rendezvous, pursuit or estimation, or a trajectory.",
     "service-2",
 )
+problems.command(
+    "from-states",
+    help=FromOrbits.__doc__,
+    epilog=(
+        "Example: infoset problems from-states chaser.oem station.oem --epoch 2026-03-01T12:00:00 "
+        "--out mine.toml"
+    ),
+)(command_of(FromOrbits, _from_orbits))

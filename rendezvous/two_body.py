@@ -109,6 +109,34 @@ def semi_major_axis_m(
     return float(1.0 / inverse) if inverse != 0.0 else float("inf")
 
 
+class ConicShape(NamedTuple):
+    """Eccentricity and true anomaly of an osculating orbit.
+
+    The anomaly is from -pi to pi; a circle has any.
+    """
+
+    eccentricity: float
+    true_anomaly_rad: float
+
+
+def conic_shape(
+    position_m: Floats, velocity_m_s: Floats, gravitational_parameter_m3_s2: float
+) -> ConicShape:
+    """Return the osculating eccentricity and true anomaly of a state.
+
+    With the semi-latus rectum p and the radial speed v: e cos f = p / r - 1, and e sin f =
+    v (p / mu)^(1/2).
+    """
+    radius = np.linalg.norm(position_m)
+    momentum = np.cross(position_m, velocity_m_s)
+    latus_rectum = momentum @ momentum / gravitational_parameter_m3_s2
+    radial_speed = position_m @ velocity_m_s / radius
+
+    e_cosine = latus_rectum / radius - 1.0
+    e_sine = radial_speed * np.sqrt(latus_rectum / gravitational_parameter_m3_s2)
+    return ConicShape(float(np.hypot(e_cosine, e_sine)), float(np.arctan2(e_sine, e_cosine)))
+
+
 def perigee_m(
     position_m: Floats, velocity_m_s: Floats, gravitational_parameter_m3_s2: float
 ) -> float:

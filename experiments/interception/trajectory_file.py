@@ -11,14 +11,15 @@ from typing import Annotated, ClassVar, NamedTuple
 import numpy as np
 
 from infoset.arrays import Floats
+from infoset.experiments.common.ephemeris import craft_state
+from infoset.experiments.common.ephemeris.craft_state import CraftState
+from infoset.experiments.common.ephemeris.epochs import Epoch, converted, parse_epoch
+from infoset.experiments.common.ephemeris.frames import centre_name, frame_of_spice
+from infoset.experiments.common.ephemeris.oem import MAX_OEM_BYTES, OemSegment, read_oem
 from infoset.experiments.common.errors import InputError, input_errors, on_a_screen
 from infoset.experiments.common.input_file import read_file, read_input, to_toml
-from infoset.experiments.interception.trajectory import craft_state, kernels
-from infoset.experiments.interception.trajectory.craft_state import CraftState
-from infoset.experiments.interception.trajectory.epochs import Epoch, converted, parse_epoch
+from infoset.experiments.interception.trajectory import kernels
 from infoset.experiments.interception.trajectory.files import named_file
-from infoset.experiments.interception.trajectory.frames import centre_name, frame_of_spice
-from infoset.experiments.interception.trajectory.oem import MAX_OEM_BYTES, OemSegment, read_oem
 from infoset.limits import NUMBER, Description, Line, Name, Positive, check_fields
 from infoset.model import StateBox
 from infoset.sim.approach import Approach, find_approach

@@ -7,6 +7,7 @@ reference orbit.
 
 from infoset.rendezvous.relative_motion.clohessy_wiltshire import ClohessyWiltshire
 from infoset.rendezvous.relative_motion.elliptic_orbit import EllipticOrbit
+from infoset.rendezvous.relative_motion.hill_state import hill_state
 from infoset.rendezvous.relative_motion.linear_motion import HeldMotion, LinearMotion, Segment
 from infoset.rendezvous.relative_motion.time_varying import TimeVaryingMotion
 from infoset.rendezvous.relative_motion.tschauner_hempel import TschaunerHempel
@@ -19,4 +20,5 @@ __all__ = [
     "Segment",
     "TimeVaryingMotion",
     "TschaunerHempel",
+    "hill_state",
 ]

@@ -1,1 +1,1 @@
-"""States of spacecraft and objects from orbit ephemeris messages and SPICE kernels."""
+"""Files that a trajectory file names, and SPICE kernels."""

@@ -14,6 +14,7 @@ from infoset.rendezvous.relative_motion import (
     EllipticOrbit,
     LinearMotion,
     TschaunerHempel,
+    hill_state,
 )
 from infoset.rendezvous.two_body import OrbitalElements
 
@@ -86,6 +87,18 @@ def test_craft_behind_on_the_same_circular_orbit_has_negative_y() -> None:
     # The axes in which a pursuit is drawn are the same.
     drawn = orbital_axes(chief[None, :3], chief[None, 3:])[0] @ (craft - chief)[:3]
     np.testing.assert_allclose(drawn, start[:3], atol=1e-8)
+
+
+def test_state_in_hill_axes_has_the_rates_of_its_own_position() -> None:
+    chief = reference(9000e3, 0.4, 1.0)
+    craft = from_hill(np.array([120.0, -900.0, 70.0, 0.3, -0.2, 0.1]), chief)
+    # Central differences of the position, whose third derivative is some 1e-9 m/s^3.
+    later, earlier = (to_hill(flown(craft, t), flown(chief, t))[:3] for t in (1.0, -1.0))
+
+    found = hill_state(craft.reshape(2, 3), chief.reshape(2, 3))
+
+    np.testing.assert_allclose(found[:3], [120.0, -900.0, 70.0], atol=1e-7)
+    np.testing.assert_allclose(found[3:], 0.5 * (later - earlier), atol=1e-6)
 
 
 @pytest.mark.parametrize(("eccentricity", "anomaly"), [(0.0, 0.3), (0.1, 2.5), (0.6, -1.0)])

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from infoset.experiments.interception.trajectory.epochs import (
+from infoset.experiments.common.ephemeris.epochs import (
     converted,
     is_guess,
     known_scale,

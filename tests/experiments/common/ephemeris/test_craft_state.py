@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from infoset.arrays import Floats
-from infoset.experiments.common.errors import InputError
-from infoset.experiments.interception.trajectory.craft_state import (
+from infoset.experiments.common.ephemeris.craft_state import (
     CraftState,
     axes_note,
     epoch_scale,
@@ -20,9 +19,10 @@ from infoset.experiments.interception.trajectory.craft_state import (
     oem_craft,
     time_notes,
 )
-from infoset.experiments.interception.trajectory.epochs import Epoch, parse_epoch
-from infoset.experiments.interception.trajectory.frames import Frame
-from infoset.experiments.interception.trajectory.oem import OemSegment, read_oem
+from infoset.experiments.common.ephemeris.epochs import Epoch, parse_epoch
+from infoset.experiments.common.ephemeris.frames import Frame
+from infoset.experiments.common.ephemeris.oem import OemSegment, read_oem
+from infoset.experiments.common.errors import InputError
 from tests.oem_text import HEADER, covariance_block, segment
 
 SUN_M3_S2 = 1.32712440018e20

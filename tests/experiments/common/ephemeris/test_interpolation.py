@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from infoset.arrays import Floats
-from infoset.experiments.interception.trajectory import interpolation
-from infoset.experiments.interception.trajectory.interpolation import (
+from infoset.experiments.common.ephemeris import interpolation
+from infoset.experiments.common.ephemeris.interpolation import (
     Interpolated,
     hermite,
     interpolate,

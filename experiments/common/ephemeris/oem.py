@@ -15,13 +15,13 @@ from typing import NamedTuple
 import numpy as np
 
 from infoset.arrays import Floats
-from infoset.experiments.common.errors import InputError, shown
-from infoset.experiments.interception.trajectory.epochs import known_scale, parse_epoch, seconds_in
-from infoset.experiments.interception.trajectory.interpolation import (
+from infoset.experiments.common.ephemeris.epochs import known_scale, parse_epoch, seconds_in
+from infoset.experiments.common.ephemeris.interpolation import (
     DEFAULT_DEGREE,
     MAX_DEGREE,
     METHODS,
 )
+from infoset.experiments.common.errors import InputError, shown
 from infoset.limits import MAXIMUM
 
 MAX_OEM_BYTES = 20_000_000

@@ -9,22 +9,22 @@ from fractions import Fraction
 import numpy as np
 
 from infoset.arrays import Floats
-from infoset.experiments.common.errors import InputError
-from infoset.experiments.interception.trajectory.epochs import (
+from infoset.experiments.common.ephemeris.epochs import (
     Epoch,
     converted,
     is_guess,
     tdb_drift_s,
 )
-from infoset.experiments.interception.trajectory.frames import (
+from infoset.experiments.common.ephemeris.frames import (
     SOLAR_SYSTEM,
     Frame,
     centre_name,
     inertial_frame,
     is_same_frame,
 )
-from infoset.experiments.interception.trajectory.interpolation import Interpolated, interpolate
-from infoset.experiments.interception.trajectory.oem import OemCovariance, OemSegment
+from infoset.experiments.common.ephemeris.interpolation import Interpolated, interpolate
+from infoset.experiments.common.ephemeris.oem import OemCovariance, OemSegment
+from infoset.experiments.common.errors import InputError
 from infoset.sim.approach import propagate
 
 SAME_EPOCH_S = Fraction(1, 1000)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from infoset.experiments.interception.trajectory.frames import (
+from infoset.experiments.common.ephemeris.frames import (
     centre_name,
     frame_of_spice,
     inertial_frame,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from infoset.experiments.common.ephemeris.oem import OemSegment, read_oem
 from infoset.experiments.common.errors import InputError
-from infoset.experiments.interception.trajectory.oem import OemSegment, read_oem
 from tests.oem_text import HEADER, covariance_block, segment
 
 EPOCHS = ("2029-03-01T00:00:00", "2029-03-01T00:01:00", "2029-03-01T00:02:30.5")

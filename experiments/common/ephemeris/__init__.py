@@ -1,0 +1,1 @@
+"""States of spacecraft and objects from orbit ephemeris messages (OEM)."""
