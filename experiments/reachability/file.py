@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
 from typing import Annotated, ClassVar
@@ -33,6 +33,7 @@ from infoset.rendezvous.reachability import (
     MotionModel,
     NonlinearMotion,
     OutputProblem,
+    PathLimits,
     ReachabilityProblem,
     ThrustShape,
     between_impulses,
@@ -64,6 +65,9 @@ _MAX_ANGLE_RAD = 0.25
 docs/guaranteed-rendezvous.md exists up to 0.8, and is 1.4 times as large as needed at 0.25."""
 _MIN_INSTANTS = 4
 """Minimum number of intervals of a period of a drift; the default of `Coasting`."""
+_FLIGHT_INSTANTS = 16
+"""Minimum number of intervals of a period in which constraints are kept: their shift is then below
+the printed digits of a position near the goal."""
 Period = Annotated[int, Limits(minimum=0, maximum=MAX_PERIODS, whole=True)]
 
 
@@ -479,6 +483,30 @@ class Rendezvous:
             max(instants, _MIN_INSTANTS),
             acceleration_m_s2,
             semi_major_axis_m=self.orbit.semi_major_axis_m if self.nonlinear else None,
+        )
+
+    @cached_property
+    def path_limits(self) -> PathLimits | None:
+        """The constraints on states at all times; None if they are kept at instants only.
+
+        Held thrust, and the frozen model of an ellipse, have no bound between instants.
+        """
+        is_frozen = self.model is MotionModel.FROZEN and self.orbit.eccentricity > 0.0
+        if not self.has_impulses or is_frozen:
+            return None
+        drifts = self.drifts
+        flight = replace(
+            drifts,
+            impulses=self.periods,
+            periods=1,
+            instants=max(drifts.instants, _FLIGHT_INSTANTS),
+        )
+        problem = self.problem
+        normals, offsets = problem.further
+        bounds = np.tile(problem.state_bounds, (self.periods, 2))
+        unit = np.eye(problem.states)
+        return PathLimits(
+            flight, np.vstack([unit, -unit, normals]), np.hstack([bounds, offsets[:-1]])
         )
 
     def _problem(self, periods: int) -> ReachabilityProblem:

@@ -23,10 +23,9 @@ from infoset.rendezvous.reachability import (
     OutputProblem,
     PassiveSafety,
     PlanFlights,
-    ProblemPart,
     UnboundedCoastError,
     affine_plan,
-    answered_plan,
+    answers_within,
     drift_certificate,
     fly_plan,
     independent_parts,
@@ -34,6 +33,7 @@ from infoset.rendezvous.reachability import (
     lower_bound,
     nonlinear_plan,
     plan_of_parts,
+    plan_within,
     safe_plan,
 )
 
@@ -42,9 +42,10 @@ WINDOW = 4
 `docs/guaranteed-rendezvous.md` more give no smaller guarantee."""
 FLIGHTS = 100
 """Number of simulated flights without the option --flights."""
-_LAST_LIMITS = (np.inf, 2.0)
-"""Limits of the last control, tried in turn, as multiples of its largest value in the affine plan.
-Chosen: an answer is about as large as the affine reaction."""
+_LAST_LIMIT = 2.0
+"""Limit of the last control, as a multiple of its largest value in the affine plan, if constraints
+after it do not follow from its own limit. Chosen: an answer is about as large as the affine
+reaction."""
 _RELAXED = 10.0
 """Factor of the bounds of states that shows whether they are the conflict; chosen."""
 
@@ -79,7 +80,8 @@ class GuaranteeReport:
         guarantees = [np.nan if self.open_loop is None else self.open_loop.guarantee]
         for count in range(1, problem.periods):
             try:
-                guarantees.append(best_plan(first_measurements(problem, count)).guarantee)
+                shorter = first_measurements(problem, count)
+                guarantees.append(best_plan(self.rendezvous, shorter).guarantee)
             except NoRobustPlanError:
                 guarantees.append(np.nan)
         return np.array([*guarantees, self.plan.guarantee])
@@ -147,7 +149,7 @@ def solve_guarantee(
     problem = rendezvous.output_problem
     open_loop = None
     try:
-        open_loop = best_plan(first_measurements(problem, 0))
+        open_loop = best_plan(rendezvous, first_measurements(problem, 0))
     except NoRobustPlanError:
         if rendezvous.sensor is None:
             raise _conflict(rendezvous, progress) from None
@@ -158,21 +160,24 @@ def solve_guarantee(
         plan = open_loop
     else:
         try:
-            plans = plans_of_parts(problem)
+            plan = best_plan(rendezvous, problem)
         except NoRobustPlanError:
             raise _conflict(rendezvous, progress) from None
-        plan = plan_of_parts(problem, plans)
         progress(0.3)
-        answered, refusal = _answered(rendezvous, plans)
+        answered, refusal = _answered(rendezvous, plan)
         progress(0.5)
         if not rendezvous.nonlinear:
-            bound = max((lower_bound(part.problem).value for part, _ in plans), default=0.0)
-            radius = max((information_radius(part.problem).value for part, _ in plans), default=0.0)
+            parts = [part.problem for part in independent_parts(problem)]
+            bound = max((lower_bound(part).value for part in parts), default=0.0)
+            radius = max((information_radius(part).value for part in parts), default=0.0)
     progress(0.6)
     plan, drifts = _checked_plan(rendezvous, plan)
     progress(0.9)
     count = FLIGHTS if options.flights is None else options.flights
-    flights = fly_plan(rendezvous.problem, plan, rendezvous.errors, count, options.seed)
+    flown = rendezvous.problem
+    if rendezvous.path_limits is not None:
+        flown = replace(flown, between=rendezvous.instants)
+    flights = fly_plan(flown, plan, rendezvous.errors, count, options.seed)
     progress(1.0)
     return GuaranteeReport(
         rendezvous, plan, open_loop, answered, refusal, bound, radius, flights, drifts
@@ -194,14 +199,17 @@ def _checked_plan(
 
     def solve(problem: OutputProblem) -> AffinePlan:
         if safety is None:
-            return best_plan(problem)
-        return safe_plan(problem, PassiveSafety(drifts, safety.keep_out_m), WINDOW).plan
+            return best_plan(rendezvous, problem)
+        safe = PassiveSafety(drifts, safety.keep_out_m)
+        return _within(rendezvous, problem, lambda each: safe_plan(each, safe, WINDOW).plan)
 
+    # With the constraints that the plan needed already.
+    problem = replace(plan.problem, caps=None)
     try:
         if rendezvous.nonlinear:
-            checked = nonlinear_plan(rendezvous.output_problem, drifts, solve).plan
+            checked = nonlinear_plan(problem, drifts, solve).plan
         else:
-            checked = solve(rendezvous.output_problem)
+            checked = solve(problem)
     except (NoRobustPlanError, UnboundedCoastError) as error:
         raise InputError(f"{rendezvous.name}: {error}") from None
     if safety is None:
@@ -229,47 +237,51 @@ def first_measurements(problem: OutputProblem, count: int) -> OutputProblem:
     return replace(problem, output=output, noise=noise)
 
 
-def plans_of_parts(problem: OutputProblem) -> list[tuple[ProblemPart, AffinePlan]]:
-    """Return the parts of a problem with the best affine plan of each."""
-    return [(part, affine_plan(part.problem, WINDOW)) for part in independent_parts(problem)]
+def best_plan(rendezvous: Rendezvous, problem: OutputProblem) -> AffinePlan:
+    """Return the best affine plan of a problem, which keeps the constraints at all times."""
+
+    def solve(whole: OutputProblem) -> AffinePlan:
+        parts = independent_parts(whole)
+        return plan_of_parts(whole, [(part, affine_plan(part.problem, WINDOW)) for part in parts])
+
+    return _within(rendezvous, problem, solve)
 
 
-def best_plan(problem: OutputProblem) -> AffinePlan:
-    """Return the best affine plan of a problem."""
-    return plan_of_parts(problem, plans_of_parts(problem))
+def _within(
+    rendezvous: Rendezvous, problem: OutputProblem, solve: Callable[[OutputProblem], AffinePlan]
+) -> AffinePlan:
+    """Return a plan that keeps the constraints at all times, if there is a bound between them."""
+    limits = rendezvous.path_limits
+    return solve(problem) if limits is None else plan_within(problem, limits, solve)
 
 
-def _answered(
-    rendezvous: Rendezvous, plans: list[tuple[ProblemPart, AffinePlan]]
-) -> tuple[float | None, str | None]:
-    """Return the guarantee with a last control that answers all outputs, or why there is none."""
+def _answered(rendezvous: Rendezvous, plan: AffinePlan) -> tuple[float | None, str | None]:
+    """Return the guarantee with a last control that answers all outputs, or why there is none.
+
+    If constraints after the last control do not follow from its limits, smaller limits are tried.
+    The problem of a plan has the caps of errors that are proportional to controls.
+    """
     if rendezvous.nonlinear:
         return None, "only for linear motion"
     if rendezvous.passive_safety is not None:
         # The last control, and so the drift after it, is not known before the flight.
         return None, "not with [passive_safety]"
-    try:
-        found = [_best_answer(plan) for _, plan in plans]
-    except (LateConstraintError, NoRobustPlanError) as error:
-        return None, str(error)
-    return max(found, default=0.0), None
-
-
-def _best_answer(plan: AffinePlan) -> float:
-    """Return the guarantee of the best answer that keeps the constraints after the last control.
-
-    If they do not follow from its limits, the limits are those of `_LAST_LIMITS`. The problem of a
-    plan has the caps of errors that are proportional to controls.
-    """
-    problem = plan.problem
-    for factor in _LAST_LIMITS:
-        limits = problem.limits.copy()
-        limits[-1] = np.minimum(limits[-1], factor * plan.control_ranges.largest[-1])
+    refusal = ""
+    problem = replace(rendezvous.output_problem, caps=plan.problem.caps)
+    own = problem.limits.copy()
+    smaller = own.copy()
+    smaller[-1] = np.minimum(own[-1], _LAST_LIMIT * plan.control_ranges.largest[-1])
+    for limits in (own, smaller):
+        problem = replace(problem, control_limits=limits)
         try:
-            return answered_plan(replace(problem, control_limits=limits), WINDOW).guarantee
+            answers = answers_within(problem, rendezvous.path_limits, WINDOW)
         except LateConstraintError as error:
-            refused = error
-    raise refused
+            refusal = str(error)
+        except NoRobustPlanError as error:
+            return None, str(error)
+        else:
+            return max((answer.guarantee for answer in answers), default=0.0), None
+    return None, refusal
 
 
 def _conflict(rendezvous: Rendezvous, progress: Callable[[float], None]) -> InputError:
@@ -277,7 +289,7 @@ def _conflict(rendezvous: Rendezvous, progress: Callable[[float], None]) -> Inpu
     found = []
     for done, (name, relaxed) in enumerate(_relaxations(rendezvous)):
         try:
-            best_plan(relaxed.output_problem)
+            best_plan(relaxed, relaxed.output_problem)
         except NoRobustPlanError:
             continue
         finally:
@@ -334,9 +346,22 @@ def guarantee_lines(report: GuaranteeReport) -> Iterator[str]:
     yield from _further_lines(report)
 
 
+def constraint_times(rendezvous: Rendezvous) -> str:
+    """Return the times at which the constraints on states hold for all errors."""
+    if rendezvous.path_limits is not None:
+        return "at all times"
+    times = f"at t = 0..{rendezvous.periods}"
+    if rendezvous.has_impulses:
+        times += ", before and after each impulse"
+    if rendezvous.checks_between_periods:
+        times += f", and at {rendezvous.checks_between_periods} instants within each period"
+    return times
+
+
 def _further_lines(report: GuaranteeReport) -> Iterator[str]:
     """Yield what else is certain: for which motion, and what happens if the engines fail."""
     rendezvous = report.rendezvous
+    yield f"constraints hold for all errors {constraint_times(rendezvous)}"
     if rendezvous.nonlinear:
         yield "affine feedback and its ranges hold for the motion about a central body"
     if report.drifts is None or rendezvous.passive_safety is None:

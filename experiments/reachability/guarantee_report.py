@@ -15,6 +15,7 @@ from infoset.experiments.reachability.file import STATE_NAMES, Rendezvous
 from infoset.experiments.reachability.guarantee import (
     WINDOW,
     GuaranteeReport,
+    constraint_times,
     guarantee_lines,
     solve_guarantee,
 )
@@ -50,6 +51,7 @@ def report_json(report: GuaranteeReport) -> dict[str, object]:
         "radius": in_unit(report.radius),
         "window": WINDOW,
         "nonlinear": report.rendezvous.nonlinear,
+        "constraints_hold": constraint_times(report.rendezvous),
         "drifts": _drifts_json(report),
         "box": {"min": ranges.lower[-1], "max": ranges.upper[-1]},
         "states": _ranges_json(plan.nominal_states, ranges, 1.0),

@@ -106,6 +106,11 @@ from infoset.rendezvous.reachability.solve import (
     optimal_controls,
     solve,
 )
+from infoset.rendezvous.reachability.within_periods import (
+    PathLimits,
+    answers_within,
+    plan_within,
+)
 
 __all__ = [
     "IMPULSE",
@@ -135,6 +140,7 @@ __all__ = [
     "OptimalControls",
     "OutputProblem",
     "PassiveSafety",
+    "PathLimits",
     "PathRows",
     "PlanFlights",
     "ProblemPart",
@@ -153,6 +159,7 @@ __all__ = [
     "affine_plan",
     "analytic_centre",
     "answered_plan",
+    "answers_within",
     "backward_bounds",
     "between_impulses",
     "between_periods",
@@ -179,6 +186,7 @@ __all__ = [
     "nonlinear_plan",
     "optimal_controls",
     "plan_of_parts",
+    "plan_within",
     "replan",
     "safe_plan",
     "samples",

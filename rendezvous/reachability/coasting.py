@@ -261,6 +261,38 @@ class CoastTube:
         at_ends = np.linalg.norm(self.largest[..., :3], axis=2)
         return np.asarray(np.maximum(at_ends[:, :-1], at_ends[:, 1:]) + self.sagittas)
 
+    def maxima(self, normals: Floats) -> Floats:
+        """Return the maxima of normals . state at the ends of the intervals, (K, N + 1, k).
+
+        `normals` have the shape (k, 6).
+        """
+        along = np.einsum("rn,kinz->kirz", normals, self.columns)
+        return np.asarray(
+            self.middles @ normals.T + self.errors.maxima(along) + self._pushes(normals)
+        )
+
+    def uncontrolled(self, normals: Floats) -> Floats:
+        """Return the parts of `maxima` of execution errors and accelerations, (K, N + 1, k)."""
+        execution = self.columns[..., self.errors.size - 3 :]
+        along = np.einsum("rn,kine->kire", normals, execution)
+        return np.asarray(np.abs(along).sum(axis=-1) + self._pushes(normals))
+
+    def _pushes(self, normals: Floats) -> Floats:
+        """Return the extents of the ellipsoids along `normals`, shape (K, N + 1, k)."""
+        squares = np.einsum("rn,kinm,rm->kir", normals, self.shapes, normals)
+        return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
+
+    def overshoots(self, normals: Floats) -> Floats:
+        """Return by how much normals . state may exceed both ends of an interval, (K, N, k).
+
+        With an acceleration of at most M the position exceeds its chord by h^2 / 8 M, and the
+        velocity exceeds both ends by h / 2 M. `normals` have the shape (k, 6).
+        """
+        position = np.linalg.norm(normals[:, :3], axis=1)
+        velocity = np.linalg.norm(normals[:, 3:], axis=1)
+        per_sagitta = position + 4.0 / self.coasting.interval_s * velocity
+        return np.asarray(self.sagittas[..., None] * per_sagitta)
+
     def extents(self, directions: Floats) -> Floats:
         """Return the extents of execution errors and accelerations, m, shape (K, N, 2).
 

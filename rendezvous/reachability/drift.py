@@ -16,7 +16,7 @@ from infoset.rendezvous.reachability.coasting import Coasting, CoastTube
 from infoset.rendezvous.reachability.conic import NoSolutionError
 from infoset.rendezvous.reachability.guaranteed import PlanVariables, affine_plan, row_sizes
 from infoset.rendezvous.reachability.motion import IMPULSE
-from infoset.rendezvous.reachability.outputs import AffinePlan, OutputProblem, PathRows
+from infoset.rendezvous.reachability.outputs import AffinePlan, OutputProblem, PathRows, joined
 from infoset.rendezvous.reachability.robust import NoRobustPlanError
 from infoset.rendezvous.reachability.sparse_program import (
     Affine,
@@ -250,7 +250,7 @@ def _safe_with(
     for _ in range(_MAX_CHECKS):
         rows = _rows(safety, normals, extents + sagittas[..., None], entered)
         try:
-            safe = replace(limited, path=_joined(problem.path, rows))
+            safe = replace(limited, path=joined(problem.path, rows))
             plan = affine_plan(safe, window, every_row=True)
         except (NoRobustPlanError, NoSolutionError):
             return None
@@ -294,12 +294,6 @@ def _rows(safety: PassiveSafety, normals: Floats, allowances: Floats, entered: F
         safety.keep_out_m + allowances[drifts, intervals].T.ravel(),
         np.full(len(states), np.inf),
     )
-
-
-def _joined(first: PathRows | None, second: PathRows) -> PathRows:
-    if first is None:
-        return second
-    return PathRows(*(np.concatenate(pair) for pair in zip(first, second, strict=True)))
 
 
 def _least_violation(

@@ -42,6 +42,13 @@ class PathRows(NamedTuple):
         )
 
 
+def joined(first: PathRows | None, second: PathRows) -> PathRows:
+    """Return all rows of two."""
+    if first is None:
+        return second
+    return PathRows(*(np.concatenate(pair) for pair in zip(first, second, strict=True)))
+
+
 class ErrorSet(NamedTuple):
     """The set Z of all errors z: its first components are errors of the start, and |z_i| <= 1.
 
@@ -122,7 +129,7 @@ class OutputProblem:
         The state that x(T) should have; zero if None.
     disturbance : ndarray, shape (T, n, p), or None
         The matrices D(t), of all errors but those of the execution.
-    execution_error : ndarray, shape (m,), or None
+    execution_error : ndarray, shape (m,) or (T, m), or None
         Bound of the error of each control that does not depend on the control, in units of it.
     relative_error : ndarray, shape (m,), or None
         The error of a control u_j is at most execution_error_j + relative_error_j |u_j|.
@@ -277,15 +284,7 @@ class OutputProblem:
             -ends,
             ends,
         )
-        if self.path is None:
-            return limits
-        return PathRows(
-            np.concatenate([limits.times, self.path.times]),
-            np.concatenate([limits.states, self.path.states]),
-            np.concatenate([limits.controls, self.path.controls]),
-            np.concatenate([limits.lower, self.path.lower]),
-            np.concatenate([limits.upper, self.path.upper]),
-        )
+        return limits if self.path is None else joined(limits, self.path)
 
     def effects_on(self, time: int, row: Floats) -> Floats:
         """Return the effects of u(0), ..., u(time - 1) on row . x(time), shape (time, m)."""
@@ -345,13 +344,18 @@ class AffinePlan:
 
     def ranges_of(self, rows: PathRows) -> Ranges:
         """Return the ranges of states x(t) + controls u(t) of some rows, shape (k,)."""
-        # A row at the time T has no control.
-        with_control = np.minimum(rows.times, self.problem.periods - 1)
-        acting = rows.controls * (rows.times < self.problem.periods)[:, None]
-        middle = np.einsum("kn,kn->k", rows.states, self.nominal_states[rows.times])
-        middle = middle + np.einsum("km,km->k", acting, self.nominal[with_control])
-        columns = np.einsum("kn,knz->kz", rows.states, self.state_columns[rows.times])
-        columns = columns + np.einsum("km,kmz->kz", acting, self.control_columns[with_control])
+        middle = np.zeros(len(rows.times))
+        columns = np.zeros((len(rows.times), self.problem.errors.size))
+        for time in np.unique(rows.times):
+            at_time = rows.times == time
+            states = rows.states[at_time]
+            middle[at_time] = states @ self.nominal_states[time]
+            columns[at_time] = states @ self.state_columns[time]
+            # A row at the time T has no control.
+            if time < self.problem.periods:
+                controls = rows.controls[at_time]
+                middle[at_time] += controls @ self.nominal[time]
+                columns[at_time] += controls @ self.control_columns[time]
         return self._ranges(middle, columns)
 
     @cached_property

@@ -45,6 +45,7 @@ def test_known_guarantees_of_the_arch_rendezvous_are_printed(infoset: Command) -
     assert "\n".join(out.splitlines()[:6]) in page
     assert "100 flights of affine feedback" in out
     assert ": 0 outside, worst" in out
+    assert "\nconstraints hold for all errors at all times\n" in out
 
 
 def test_results_are_written_with_their_units(infoset: Command) -> None:
@@ -178,6 +179,7 @@ def test_held_thrust_has_its_own_unit(infoset: Command) -> None:
     assert found["flights"]["outside"] == 0
     assert code == 0
     assert "last control re-planned" in out
+    assert "constraints hold for all errors at t = 0..10\n" in out
 
 
 def test_errors_proportional_to_impulses_cost_guarantee(infoset: Command) -> None:
