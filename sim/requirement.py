@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bisect
 import functools
 import math
 import re
@@ -35,6 +36,8 @@ _DEFAULT_LEVEL = "99"
 numbers of runs show."""
 _BISECTIONS = 50
 """Bisections for an end of an interval: 2^-50 is near the rounding of a share."""
+_MOST_RUNS = 2**60
+"""More runs than any share needs: a share below 1 is at most 1 - 2^-53."""
 _SAMPLE_SIZES = 2000
 """Number of sizes that `runs_needed` tries first, 0.7 % apart: sizes between two are tried next."""
 
@@ -380,3 +383,16 @@ def runs_needed(count: int, runs: int, share: float) -> int | None:
         return None
     before = sizes[max(int(np.searchsorted(sizes, enough[0])) - 1, 0)]
     return int(deciding(np.arange(before, enough[0] + 1))[0])
+
+
+def least_runs(share: float, *, watched: bool) -> int:
+    """Return the minimum number of runs that can decide that a required share is met.
+
+    All of them satisfy the bound then. `watched` is an argument of `judge`. A number that is fixed
+    before is the least n with share^n <= 2.5 %.
+    """
+    if not watched:
+        return math.ceil(math.log(_TAIL) / math.log(share))
+    return bisect.bisect_left(
+        range(_MOST_RUNS), True, lo=1, key=lambda runs: bool(decides(runs, runs, share))
+    )

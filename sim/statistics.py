@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import bisect
 import functools
 import math
 from collections.abc import Sequence
@@ -14,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from infoset.arrays import Floats
-from infoset.limits import FRACTION, WHOLE, real_values
+from infoset.limits import FRACTION, real_values
 
 COUNT_ROUNDING = 1e-9
 """Rounding error of an expected number of values: 100 values show the quantile of 0.99, although
@@ -235,44 +234,9 @@ def estimate_hits(hits: int, runs: int, confidence: float = 0.95) -> HitEstimate
     if runs < 1 or not 0 <= hits <= runs:
         raise ValueError(f"hits must be from 0 to runs, and runs at least 1: got {hits} of {runs}")
     tail = 0.5 * (1.0 - confidence)
-    lower = _lower_end(hits, runs, tail)
+    lower = float(beta.ppf(tail, hits, runs - hits + 1)) if hits else 0.0
     upper = float(beta.ppf(1.0 - tail, hits + 1, runs - hits)) if hits < runs else 1.0
     return HitEstimate(runs, hits, hits / runs, lower, upper)
-
-
-def _lower_end(hits: int, runs: int, tail: float) -> float:
-    """Return the probability of a hit for which P(at least this number of hits) is `tail`.
-
-    It is zero without a hit.
-    """
-    from scipy.stats import beta  # slow to load, and few commands need it
-
-    return float(beta.ppf(tail, hits, runs - hits + 1)) if hits else 0.0
-
-
-def runs_for_hits(share: float, misses: int = 0, confidence: float = 0.95) -> int:
-    """Return the minimum number of runs, with some misses, that show a probability of a hit.
-
-    With this number of runs, of which `misses` miss, the hypothesis that the probability is less
-    than `share` is rejected at the level 1 - `confidence`, by the exact one-sided binomial test.
-    Without misses it is the least n with share^n <= 1 - confidence: 299 runs for 99 % at 95 %.
-
-    Raises
-    ------
-    ValueError
-        If the share or the confidence is not between 0 and 1, or the number of misses is negative.
-    """
-    FRACTION.need("share", share)
-    FRACTION.need("confidence", confidence)
-    WHOLE.need("misses", misses)
-
-    def shows_it(runs: int) -> bool:
-        return bool(_lower_end(runs - misses, runs, 1.0 - confidence) >= share)
-
-    most = misses + 1
-    while not shows_it(most):
-        most *= 2
-    return bisect.bisect_left(range(most), True, lo=misses + 1, key=shows_it)
 
 
 def average_ranks(values: Floats) -> Floats:

@@ -24,6 +24,7 @@ from infoset.experiments.interception.command import (
     RangeSensor,
     ScenarioName,
     StrategyName,
+    run_count,
 )
 
 MAX_WORKERS = 1024
@@ -54,7 +55,17 @@ class FlightOptions:
 
     scenario: ScenarioName = "asteroid-1997"
     settings: Settings = None
-    runs: Annotated[int, typer.Option(metavar="N", min=1, max=MAX_RUNS, help="Number of runs.")]
+    runs: Annotated[
+        int,
+        typer.Option(
+            metavar="N",
+            parser=run_count,
+            help=(
+                "Number of runs; needed: the least number that can decide hit>=0.99, 535 of each "
+                "noise."
+            ),
+        ),
+    ]
     out: Annotated[
         Path, typer.Option(metavar="DIR", help="Folder for the runs; created if needed.")
     ]
@@ -161,7 +172,15 @@ class Sweep(FlightOptions):
     """
 
     runs: Annotated[
-        int, typer.Option(metavar="N", min=1, max=MAX_RUNS, help="Number of runs of each cell.")
+        int,
+        typer.Option(
+            metavar="N",
+            parser=run_count,
+            help=(
+                "Number of runs of each cell; needed: the least number that can decide the "
+                "requirement, of each noise."
+            ),
+        ),
     ] = 400
     out: Annotated[
         Path, typer.Option(metavar="DIR", help="Folder for the runs; created if needed.")

@@ -21,6 +21,7 @@ from infoset.experiments.interception.scenario_file import (
 )
 from infoset.experiments.interception.strategies import OwnNoise, chosen_noise, own_code_errors
 from infoset.sim import Campaign, CampaignNoise, Scenario
+from infoset.sim.requirement import AnyRequirement, least_runs
 from infoset.sim.storage import MANIFEST, CampaignFolder, StorageError, need_free, read_manifest
 from infoset.sim.versions import VersionError
 
@@ -53,6 +54,17 @@ def noise_of(options: FlightOptions) -> CampaignNoise | OwnNoise | None:
     names = [noise.value for noise in CampaignNoise if noise is not CampaignNoise.OWN]
     chosen = chosen_noise(options.noise, names)
     return CampaignNoise(chosen) if isinstance(chosen, str) else chosen
+
+
+def noises_at_once(options: FlightOptions) -> int:
+    """Return the number of noises among which the runs of the options are divided."""
+    noise = noise_of(options)
+    return len(noise.kinds) if isinstance(noise, CampaignNoise) else 1
+
+
+def needed_runs(options: FlightOptions, required: AnyRequirement) -> int:
+    """Return the least number of runs that can decide a requirement with each noise."""
+    return noises_at_once(options) * least_runs(required.share, watched=True)
 
 
 def fly(

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from infoset.experiments.campaigns.command import CampaignOptions
 from infoset.experiments.campaigns.flight import (
     RESUME_HINT,
     SCENARIO_FILE,
     campaign_errors,
     fly,
+    needed_runs,
     noise_of,
+    noises_at_once,
     scenario_of,
 )
 from infoset.experiments.campaigns.run_tables import heading, records, summary, summary_parts
@@ -17,8 +21,9 @@ from infoset.experiments.common.input_file import to_toml
 from infoset.experiments.common.output import output_of, to_json
 from infoset.experiments.common.screen import show, some_runs
 from infoset.experiments.common.units import duration_text
+from infoset.experiments.interception.command import NEEDED
 from infoset.experiments.interception.strategies import own_strategy
-from infoset.experiments.interception.study import study_title
+from infoset.experiments.interception.study import USUAL_REQUIREMENT, needed_notes, study_title
 from infoset.sim import Campaign, RunsUntil, StoppingRule
 
 SUMMARY = "summary.json"
@@ -27,7 +32,11 @@ SUMMARY = "summary.json"
 def run(options: CampaignOptions) -> None:
     """Simulate the campaign, write its summary and print the tables."""
     with campaign_errors(RESUME_HINT), output_of(options) as written:
-        scenario, model_notes = scenario_of(options)
+        if options.runs == NEEDED:
+            options = replace(options, runs=needed_runs(options, USUAL_REQUIREMENT))
+        scenario, notes = scenario_of(options)
+        if scenario.body is not None:
+            notes += needed_notes(USUAL_REQUIREMENT, options.runs // noises_at_once(options))
         with input_errors("--until"):
             runs: int | RunsUntil = options.runs
             if options.until is not None:
@@ -42,7 +51,7 @@ def run(options: CampaignOptions) -> None:
             guarantee=options.guarantee,
             chunk=options.chunk,
         )
-        stored, warnings, elapsed_s = fly(campaign, options, model_notes)
+        stored, warnings, elapsed_s = fly(campaign, options, notes)
         manifest = stored.manifest
         table = summary(stored)
         results = heading(stored)

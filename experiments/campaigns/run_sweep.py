@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from infoset.experiments.campaigns.command import Sweep as Options
 from infoset.experiments.campaigns.flight import (
     RESUME_HINT,
     SCENARIO_FILE,
     campaign_errors,
     fly,
+    needed_runs,
     noise_of,
+    noises_at_once,
     scenario_of,
 )
 from infoset.experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
@@ -18,7 +22,9 @@ from infoset.experiments.common.errors import InputError
 from infoset.experiments.common.input_file import to_toml
 from infoset.experiments.common.output import output_of, to_json
 from infoset.experiments.common.screen import say, show
+from infoset.experiments.interception.command import NEEDED
 from infoset.experiments.interception.strategies import own_strategy
+from infoset.experiments.interception.study import needed_notes
 from infoset.sim import Campaign, RunsUntil
 from infoset.sim.requirement import AnyRequirement
 
@@ -37,9 +43,14 @@ def run(options: Options) -> None:
         axes = sweep_axes(",".join(options.vary), scenario)
         cells = sweep_cells(scenario, axes)
         required = read_requirement(options.require, has_size=cells[0].body is not None)
+        if options.runs == NEEDED:
+            options = replace(options, runs=needed_runs(options, required))
+        runs = _runs(options, required)
+        most = runs.max_runs if isinstance(runs, RunsUntil) else runs
+        notes += needed_notes(required, most // noises_at_once(options))
         swept = Campaign(
             scenario,
-            _runs(options, required),
+            runs,
             options.out,
             axes=axes,
             cells=cells,

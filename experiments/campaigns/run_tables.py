@@ -22,6 +22,7 @@ from infoset.experiments.interception.study import (
     hit_text,
     miss_text,
     noise_notes,
+    outlook_text,
     redrawn_text,
     set_warnings,
 )
@@ -335,6 +336,8 @@ def _notes(
             row["runs"], row["hits"], row["hit_probability"], row["hit_lower"], row["hit_upper"]
         )
         yield hit_text(hits, folder.manifest.scenario)
+        if outlook := outlook_text(hits):
+            yield outlook
         missed = {
             name.removeprefix("missed_"): value
             for name, value in row.items()

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
+from infoset.experiments.common.errors import shown
 from infoset.experiments.common.options import (
     Csv,
     FileOptions,
@@ -21,6 +22,25 @@ from infoset.experiments.common.options import (
 
 MAX_RUNS = 10_000_000
 """Maximum number of runs: one miss in so many runs shows a probability of 99.99999 %."""
+
+NEEDED = 0
+"""Value of ``runs`` for ``--runs needed``: no study has zero runs."""
+
+
+def run_count(text: Any) -> int:
+    """Return the number of runs of the option ``--runs``; `NEEDED` for the word ``needed``."""
+    if text == "needed":
+        return NEEDED
+    try:
+        count = int(text)
+    except ValueError:
+        count = 0
+    if not 1 <= count <= MAX_RUNS:
+        raise typer.BadParameter(
+            f"must be a whole number from 1 to {MAX_RUNS}, or needed: got {shown(text)}"
+        )
+    return count
+
 
 ScenarioName = Annotated[
     str,
@@ -101,7 +121,15 @@ class Experiment(FileOptions):
     scenario: ScenarioName = "asteroid-1997"
     settings: Settings = None
     runs: Annotated[
-        int, typer.Option(metavar="N", min=1, max=MAX_RUNS, help="Number of runs of each case.")
+        int,
+        typer.Option(
+            metavar="N",
+            parser=run_count,
+            help=(
+                "Number of runs of each case; needed: the least number that can decide hit>=0.99, "
+                "535."
+            ),
+        ),
     ] = 50
     noise: NoiseName = None
     seed: Seed = 0

@@ -16,10 +16,17 @@ from infoset.guidance.noise import NoiseSource
 from infoset.guidance.noise_registry import noise_note
 from infoset.model import Model, SetSettings
 from infoset.sim import HitEstimate, MissCause, Results, Scenario, estimate_hits
-from infoset.sim.requirement import CONFIDENCE, HitRequirement, runs_needed
+from infoset.sim.requirement import (
+    MAX_RUNS_NEEDED,
+    AnyRequirement,
+    HitRequirement,
+    least_runs,
+    runs_needed,
+    share_interval,
+)
 from infoset.sim.results import join
 from infoset.sim.simulate import broken_assumption
-from infoset.sim.statistics import runs_for_hits, shown_quantiles
+from infoset.sim.statistics import shown_quantiles
 
 QUANTILES = {"p10": 0.1, "p50": 0.5, "p90": 0.9, "p99": 0.99, "max": 1.0}
 """Levels of the quantiles in tables and JSON, by name."""
@@ -35,6 +42,8 @@ WANTED_SHARES = tuple(1.0 - 10.0**-digits for digits in range(2, 8))
 
 The last one allows one miss in ten million runs, the largest campaigns.
 """
+USUAL_REQUIREMENT = HitRequirement(WANTED_SHARES[0])
+"""Requirement whose runs `infoset experiment` and `infoset campaign` name before they begin."""
 OF_PAPER = ("asteroid-1997", "asteroid-1997-single")
 """Scenarios of the paper of 1997; only their results have the numbers of its curves and figures."""
 
@@ -316,34 +325,48 @@ def hit_text(hits: HitEstimate | None, scenario: Scenario) -> str:
     )
 
 
-def outlook_text(hits: HitEstimate | None) -> str:
-    """Return a line about the runs that would show a greater probability of a hit.
+def needed_notes(required: AnyRequirement, runs: int) -> list[str]:
+    """Return a line about the runs of a noise that a requirement needs; none if `runs` are enough.
 
-    The probability is the first of 99 %, 99.9 % and so on that the sample does not show yet. The
-    text is empty if the sample excludes it.
+    Runs are enough if they can decide also after looks at the results.
+    """
+    needed = least_runs(required.share, watched=True)
+    if runs >= needed:
+        return []
+    all_runs = "all hits"
+    if not isinstance(required, HitRequirement) or required.cause is not None:
+        all_runs = "all of which satisfy it"
+    fixed = least_runs(required.share, watched=False)
+    return [
+        f"{required} needs at least {needed} runs of each noise, {all_runs} ({fixed} if the number "
+        f"is fixed before the first run); you asked for {runs}"
+    ]
+
+
+def outlook_text(hits: HitEstimate | None) -> str:
+    """Return a line about what the hits show, and the runs that would show more.
+
+    The next probability is the first of 99 %, 99.9 % and so on that the sample does not show yet.
+    The text is empty if the sample excludes it.
     """
     if hits is None:
         return ""
-    misses = hits.runs - hits.hits
-    share = next(share for share in WANTED_SHARES if hits.runs < runs_for_hits(share, misses))
+    share = next(share for share in WANTED_SHARES if hits.lower < share)
     if hits.upper < share:
         return ""
 
-    allowed = "without a miss"
-    if misses == 1:
-        allowed = "with at most 1 miss"
-    elif misses > 1:
-        allowed = f"with at most {misses} misses"
-    text = (
-        f"for {percent(share)} with {percent(CONFIDENCE)} confidence: at least "
-        f"{runs_for_hits(share, misses)} runs {allowed}; infoset sweep --vary KEY=FROM:TO:COUNT "
-        f'--require "{HitRequirement(share)}" --until decided decides it'
+    needed = runs_needed(hits.hits, hits.runs, share)
+    if needed is None:
+        more = f"needs more than {MAX_RUNS_NEEDED} runs"
+    else:
+        like = "all hit" if hits.hits == hits.runs else "the share of hits stays the same"
+        more = f"needs about {needed - hits.runs} more runs if {like}"
+    lower, _ = share_interval(hits.hits, hits.runs)
+    return (
+        f"the probability of a hit is at least {percent(hits.lower)} if the number of runs was "
+        f"fixed before, {percent(lower)} if runs were added after a look at results; "
+        f"{HitRequirement(share)} {more}"
     )
-
-    until_decided = runs_needed(hits.hits, hits.runs, share)
-    if until_decided is not None:
-        text += f", after about {until_decided} runs"
-    return text
 
 
 def miss_text(missed: Mapping[str, Any], runs: int, scenario: Scenario) -> str:

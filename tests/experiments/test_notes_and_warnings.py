@@ -11,11 +11,11 @@ import pytest
 
 from infoset.experiments import load_scenario
 from infoset.experiments.interception.scenario_file import scenario_warnings
-from infoset.experiments.interception.study import outlook_text
+from infoset.experiments.interception.study import needed_notes, outlook_text
 from infoset.guidance import Thruster
 from infoset.sim import HitRequirement, estimate_hits
 from infoset.sim.closed_form import possible_miss_of
-from infoset.sim.requirement import Decision, judge
+from infoset.sim.requirement import Decision, judge, parse_requirement
 from infoset.sim.scenario import of_model
 from infoset.sim.schedule import image_times_s
 from tests.experiments.command_line import Command
@@ -122,21 +122,39 @@ def test_a_sweep_names_keys_without_an_effect_and_its_adversary(infoset: Command
 @pytest.mark.parametrize(
     ("hits", "runs", "text"),
     [
-        (100, 100, "for 99 % with 95 % confidence: at least 299 runs without a miss; "),
-        (298, 298, "for 99 % with 95 % confidence: at least 299 runs without a miss; "),
-        # 0.999^2995 <= 0.05 < 0.999^2994
-        (299, 299, "for 99.9 % with 95 % confidence: at least 2995 runs without a miss; "),
-        # 0.99^473 + 473 * 0.01 * 0.99^472 <= 0.05, and not for 472
-        (99, 100, "for 99 % with 95 % confidence: at least 473 runs with at most 1 miss; "),
+        # 0.025^(1 / 100) = 0.9638; exact_p_value(100, 100, 0.94786) = 0.025
+        (
+            100,
+            100,
+            "the probability of a hit is at least 96.38 % if the number of runs was fixed before, "
+            "94.79 % if runs were added after a look at results; hit>=0.99 needs about 435 more "
+            "runs if all hit",
+        ),
+        # 0.99^367 > 0.025 >= 0.99^368
+        (367, 367, "hit>=0.99 needs about 168 more runs if all hit"),
+        (368, 368, "hit>=0.999 needs about 5005 more runs if all hit"),
+        (98, 100, "more runs if the share of hits stays the same"),
+        (99, 100, "hit>=0.99 needs more than 1000000 runs"),
     ],
 )
-def test_outlook_names_the_runs_that_show_a_greater_probability(
+def test_outlook_names_what_the_hits_show_and_the_runs_that_show_more(
     hits: int, runs: int, text: str
 ) -> None:
-    outlook = outlook_text(estimate_hits(hits, runs))
-    assert outlook.startswith(text)
-    share = "0.999" if "99.9" in text else "0.99"
-    assert f'--require "hit>={share}" --until decided decides it' in outlook
+    assert text in outlook_text(estimate_hits(hits, runs))
+
+
+def test_needed_runs_are_named_if_the_asked_ones_are_too_few() -> None:
+    asked = HitRequirement(0.99)
+    assert needed_notes(asked, 100) == [
+        "hit>=0.99 needs at least 535 runs of each noise, all hits (368 if the number is fixed "
+        "before the first run); you asked for 100"
+    ]
+    assert needed_notes(asked, 534)
+    assert needed_notes(asked, 535) == []
+    (quantile,) = needed_notes(parse_requirement("miss_m p90<10"), 20)
+    assert quantile.startswith(
+        "miss_m p90<10 needs at least 51 runs of each noise, all of which satisfy it (36 if "
+    )
 
 
 @pytest.mark.parametrize(("hits", "runs"), [(50, 100), (0, 10), (1900, 2000)])
@@ -147,7 +165,7 @@ def test_outlook_is_empty_if_the_sample_excludes_the_probability(hits: int, runs
 def test_the_sweep_needs_the_runs_that_the_outlook_names() -> None:
     """The confidence sequence decides after the named number of hits, and not one run earlier."""
     outlook = outlook_text(estimate_hits(100, 100))
-    needed = int(outlook.rpartition("after about ")[2].split()[0])
+    needed = 100 + int(outlook.rpartition("needs about ")[2].split()[0])
     assert judge(np.ones(needed), HitRequirement(0.99), watched=True).decision is Decision.MET
     assert (
         judge(np.ones(needed - 1), HitRequirement(0.99), watched=True).decision
@@ -156,15 +174,51 @@ def test_the_sweep_needs_the_runs_that_the_outlook_names() -> None:
 
 
 def test_experiment_with_a_body_prints_the_outlook(infoset: Command, file: Path) -> None:
-    code, out, _ = infoset("experiment", file, "--runs", 4, "--set", "body.radius_m=1e5")
+    code, out, error = infoset("experiment", file, "--runs", 4, "--set", "body.radius_m=1e5")
     assert code == 0
+    assert "hit>=0.99 needs at least 535 runs of each noise" in error
     lines = out.splitlines()
     for case in ("random", "random + range sensor", "game", "game + range sensor"):
         (number,) = (at for at, line in enumerate(lines) if line.startswith(f"{case}: hit"))
-        assert lines[number + 1].startswith(
-            f"{case}: for 99 % with 95 % confidence: at least 299 runs without a miss"
-        )
-    assert "99 %" not in infoset("experiment", file, "--runs", 4)[1]
+        assert lines[number + 1].startswith(f"{case}: the probability of a hit is at least 39.76 %")
+        assert lines[number + 1].endswith("hit>=0.99 needs about 531 more runs if all hit")
+
+    _, out, error = infoset("experiment", file, "--runs", 4)
+    assert "hit" not in out
+    assert "hit" not in error
+
+
+def test_the_word_needed_is_the_least_number_of_runs_of_each_noise(
+    infoset: Command, file: Path
+) -> None:
+    """The requirement hit>=0.5 needs 8 hits: (n + 1) 0.5^(n + 1) / (1 - 0.5^(n + 1)) <= 0.025."""
+    code, _, error = infoset(
+        "sweep",
+        file,
+        "--set",
+        "body.radius_m=1e5",
+        "--vary",
+        "thruster.max_impulse_m_s=2:8:2",
+        "--require",
+        "hit>=0.5",
+        "--noise",
+        "mixed",
+        "--runs",
+        "needed",
+        "--out",
+        "out",
+    )
+    assert code == 0
+    assert "runs of each noise" not in error
+    assert [
+        (cell["runs"], cell["requirement"]) for cell in infoset.json("report", "out")["cells"]
+    ] == [(8, "met")] * 4
+
+
+@pytest.mark.parametrize("runs", ["0", "10000001", "many", "2.5"])
+def test_a_number_of_runs_out_of_range_is_refused(infoset: Command, runs: str) -> None:
+    message = infoset.refused("experiment", "--runs", runs)
+    assert f'whole number from 1 to 10000000, or needed: got "{runs}"' in message
 
 
 PAPERS_WORDS = re.compile(r"curve|figure-[234]|figure [234]|published|printed")

@@ -18,6 +18,7 @@ from infoset.sim.requirement import (
     HitRequirement,
     decides,
     judge,
+    least_runs,
     p_values,
     parse_requirement,
     runs_needed,
@@ -221,6 +222,33 @@ def test_runs_needed_are_the_exact_minimum_if_all_runs_satisfy(share: str, minim
     assert exact_p_value(minimum, minimum, exact) <= Fraction("0.025")
 
     assert runs_needed(20, 20, float(exact)) == minimum
+
+
+@pytest.mark.parametrize(
+    ("share", "watched", "fixed"),
+    [("0.9", 51, 36), ("0.95", 105, 72), ("0.99", 535, 368), ("0.999", 5373, 3688)],
+)
+def test_least_runs_are_the_exact_minimum(share: str, watched: int, fixed: int) -> None:
+    exact = Fraction(share)
+    assert exact_p_value(watched, watched, exact) <= Fraction("0.025")
+    assert exact_p_value(watched - 1, watched - 1, exact) > Fraction("0.025")
+    assert Decimal(share) ** (fixed - 1) > Decimal("0.025") >= Decimal(share) ** fixed
+
+    assert least_runs(float(share), watched=True) == watched
+    assert least_runs(float(share), watched=False) == fixed
+
+
+def test_least_runs_exist_for_every_share() -> None:
+    share = 1.0 - 2.0**-53
+    # In the limit of small x = 1 - q, with s = n x: s / (exp(s) - 1) = 0.025.
+    lower, upper = 1.0, 20.0
+    for _ in range(60):
+        middle = 0.5 * (lower + upper)
+        if middle / math.expm1(middle) > 0.025:
+            lower = middle
+        else:
+            upper = middle
+    assert least_runs(share, watched=True) == pytest.approx(lower * 2.0**53, rel=1e-6)
 
 
 def test_runs_needed_are_none_if_the_estimate_is_at_the_bound() -> None:

@@ -3,7 +3,6 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 from math import comb
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ from infoset.sim import empirical_distribution, estimate_hits, estimate_quantile
 from infoset.sim.statistics import (
     average_ranks,
     order_statistics,
-    runs_for_hits,
     shown_quantiles,
     shows,
 )
@@ -123,42 +121,6 @@ def probability_of_at_most(misses: int, runs: int, share: Fraction) -> Fraction:
         ),
         Fraction(0),
     )
-
-
-@pytest.mark.parametrize(
-    ("share", "misses", "confidence"),
-    [
-        ("0.99", 0, "0.95"),
-        ("0.99", 1, "0.95"),
-        ("0.99", 4, "0.95"),
-        ("0.9", 0, "0.95"),
-        ("0.9", 7, "0.99"),
-        ("0.75", 3, "0.6"),
-    ],
-)
-def test_the_runs_for_hits_are_the_least_of_the_exact_test(
-    share: str, misses: int, confidence: str
-) -> None:
-    runs = runs_for_hits(float(share), misses, float(confidence))
-    level = 1 - Fraction(confidence)
-    assert probability_of_at_most(misses, runs, Fraction(share)) <= level
-    assert runs == misses + 1 or probability_of_at_most(misses, runs - 1, Fraction(share)) > level
-
-
-def test_299_runs_without_a_miss_show_99_percent() -> None:
-    assert runs_for_hits(0.99) == 299
-    assert Fraction(99, 100) ** 299 <= Fraction(5, 100) < Fraction(99, 100) ** 298
-
-
-@pytest.mark.parametrize(
-    ("arguments", "name"),
-    [((1.0,), "share"), ((0.0,), "share"), ((0.9, -1), "misses"), ((0.9, 0, 1.0), "confidence")],
-)
-def test_runs_for_hits_are_refused_if_an_argument_is_out_of_range(
-    arguments: tuple[Any, ...], name: str
-) -> None:
-    with pytest.raises(ValueError, match=name):
-        runs_for_hits(*arguments)
 
 
 @given(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from rich.table import Table
@@ -19,7 +20,7 @@ from infoset.experiments.common.screen import (
     show,
     some_runs,
 )
-from infoset.experiments.interception.command import Experiment
+from infoset.experiments.interception.command import NEEDED, Experiment
 from infoset.experiments.interception.course import Courses
 from infoset.experiments.interception.remedy import Remedy, find_remedies
 from infoset.experiments.interception.runs.shared import (
@@ -40,6 +41,7 @@ from infoset.experiments.interception.strategies import (
 )
 from infoset.experiments.interception.study import (
     QUANTILES,
+    USUAL_REQUIREMENT,
     Curve,
     SetCounts,
     case_title,
@@ -47,6 +49,7 @@ from infoset.experiments.interception.study import (
     hit_text,
     is_of_paper,
     miss_text,
+    needed_notes,
     noise_notes,
     outlook_text,
     redrawn_text,
@@ -59,6 +62,7 @@ from infoset.guidance import NoiseKind, Strategy
 from infoset.sim import Results, Scenario
 from infoset.sim.columns import csv_text
 from infoset.sim.parallel import Task
+from infoset.sim.requirement import least_runs
 from infoset.sim.scenario import strategy_name
 from infoset.sim.statistics import shown_quantiles
 
@@ -84,6 +88,8 @@ class _ChosenNoise(NamedTuple):
 
 def run(options: Experiment) -> None:
     """Simulate the curves, write the files and print the table."""
+    if options.runs == NEEDED:
+        options = replace(options, runs=least_runs(USUAL_REQUIREMENT.share, watched=True))
     scenario = scenario_with(options)
     own = own_strategy(options.strategy)
     noise = _noise_of(options, scenario)
@@ -94,7 +100,11 @@ def run(options: Experiment) -> None:
         *b_plane_figures(scenario, noises),
     ]
 
-    with work_of(options, scenario, ["results.csv", *figure_files(*figures)]) as work:
+    notes = []
+    if scenario.body is not None:
+        notes = needed_notes(USUAL_REQUIREMENT, options.runs)
+    files = ["results.csv", *figure_files(*figures)]
+    with work_of(options, scenario, files, notes=notes) as work:
         if scenario.range_sensor is None:
             cases = f"{noise.name} and game noise only"
             if is_of_paper(scenario):
