@@ -119,6 +119,11 @@ class Thruster:
         """Whether the times of single impulses are given, as a list or by a period."""
         return bool(self.impulses_s) or self.impulse_period_s is not None
 
+    @property
+    def has_times(self) -> bool:
+        """Whether times before the nominal arrival are given."""
+        return bool(self.impulses_s or self.last_impulse_s or self.first_impulse_s)
+
     def impulse_steps(self, arrival_s: float, step_s: float) -> Sequence[int] | None:
         """Return the steps in which impulses can be given; None is every step from `delay_steps`.
 
@@ -171,7 +176,9 @@ class Thruster:
 
     def _periodic_steps(self, period_s: float, arrival_s: float, step_s: float) -> list[int]:
         """Return the steps of impulses every period, counted back from the cut-off."""
-        if period_s < step_s * (1.0 - STEP_ROUNDING):
+        # The asked step is shorter than the fitted one by at most this factor (`fitted_step_s`).
+        fitting = 1.0 - 0.5 * step_s / arrival_s
+        if period_s < step_s * fitting * (1.0 - STEP_ROUNDING):
             raise ValueError(
                 f"thruster.impulse_period_s must be at least a step, {step_s:g} s: got {period_s!r}"
             )

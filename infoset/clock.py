@@ -1,4 +1,8 @@
-"""Times before the nominal arrival on a grid of steps: a time means the nearest step."""
+"""Times before the nominal arrival on a grid of steps: a time means the nearest step.
+
+If times before the arrival are asked for, the length of the step is changed slightly so that the
+nominal arrival is a whole number of steps after the start.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +14,22 @@ STEP_ROUNDING = 1e-9
 A flight has at most 1e5 steps, and a subtraction and a division round their number by at most
 4e-11. Times of a file are decimals with far fewer digits.
 """
+
+
+def fitted_step_s(arrival_s: float, step_s: float) -> float:
+    """Return the step, s, that is nearest to an asked one and divides the time to the arrival.
+
+    It differs from the asked step by at most 1/(2N - 1) of it, with the number N of steps.
+
+    Parameters
+    ----------
+    arrival_s, step_s : float
+        Time from the start to the nominal arrival, and the asked length of a step, s.
+    """
+    number = max(1, round(arrival_s / step_s))
+    if abs(arrival_s / step_s - number) <= STEP_ROUNDING:
+        return step_s
+    return arrival_s / number
 
 
 def steps_between(start_s: float, time_s: float, step_s: float) -> int:

@@ -316,7 +316,7 @@ class SetModel(SetSettings):
         super().__post_init__()
         if len(self.axes) == 1:
             self._check_planar()
-        self.check_period(self.angle_sensor)
+        check_period(self.angle_sensor, self.step_s)
         self.check_start("bounds", self.bounds)
         nearest_m = CENTROID_ERRORS_AT_THRESHOLD * self.angle_sensor.centroid_error_m
         if self.range_threshold_m < nearest_m:
@@ -379,22 +379,6 @@ class SetModel(SetSettings):
             pointing_error_rad=0.0,
         )
 
-    def check_period(self, sensor: Sensor) -> None:
-        """Refuse a sensor whose period is not a whole number of steps.
-
-        Raises
-        ------
-        ValueError
-            If the period is not a whole number of steps.
-        """
-        steps = sensor.period_s / self.step_s
-        whole = self.steps_in(sensor.period_s)
-        if abs(steps - whole) > WHOLE_STEPS_TOLERANCE * whole:
-            raise ValueError(
-                f"{sensor.table}.period_s must be a whole number of steps of {self.step_s!r} s: "
-                f"got {sensor.period_s!r} s"
-            )
-
     def check_start(self, name: str, box: StateBox) -> None:
         """Refuse starts below the range threshold, or without a positive error bound.
 
@@ -440,7 +424,7 @@ class SetModel(SetSettings):
 
     def steps_in(self, period_s: float) -> int:
         """Return the number of steps between two measurements, at least one."""
-        return max(1, round(period_s / self.step_s))
+        return steps_of_period(period_s, self.step_s)
 
     @property
     def min_range_m(self) -> float:
@@ -468,3 +452,25 @@ class SetModel(SetSettings):
                 f"closing_speed_m_s, {self.closing_speed_m_s:g} m/s"
             )
         return minimum / (1.0 + eta), maximum / (1.0 - eta)
+
+
+def steps_of_period(period_s: float, step_s: float) -> int:
+    """Return the number of steps between two measurements, at least one."""
+    return max(1, round(period_s / step_s))
+
+
+def check_period(sensor: Sensor, step_s: float) -> None:
+    """Refuse a sensor whose period is not a whole number of steps.
+
+    Raises
+    ------
+    ValueError
+        If the period is not a whole number of steps.
+    """
+    steps = sensor.period_s / step_s
+    whole = steps_of_period(sensor.period_s, step_s)
+    if abs(steps - whole) > WHOLE_STEPS_TOLERANCE * whole:
+        raise ValueError(
+            f"{sensor.table}.period_s must be a whole number of steps of {step_s!r} s: got "
+            f"{sensor.period_s!r} s"
+        )

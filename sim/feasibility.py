@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from infoset.clock import STEP_ROUNDING
 from infoset.guidance.authority import max_correctable_m
 from infoset.sim.closed_form import PossibleMiss, possible_miss
 from infoset.sim.draws import draw_starts
@@ -76,7 +77,7 @@ def feasibility(scenario: Scenario) -> Feasibility | None:
     by_budget = max_correctable_m(times_s, thruster, to_go_s, budget=thruster.budget_m_s)
     radius_m = scenario.radius_m or 0.0
     return Feasibility(
-        steps=int(arrival_s / model.step_s),
+        steps=int(arrival_s / model.step_s + STEP_ROUNDING),
         images=len(image_times_s(scenario)),
         decisions=int((times_s < arrival_s).sum()),
         unguided_miss_m=float(unguided_m.max()),

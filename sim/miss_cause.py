@@ -134,7 +134,7 @@ class DecisionLog:
         thruster = self._scenario.thruster
         number = len(self._steps)
         steps = np.array(self._steps, dtype=np.int64) + thruster.delay_steps
-        times_s: Floats = self._scenario.step_s * steps.astype(np.float64)
+        times_s: Floats = self._scenario.fitted_step_s * steps.astype(np.float64)
         flights = _AtDecisions(
             self._misses_without_impulses_m(steps, times_s, lateral_miss_m, arrival_s),
             self._tracking[:number],

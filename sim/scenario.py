@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from infoset.arrays import Floats
+from infoset.clock import fitted_step_s
 from infoset.guidance.noise import NoiseSource, TieRule
 from infoset.guidance.noise_registry import NoiseKind
 from infoset.guidance.strategy import Strategy
@@ -27,7 +28,7 @@ from infoset.limits import (
     check_fields,
     shown,
 )
-from infoset.model import SetModel, SetSettings, StateBox
+from infoset.model import SetModel, SetSettings, StateBox, check_period
 from infoset.sensors import AngleSensor, BearingSensor, Camera, RangeSensor, RateSensor, Sensor
 from infoset.sim.covariance import Covariance
 from infoset.sim.wrong_images import WrongImages, WrongRanges
@@ -164,7 +165,8 @@ class Scenario:
         Range at the start, m, and closing speed e, m/s, of the nominal motion, which the on-board
         model believes in.
     step_s : float
-        The step Delta of observation and control, s.
+        The step Delta of observation and control, s. With times before the arrival it is the asked
+        step, and flights have `fitted_step_s`.
     strategy : str
         Name of the guidance strategy.
     noise, tie : NoiseKind, TieRule
@@ -237,7 +239,7 @@ class Scenario:
     def __post_init__(self) -> None:
         check_fields(self)
         for sensor in self.sensors.values():
-            self.set_model.check_period(sensor)
+            check_period(sensor, self.step_s)
         self._check_axes()
         self._check_covariance()
         # Properties that raise ValueError: if the thruster can give no impulse, and if the closing
@@ -296,11 +298,15 @@ class Scenario:
         """Knowledge and assumptions on board, without gravity and the errors of the engine
         (`infoset.sim.gravity`).
         """
+        step_s = self.fitted_step_s
+        sensor = self.bearing_sensor
+        if step_s != self.step_s:
+            sensor = replace(sensor, period_s=sensor.period_s / self.step_s * step_s)
         return SetModel(
             closing_speed_m_s=self.closing_speed_m_s,
-            step_s=self.step_s,
+            step_s=step_s,
             bounds=self.uncertainty,
-            angle_sensor=self.bearing_sensor,
+            angle_sensor=sensor,
             **vars(self.information_set),
         )
 
@@ -378,6 +384,18 @@ class Scenario:
         """Time from the start to x = 0 at the nominal range and closing speed, s."""
         return self.nominal_range_m / self.closing_speed_m_s
 
+    @cached_property
+    def fitted_step_s(self) -> float:
+        """The step of flights, s.
+
+        If the scenario has times before the nominal arrival, the arrival is a whole number of these
+        steps after the start, so that the times are exact; otherwise it is `step_s`.
+        """
+        has_times = self.thruster.has_times or self.bearing_sensor.has_times
+        if not has_times:
+            return self.step_s
+        return fitted_step_s(self.nominal_arrival_s, self.step_s)
+
     @property
     def correlation_time_s(self) -> float:
         """Time constant of correlated errors, s."""
@@ -388,7 +406,7 @@ class Scenario:
     @property
     def impulse_steps(self) -> Sequence[int] | None:
         """Steps in which impulses can be given; None is every step from the delay on."""
-        return self.thruster.impulse_steps(self.nominal_arrival_s, self.step_s)
+        return self.thruster.impulse_steps(self.nominal_arrival_s, self.fitted_step_s)
 
     @property
     def is_spatial(self) -> bool:

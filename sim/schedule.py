@@ -36,6 +36,9 @@ class Schedule:
         arrival, decreasing.
     images_before_last_decision : int
         Number of images until the last decision of an impulse.
+    true_arrivals_s : tuple of float
+        Earliest and latest arrival of the starts of the dispersion without impulses and gravity, s
+        after the nominal one.
     differences : tuple of Difference
         Times of the scenario that differ by more than a tenth of a step from the schedule.
     """
@@ -43,13 +46,14 @@ class Schedule:
     images_s: tuple[float, ...]
     impulses_s: tuple[float, ...]
     images_before_last_decision: int
+    true_arrivals_s: tuple[float, float]
     differences: tuple[Difference, ...]
 
 
 def schedule(scenario: Scenario) -> Schedule | None:
     """Return the schedule; None if the nominal arrival is more than `MAX_STEPS` away."""
     arrival_s = scenario.nominal_arrival_s
-    step_s = scenario.step_s
+    step_s = scenario.fitted_step_s
     if arrival_s > MAX_STEPS * step_s:
         return None
 
@@ -63,7 +67,21 @@ def schedule(scenario: Scenario) -> Schedule | None:
     reported_s = REPORTED_DIFFERENCE * step_s
     asked = [*_asked_images(scenario, images_s), *_asked_impulses(scenario, impulses_s)]
     differences = tuple(each for each in asked if abs(each.scheduled_s - each.asked_s) > reported_s)
-    return Schedule(images_s, impulses_s, len(image_times_s(scenario)), differences)
+    return Schedule(
+        images_s,
+        impulses_s,
+        len(image_times_s(scenario)),
+        _true_arrivals_s(scenario),
+        differences,
+    )
+
+
+def _true_arrivals_s(scenario: Scenario) -> tuple[float, float]:
+    """Return the earliest and the latest arrival of `Schedule`."""
+    box = scenario.dispersion
+    fastest_m_s, slowest_m_s = -box.vx_m_s[0], -box.vx_m_s[1]
+    nominal_s = scenario.nominal_arrival_s
+    return box.x_m[0] / fastest_m_s - nominal_s, box.x_m[1] / slowest_m_s - nominal_s
 
 
 def image_times_s(scenario: Scenario) -> list[float]:
@@ -90,13 +108,13 @@ def images_until(scenario: Scenario, last_step: int) -> Iterator[int]:
     sensor = scenario.bearing_sensor
     period_steps = scenario.set_model.steps_in(sensor.period_s)
     for step in reversed(range(0, last_step + 1, period_steps)):
-        if sensor.measures_at(scenario.nominal_arrival_s - step * scenario.step_s):
+        if sensor.measures_at(scenario.nominal_arrival_s - step * scenario.fitted_step_s):
             yield step
 
 
 def _before_s(scenario: Scenario, steps: Sequence[int]) -> tuple[float, ...]:
     """Return the times of steps before the nominal arrival, s."""
-    return tuple(scenario.nominal_arrival_s - step * scenario.step_s for step in steps)
+    return tuple(scenario.nominal_arrival_s - step * scenario.fitted_step_s for step in steps)
 
 
 def _asked_images(scenario: Scenario, images_s: Sequence[float]) -> Iterator[Difference]:
@@ -115,7 +133,7 @@ def _asked_impulses(scenario: Scenario, scheduled_s: Sequence[float]) -> Iterato
     """
     thruster = scenario.thruster
     arrival_s = scenario.nominal_arrival_s
-    step_s = scenario.step_s
+    step_s = scenario.fitted_step_s
 
     def nearest_step(key: str, time_s: float) -> Difference:
         step = steps_between(arrival_s, time_s, step_s)

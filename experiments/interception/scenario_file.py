@@ -19,7 +19,7 @@ from infoset.sim.closed_form import PossibleMiss
 from infoset.sim.feasibility import Feasibility, feasibility
 from infoset.sim.gravity import on_board_model
 from infoset.sim.scenario import MAX_STEPS, Scenario, Target
-from infoset.sim.schedule import images_until, schedule
+from infoset.sim.schedule import Schedule, images_until, schedule
 
 FAR = 10.0
 """Ratio of the nominal range to the possible ranges from which a warning reports it.
@@ -225,11 +225,11 @@ def flight_facts(scenario: Scenario) -> list[str]:
     if found is None:
         return []
 
+    steps = f"{found.steps} steps of {_seconds(scenario.fitted_step_s)} s"
+    if scenario.fitted_step_s != scenario.step_s:
+        steps += f" (asked: {scenario.step_s:g} s)"
     lines = [
-        (
-            f"flight: {duration_text(scenario.nominal_arrival_s)} in {found.steps} steps of "
-            f"{scenario.step_s:g} s"
-        ),
+        f"flight: {duration_text(scenario.nominal_arrival_s)} in {steps}",
         *schedule_lines(scenario),
         (
             f"miss without impulses: up to {length_text(found.unguided_miss_m)}; all impulses "
@@ -272,6 +272,7 @@ def schedule_lines(scenario: Scenario) -> list[str]:
             "last decision of an impulse"
         ),
         f"possible impulses: {_span(times.impulses_s)}",
+        _arrivals_line(scenario, times),
     ]
 
     by_key: dict[str, list[str]] = {}
@@ -287,6 +288,19 @@ def schedule_lines(scenario: Scenario) -> list[str]:
         lines.append(f"{line} (nearest possible times)")
 
     return lines
+
+
+def _arrivals_line(scenario: Scenario, times: Schedule) -> str:
+    """Return the line about the true arrivals and the time of the last impulse before them."""
+    earliest_s, latest_s = times.true_arrivals_s
+    line = f"true arrival: from {earliest_s:+.4g} s to {latest_s:+.4g} s after the nominal arrival"
+    if scenario.impulse_steps is None or not times.impulses_s:
+        return line
+    last_s = times.impulses_s[-1]
+    return (
+        f"{line}; the last impulse is {_seconds(last_s + earliest_s)} s to "
+        f"{_seconds(last_s + latest_s)} s before it"
+    )
 
 
 def _span(before_s: Sequence[float]) -> str:
@@ -315,7 +329,9 @@ def schedule_json(scenario: Scenario) -> dict[str, Any] | None:
 
     return {
         "nominal_arrival_s": scenario.nominal_arrival_s,
-        "step_s": scenario.step_s,
+        "true_arrivals_s": times.true_arrivals_s,
+        "step_s": scenario.fitted_step_s,
+        "asked_step_s": scenario.step_s,
         "images": {
             **ends(times.images_s),
             "before_last_decision": times.images_before_last_decision,

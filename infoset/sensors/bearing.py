@@ -135,6 +135,11 @@ class BearingSensor(Sensor):
         """Return the error bound at the true range, rad."""
         return self.error_bounds(sight.range_m)
 
+    @property
+    def has_times(self) -> bool:
+        """Whether times before the nominal arrival are given."""
+        return self.first_image_s is not None or self.last_image_s > 0.0
+
     def measures_at(self, before_arrival_s: float) -> bool:
         """Return whether the image at a time before the nominal arrival, s, is taken.
 

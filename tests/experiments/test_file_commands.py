@@ -22,6 +22,7 @@ FACTS = [
     "flight",
     "images",
     "possible impulses",
+    "true arrival",
     "miss without impulses",
     (
         "miss that the images and the speeds of [uncertainty] leave possible, with errors at "
@@ -29,8 +30,6 @@ FACTS = [
     ),
 ]
 CAMERA_FACT = "miss that the images alone leave possible, with errors at their bounds (closed form)"
-TIMES = ["camera.first_image_s", "thruster.impulses_s"]
-"""Facts of deep-impact-2005, whose times are not those of its steps."""
 
 
 @pytest.mark.parametrize("noun", MINE)
@@ -69,8 +68,6 @@ def test_a_built_in_file_is_shown_copied_checked_and_written_again(
     expected = FACTS if noun == "scenarios" else []
     if name in ("dart-2022", "deep-impact-2005", "haiv-2013"):
         expected = [*FACTS[:-1], CAMERA_FACT, FACTS[-1]]
-    if name == "deep-impact-2005":
-        expected = [*expected[:3], *TIMES, *expected[3:]]
     assert [fact.partition(":")[0] for fact in facts] == expected
     found = json.loads(infoset(noun, "check", "mine.toml", "--json")[1])
     assert (found["name"], found.get("kind", SCENARIO)) == ("mine", file.kind)
@@ -78,23 +75,29 @@ def test_a_built_in_file_is_shown_copied_checked_and_written_again(
 
 
 def test_check_prints_the_schedule_that_will_happen(infoset: Command) -> None:
-    """24 h at 10.3 km/s and 15 s are 5592 steps and 3.495 s."""
+    """864000 km at 10.3 km/s are 83883.495 s: 5592 steps of 15.000625 s."""
     _, out, _ = infoset("scenarios", "check", "deep-impact-2005")
-    assert out.splitlines()[1:6] == [
-        "flight: 23.3 h in 5592 steps of 15 s",
-        "images: 481, from 7203.495 s to 3.495146 s before the nominal arrival; "
+    assert out.splitlines()[1:5] == [
+        "flight: 23.3 h in 5592 steps of 15.00063 s (asked: 15 s)",
+        "images: 480, from 7200.3 s to 15.00063 s before the nominal arrival; "
         "431 before the last decision of an impulse",
-        "possible impulses: 3, from 5403.495 s to 753.4951 s before the nominal arrival",
-        "camera.first_image_s: 7203.495 s instead of 7200 s (nearest possible times)",
-        "thruster.impulses_s: 5403.495 s instead of 5400 s; 2103.495 s instead of 2100 s; "
-        "753.4951 s instead of 750 s (nearest possible times)",
+        "possible impulses: 3, from 5400.225 s to 750.0313 s before the nominal arrival",
+        "true arrival: from -8.926 s to +8.927 s after the nominal arrival; the last impulse is "
+        "741.1053 s to 758.9581 s before it",
     ]
     found = json.loads(infoset("scenarios", "check", "deep-impact-2005", "--json")[1])
     schedule = found["schedule"]
-    assert schedule["images"]["number"] == 481
+    assert schedule["asked_step_s"] == 15.0
+    assert schedule["step_s"] == pytest.approx(864e6 / 10.3e3 / 5592)
+    assert schedule["images"]["number"] == 480
     assert schedule["impulses"]["number"] == 3
-    assert schedule["impulses"]["last_s"] == pytest.approx(864e6 / 10.3e3 - 5542 * 15.0)
-    assert [each["asked_s"] for each in schedule["differences"]] == [7200.0, 5400.0, 2100.0, 750.0]
+    assert schedule["impulses"]["last_s"] == pytest.approx(50 * 864e6 / 10.3e3 / 5592)
+    # The starts of [dispersion]: 863950 to 864050 km, 10.2995 to 10.3005 km/s.
+    nominal_s = 864e6 / 10.3e3
+    assert schedule["true_arrivals_s"] == pytest.approx(
+        [863950e3 / 10300.5 - nominal_s, 864050e3 / 10299.5 - nominal_s]
+    )
+    assert schedule["differences"] == []
     assert set(found["possible_miss"]) == {"images_m", "images_and_speeds_m"}
 
 

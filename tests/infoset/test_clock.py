@@ -8,7 +8,7 @@ from fractions import Fraction
 
 import pytest
 
-from infoset.clock import steps_between
+from infoset.clock import fitted_step_s, steps_between
 
 
 def nearest_step(start_s: Fraction, time_s: Fraction, step_s: Fraction) -> int:
@@ -62,3 +62,19 @@ def test_step_of_a_time_is_before_the_arrival(
     start_s: float, time_s: float, step_s: float, step: int
 ) -> None:
     assert steps_between(start_s, time_s, step_s) == step
+
+
+@pytest.mark.parametrize(
+    ("arrival_s", "step_s", "fitted_s"),
+    [
+        (100.0, 8.0, 100.0 / 12),  # 12.5 steps: of two equally near numbers the even one
+        (100.0, 7.0, 100.0 / 14),
+        (100.0, 10.0, 10.0),
+        (3.0, 10.0, 3.0),
+        (0.3, 0.1, 0.1),  # 0.3 / 0.1 is less than 3 in floats
+    ],
+)
+def test_fitted_step_divides_the_time_to_the_arrival(
+    arrival_s: float, step_s: float, fitted_s: float
+) -> None:
+    assert fitted_step_s(arrival_s, step_s) == fitted_s

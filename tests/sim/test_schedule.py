@@ -19,7 +19,7 @@ from infoset.sim.schedule import Difference, image_times_s, schedule
 
 LATE = Path(__file__).parent / "cases" / "late-cut-off.toml"
 ARRIVAL_S = 124200123.4598 / 11500.03425967
-"""Nominal arrival of the case, s: 0.0214 s before 180 steps of 60 s."""
+"""Nominal arrival of the case, s: 0.0214 s before 180 steps of 60 s; flights have 180 steps."""
 
 
 def changed(scenario: Scenario, images: dict[str, Any], impulses: dict[str, Any]) -> Scenario:
@@ -33,15 +33,15 @@ def test_the_last_impulse_and_image_are_nearest_to_their_times() -> None:
     found = schedule(load_scenario(LATE))
     assert found is not None
     assert (len(found.images_s), found.images_s[0]) == (180, ARRIVAL_S)
-    assert found.images_s[-1] == pytest.approx(59.97856, abs=1e-5)
+    assert found.images_s[-1] == pytest.approx(ARRIVAL_S / 180)
     assert (len(found.impulses_s), found.impulses_s[0]) == (179, ARRIVAL_S)
-    assert found.impulses_s[-1] == pytest.approx(119.97856, abs=1e-5)
+    assert found.impulses_s[-1] == pytest.approx(2 * ARRIVAL_S / 180)
     assert found.images_before_last_decision == 179
     assert found.differences == ()
 
 
 def test_cut_off_is_at_the_step_nearest_to_its_time() -> None:
-    """A cut-off at 120 s equals one at 119.98 s, the time of the step.
+    """A cut-off at 120 s equals one at 119.98 s: the step is at 119.9998 s.
 
     A cut-off at the step before leaves a larger miss.
     """
@@ -104,7 +104,8 @@ def test_a_period_gives_the_flights_of_the_list_of_its_times(brief: Scenario) ->
 
 
 def test_times_that_differ_by_more_than_a_tenth_of_a_step_are_differences(brief: Scenario) -> None:
-    arrival_s = brief.nominal_arrival_s  # 10.2586 s, with steps of 0.5 s
+    brief = replace(brief, nominal_range_m=10.0 * brief.closing_speed_m_s)
+    arrival_s = brief.nominal_arrival_s  # 10 s, with steps of 0.5 s
     images = {"first_image_s": arrival_s - 2.04, "last_image_s": arrival_s - 8.06}
     impulses = {"impulses_s": (arrival_s - 2.96, arrival_s - 5.24, arrival_s - 9.0)}
     found = schedule(changed(brief, images, impulses))
@@ -118,6 +119,7 @@ def test_times_that_differ_by_more_than_a_tenth_of_a_step_are_differences(brief:
 def test_times_of_a_period_are_differences_if_it_is_not_a_whole_number_of_steps(
     brief: Scenario,
 ) -> None:
+    brief = replace(brief, nominal_range_m=10.0 * brief.closing_speed_m_s)
     arrival_s = brief.nominal_arrival_s
     impulses = {
         "last_impulse_s": arrival_s - 9.0,
@@ -131,6 +133,60 @@ def test_times_of_a_period_are_differences_if_it_is_not_a_whole_number_of_steps(
         ("thruster.impulse_period_s", 6.0),
         ("thruster.impulse_period_s", 2.5),
     ]
+
+
+@pytest.mark.parametrize(
+    ("arrival_s", "step_s", "asked_s", "scheduled_s"),
+    [
+        (10799.9786, 60.0, (5400.0, 2100.0, 750.0, 120.0), (5399.989, 2099.996, 779.998, 119.9998)),
+        (10790.0, 60.0, (120.0,), (119.889,)),
+        (14404.32, 10.0, (150.0, 20.0), (150.045, 20.006)),
+        (83883.495, 15.0, (5400.0, 2100.0, 750.0), (5400.225, 2100.0875, 750.03125)),
+        (14400.0, 10.0, (150.0,), (150.0,)),
+    ],
+)
+def test_times_are_kept_if_the_arrival_is_no_whole_number_of_steps(
+    arrival_s: float, step_s: float, asked_s: tuple[float, ...], scheduled_s: tuple[float, ...]
+) -> None:
+    dart = load_scenario("dart-2022")
+    scenario = replace(
+        dart,
+        nominal_range_m=arrival_s * dart.closing_speed_m_s,
+        step_s=step_s,
+        camera=replace(dart.bearing_sensor, period_s=step_s),
+        thruster=replace(dart.thruster, last_impulse_s=None, impulses_s=asked_s),
+    )
+    found = schedule(scenario)
+    assert found is not None
+    assert found.impulses_s == pytest.approx(scheduled_s, abs=5e-4)
+    assert found.images_s[0] == scenario.nominal_arrival_s
+
+
+def test_step_is_the_asked_one_without_times_or_with_a_whole_number_of_steps(
+    brief: Scenario,
+) -> None:
+    assert brief.set_model.step_s == 0.5
+    cut_off = {"last_impulse_s": 2.0}
+    assert changed(brief, {}, cut_off).set_model.step_s == pytest.approx(595e3 / 58e3 / 21)
+    whole = replace(brief, nominal_range_m=10.0 * brief.closing_speed_m_s)
+    assert changed(whole, {}, cut_off).set_model.step_s == 0.5
+
+
+def test_impulses_every_asked_step_are_every_step(brief: Scenario) -> None:
+    """Flights have 20 steps of 0.5125 s, longer than the period."""
+    longer = replace(brief, nominal_range_m=10.25 * brief.closing_speed_m_s)
+    scenario = changed(longer, {}, {"last_impulse_s": 1.0, "impulse_period_s": 0.5})
+    assert scenario.impulse_steps == [*range(19)]
+
+
+def test_true_arrivals_are_those_of_the_fastest_and_the_slowest_start() -> None:
+    dart = load_scenario("dart-2022")
+    found = schedule(dart)
+    assert found is not None
+    box = dart.dispersion
+    assert found.true_arrivals_s == pytest.approx(
+        (box.x_m[0] / -box.vx_m_s[0] - 14400.0, box.x_m[1] / -box.vx_m_s[1] - 14400.0)
+    )
 
 
 def test_step_at_the_arrival_is_not_in_the_schedule(brief: Scenario) -> None:
