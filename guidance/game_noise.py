@@ -116,6 +116,9 @@ class GameNoise:
         return np.where(side == 0.0, chosen, shifted)
 
     def _upper_is_worse(self, miss: PredictedMiss, step: int) -> Flags:
+        """Return where the upper extreme is kept, shape (C, B): the one of the greater modulus, or
+        at a tie the one that the rule names.
+        """
         upper = np.abs(miss.upper_m)
         lower = np.abs(miss.lower_m)
         is_tie = np.abs(upper - lower) <= TIE_TOLERANCE * (miss.upper_m - miss.lower_m)
@@ -144,6 +147,11 @@ def _angle(
     miss: PredictedMiss,
     upper_is_worse: Flags,
 ) -> Floats:
+    """Return the measured angles that keep the worse extreme, shape (C, B).
+
+    `angles` are the minimum and the maximum angle of the set, and the ranges where it has them.
+    Which of the two extremes has the larger angle does not follow from their misses.
+    """
     upper = miss.upper_point
     lower = miss.lower_point
     worst = np.where(upper_is_worse, upper.alpha_rad, lower.alpha_rad)
@@ -169,6 +177,11 @@ def _range(
     miss: PredictedMiss,
     upper_is_worse: Flags,
 ) -> Floats:
+    """Return the measured ranges that keep the worse extreme, shape (B,).
+
+    A measured range m agrees with the ranges from m / (1 + e) to m / (1 - e), with the relative
+    error e: a range r is an end of this interval for m = r (1 + e) and m = r (1 - e).
+    """
     upper = miss.upper_point.range_m
     lower = miss.lower_point.range_m
     error = sensor.relative_error

@@ -136,6 +136,7 @@ def _hash_of_sources(file: Path) -> str:
     files = [file]
     for source in files:
         files += [path for path in _imports(source) if path not in files]
+    # 16 digits are 64 bits: enough to tell versions apart, in the short name of a file.
     return hashlib.sha256("".join(sorted(map(_text, files))).encode()).hexdigest()[:16]
 
 

@@ -484,6 +484,7 @@ class _Dual:
         slopes = np.concatenate(self.slopes)
         missed = np.concatenate(reached)
         free = np.linalg.lstsq(slopes, missed, rcond=None)[0] if slopes.shape[1] else np.zeros(0)
+        # 1e-300, here and below: goals of zero need no control, and keep the quotients defined.
         size = max(float(np.linalg.norm(np.concatenate(self.goals))), 1e-300)
         violation = float(np.linalg.norm(missed - slopes @ free)) / size
         energy = float(self.weights @ energies)

@@ -186,7 +186,8 @@ class Planner:
                 self.acceleration_m_s2 = np.maximum(self.acceleration_m_s2, amplitudes)
 
         self.constructions: list[str] = []
-        # The order and the number are part of what a seed means: a change gives other plans.
+        # The order and the number are part of what a seed means, and so are the probabilities and
+        # sizes in the changes below, which are chosen: another number gives other plans.
         # Moves of the start are listed three times: they are chosen three times as often.
         self._changes: list[Callable[[Plans, int], None]] = [
             self._flip,

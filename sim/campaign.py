@@ -203,6 +203,7 @@ class Campaign:
         required = self.require
         if required is None and isinstance(rule, AnyRequirement):
             required = rule
+        # 32 digits of a hash, 128 bits, tell the cells of two sweeps apart.
         return Manifest(
             scenario=noise.applied_to(self.scenario),
             runs=self._max_runs,
@@ -272,6 +273,9 @@ class Campaign:
         workers: int | None,
         progress: _Progress | None,
     ) -> None:
+        """Simulate and store the chunks that the folder lacks; with a rule, those of undecided
+        cells, until the rule stops the campaign.
+        """
         cells = None
         store = folder.write
         missing: Iterator[tuple[int, range]]

@@ -266,6 +266,10 @@ class _Estimate(NamedTuple):
 
 
 def _estimated_quantile(values: Floats, level: float, watched: bool) -> _Estimate:
+    """Return a quantile, if the sample shows it, between the order statistics that enclose it.
+
+    An end is None if its rank is beyond the sample.
+    """
     size = values.size
     first, last = _ranks(size, level, watched)
     ordered = np.sort(values)

@@ -589,8 +589,8 @@ def cut_misses(
     thickness = polygon.height(points, top, -tau, 1.0) - polygon.height(points, bottom, -tau, 1.0)
     magnitude = abs(points[top, 1]) + abs(points[bottom, 1]) + tau * right.reach
     if thickness <= 16.0 * EPSILON * magnitude:
-        # All heights are equal to within the slack of a cut: the vertices of extreme V are the ends
-        # of both chains.
+        # All heights are equal to within 16 ulp, the slack of a cut (`CUT_SLACK`): the section is a
+        # segment along the level, and its vertices of extreme V are the ends of both chains.
         bottom, top = polygon.extremes(points, count, -1.0, 0.0)
 
     write_chain(right, rings, points, count, bottom, top)

@@ -84,7 +84,7 @@ class Outlines(NamedTuple):
     ----------
     labels : ndarray, shape (MAX_LABELS,)
         The labels, m, in increasing order.
-    points : ndarray, shape (C, MAX_LABELS, CAPACITY, 2)
+    points : ndarray, shape (C, MAX_LABELS, `chain_storage.CAPACITY`, 2)
         Vertices (V, z) of their sections along each axis.
     counts : ndarray of int, shape (C, MAX_LABELS)
         Numbers of vertices.

@@ -279,6 +279,7 @@ def intersect(points: Points, count: int, other: Points, other_count: int, out: 
     b_sides = sides_of(a, n, b, m)
     a_sides = sides_of(b, m, a, n)
 
+    # Up to n + m vertices inside, and two crossings on each edge.
     corners = np.empty((3 * (n + m), 2))
     made = append_inner(a, n, b, m, b_sides, corners, 0)
     made = append_inner(b, m, a, n, a_sides, corners, made)

@@ -69,6 +69,8 @@ class KeplerTour(Visits):
         known: list[tuple[Floats, list[Floats]]] = []
 
         def fly(time_s: Floats) -> ShotPath:
+            # The search begins at the known path whose times are nearest; only the last few are
+            # kept.
             nodes = self.nodes(order, time_s)
             check_times(self.start_s, nodes.arrive_s, nodes.leave_s)
             blocks = blocks_of(

@@ -116,11 +116,15 @@ def best_order(
     horizon = limits.latest_s
 
     def solve(order: tuple[int, ...], warm: Sequence[Floats], careful: bool) -> tuple[float, Path]:
+        # The objective and the path of an order, which may be partial; `warm` are times to start
+        # from.
         complete = len(order) == count
         held = limits
         enough = -np.inf
         if not complete:
             if horizon is not None:
+                # The least time of the other visits, of which the last one (the longest stay, so
+                # that this is a bound for every order of them) ends the path without a stay.
                 rest = [target for target in range(count) if target not in order]
                 later = (
                     dwell[order[-1]]

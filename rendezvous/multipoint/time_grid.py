@@ -122,6 +122,7 @@ class _TimeGrid:
         # A sum of gaps at their minimum may exceed the room by rounding.
         steps = max(room - self._count * self._min_gap_s, 0.0)
 
+        # Between two of its breaks the motion turns by about a radian.
         radians = len(tour.motion.breaks(tour.start_s, self._latest_s)) - 1
         enough = max(MIN_TIMES, int(np.ceil(TIMES_PER_RADIAN * radians)))
         size = min(enough, self._most_times())
@@ -131,6 +132,11 @@ class _TimeGrid:
         self._departures: dict[float, _Departure] = {}
 
     def search(self, progress: Callable[[float], None] | None) -> GridSearch:
+        """Return the candidates by dynamic programming, the cheapest first.
+
+        A level has the ways through one number of targets: by the set of these targets, as the bits
+        of a number, and by the last of them.
+        """
         level = {0: {START: self._start()}}
         done = 0
         total = sum(self._pairs(visits) for visits in range(1, self._count + 1))

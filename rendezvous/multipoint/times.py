@@ -345,6 +345,7 @@ def room_s(start_s: float, dwell_s: Floats, limits: TimeLimits) -> float:
     total = limits.latest_s - start_s - stays
     need = len(dwell_s) * limits.min_gap_s
     clock = max(abs(limits.latest_s), abs(start_s))
+    # The minimum gaps may fill all the time: 1e-14 of a time is more than the rounding of the sums.
     if not total > _CLOCK * clock or total < need - 1e-14 * clock:
         raise NoRoomError(
             f"{len(dwell_s)} visits do not fit before the latest time, {limits.latest_s:g} s: with "
@@ -398,7 +399,7 @@ def _descend(
     """
     if start.objective < enough:
         return start
-    # Keeps the logarithm finite where a path costs nothing.
+    # Keeps the logarithm finite where a path costs nothing; not 0 even if the start costs nothing.
     floor = 1e-30 * max(start.objective, 1e-270)
     shares = np.broadcast_to(scale, start.gaps.shape) / trials.total
     walls = 0
@@ -406,6 +407,7 @@ def _descend(
 
     def value(x: Floats) -> tuple[float, Floats]:
         nonlocal walls, lowest
+        # Whatever point is tried, no gap is below half the minimum one.
         gaps = np.maximum(x * scale, 0.5 * trials.minimum)
         trial = trials.attempt(gaps)
         if trial is None:
@@ -479,6 +481,7 @@ def _polish(trials: _Trials, best: _Trial) -> _Trial:
         outside = bool(
             (moved < minimum * (1.0 - 1e-12)).any() or moved.sum() > total * (1.0 + 1e-12)
         )
+        # The factors 1 +- 1e-12, here and below, allow for rounding.
         # Newton's method is for the neighbourhood of a minimum: a tenth of a gap, chosen.
         if outside or np.abs(move).max() > 0.1 * float(here.gaps.min()):
             break
@@ -487,6 +490,7 @@ def _polish(trials: _Trials, best: _Trial) -> _Trial:
         if trial.objective > here.objective * (1.0 + 1e-12):
             break
         here = trial
+        # The next move would be some 1e-22 of the scale: below rounding.
         if np.abs(move).max() <= 1e-11 * trials.scale:
             break
     return here if here.objective <= best.objective * (1.0 + 1e-12) else best

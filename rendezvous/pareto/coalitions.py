@@ -112,6 +112,9 @@ def analyse_coalitions(solution: EncounterSolution) -> Coalitions:
 
 
 def _worth(solution: EncounterSolution, members: tuple[int, ...], weights: Floats) -> float:
+    """Return the minimum of the weighted excess of a coalition; 0 for a craft alone, and without
+    weights.
+    """
     costs = [solution.costs[member] for member in members]
     if len(members) == 1 or not (weights[list(members)] > 0.0).any():
         return 0.0

@@ -12,8 +12,9 @@ from infoset.rendezvous._arrays import Floats
 from infoset.rendezvous.pareto.solution import EncounterSolution
 
 _CORNER = 1e-20
-"""Square of the radius of the rounded corner of a norm, relative to the distance of the farthest
-ideal.
+"""Square of the radius of the rounded corner of a norm, in units of the distance of the farthest
+ideal: a norm is greater by up to this radius, 1e-10, than the exact one, and has derivatives at its
+corner. Chosen.
 """
 
 
@@ -42,6 +43,7 @@ def min_sum_of_costs(solution: EncounterSolution) -> Floats:
         bend = np.einsum("nca,ncb->nab", roots, roots) - slopes[:, :, None] * slopes[:, None, :]
         return np.asarray(np.einsum("n,nab->ab", weights / size, bend))
 
+    # Ideals whose norm has nearly a corner: without a cost, up to ten times the radius (chosen).
     starts = [np.zeros(len(middle)), *ideals[floors < 100.0 * _CORNER]]
     minimum = minimize(
         lambda point: tuple(weights @ part for part in costs(point)),
@@ -114,6 +116,7 @@ def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
     """
     matrices = np.array([cost.matrix for cost in solution.costs])
     unit = matrices / np.trace(matrices, axis1=1, axis2=2)[:, None, None]
+    # Craft that start at one time have one M, up to a factor and rounding, which is below 1e-12.
     if not np.allclose(unit, unit[0], rtol=1e-12, atol=1e-15):
         raise ValueError(
             "the meeting nearest to a preferred one is known only for craft that start at the "
@@ -191,6 +194,8 @@ def _bound_craft(
         point = point + step[:free]
         shares = shares + step[free : free + count]
 
+    # The result of Newton's method has more digits, although rounding may make it greater by some
+    # 1e-16; if it has diverged, the search's result is better.
     if excess(point).max() <= excess(best).max() * (1.0 + 1e-9):
         best = point
     return np.asarray(best)

@@ -225,6 +225,10 @@ def _factor(craft: Craft, meeting_s: float, common: int) -> tuple[Floats, Floats
 
 
 def _craft_cost(craft: Craft, whiten: Floats, missing: Floats, opening: Floats) -> CraftCost:
+    """Return the cost |base + slope p|^2 of a craft for free values p.
+
+    `missing` is the state that lacks at p = 0, and `opening` how it changes with p.
+    """
     base = whiten @ missing
     slope = whiten @ opening
     orthogonal, upper = np.linalg.qr(slope)

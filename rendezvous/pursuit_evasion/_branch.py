@@ -166,6 +166,7 @@ def first_crossing(before: Node, after: Node, radius: float) -> float | None:
             before.distance - radius,
         ]
     )
+    # Real roots can have imaginary parts of the size of rounding.
     times = [
         float(root.real)
         for root in np.roots(cubic)

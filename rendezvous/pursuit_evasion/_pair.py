@@ -313,6 +313,7 @@ class Pair:
         return None
 
     def _linearised(self, state: Floats, tolerance: float, time_free: bool) -> _Linear | None:
+        """Return the linear equations of Newton's method at a state, or None if they fail."""
         nu = state[12:15]
         duration = float(state[15])
         distance = float(state[16])

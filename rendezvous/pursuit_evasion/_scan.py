@@ -102,6 +102,7 @@ def scan(pair: Pair, node: Node) -> Scan:
     distance = np.array([grid[i] @ (evader[i].state - pursuer[i].state)[:3] for i in both])
 
     peaks: list[Node] = []
+    # Climbs that end at one peak differ by rounding, two peaks by more than 1e-3 (chosen).
     for index in _starts(nu, distance):
         peak = _climb(pair, pursuer[both[index]], evader[both[index]], node.duration)
         if peak is not None and all(np.abs(peak.nu - other.nu).max() > 1e-3 for other in peaks):
@@ -205,7 +206,11 @@ def _starts(nu: Floats, values: Floats) -> list[int]:
 
 
 def _climb(pair: Pair, pursuer: End, evader: End, duration: float) -> Node | None:
-    """Climb h_E - h_P, whose gradient is r_E - r_P, and finish with Newton's method."""
+    """Climb h_E - h_P, whose gradient is r_E - r_P, and finish with Newton's method.
+
+    A stride is an angle, rad, along the normalised gradient; a gradient below 1e-3 gives shorter
+    ones. The first stride and its factors after a rise and after a fall are chosen.
+    """
     stride = 0.2
     for _ in range(_MAX_CLIMBING):
         rise = (evader.state - pursuer.state)[:3]

@@ -180,6 +180,11 @@ class _Pursuit:
         self._log: list[tuple[float, float, Floats]] = []
 
     def run(self, plan: Node, leg: float) -> PursuitFlight:
+        """Fly legs of a duration `leg`, each with a new plan, until the flight ends.
+
+        `plan` is the pursuer's plan, from what it observes; `own` is the evader's, from the exact
+        states, which it needs if it is optimal and the observation is not exact.
+        """
         own = plan
         while len(self._log) < _MAX_PLANS:
             apart = self._evader.start[:3] - self._pursuer.start[:3]

@@ -198,6 +198,11 @@ def orbital_axes(position_m: Floats, velocity_m_s: Floats) -> Floats:
 
 
 def _sampled(path: ExtremalPath, times: Floats, units: Units) -> PlayerHistory:
+    """Return states, thrust and switching function of a path at rising times, in SI.
+
+    The switching function is |p_v| / m plus the integral of flow |p_v| / m^2 until the end, divided
+    by its first value: thrust is best where it is positive.
+    """
     y = path.sampled(times)
     craft = path.craft
     mass = craft.mass - craft.flow * times

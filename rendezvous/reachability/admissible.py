@@ -549,6 +549,10 @@ class Maximiser:
         return with_thrust(program, lifted)
 
     def _solved(self, cost: Floats, max_gap: float = MAX_GAP) -> Optimum:
+        """Return the maximum of `cost`, by the solver that is kept for all costs.
+
+        If its result is not accurate, a program of this cost alone is solved.
+        """
         if not self._lifted.size:
             return Optimum(np.zeros(0), np.zeros(len(self._lifted.rows)))
         size = float(np.abs(cost).max())

@@ -262,6 +262,11 @@ def _follow(found: AnsweredPlan, rows: PathRows) -> bool:
 def _solved(
     problem: OutputProblem, window: int | None, rows: PathRows, spare: float
 ) -> AnsweredPlan:
+    """Return the plan of the least guarantee that keeps `rows`, by one linear program (Theorem 4).
+
+    Each vertex of M limits the guarantee; of a vertex and its opposite, one does so with both signs
+    if the errors are symmetric (`both`).
+    """
     program = SparseProgram()
     plan = PlanVariables(program, problem, window, problem.periods - 1)
     guarantee = program.variables(1)

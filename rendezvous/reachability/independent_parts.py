@@ -87,6 +87,10 @@ def _groups(problem: OutputProblem) -> Flags:
 def _part(
     problem: OutputProblem, states: Places, controls: Places, outputs: Places
 ) -> OutputProblem:
+    """Return the problem of some states, controls and outputs, which act on no others.
+
+    Generators, noise, goals and rows of the path that do not act on them are left out.
+    """
     start = problem.start
     assert isinstance(start, Zonotope)
     noise = problem.noise[:, outputs]

@@ -37,7 +37,9 @@ _ROUNDED_DECREASE = 1e-15
 """Decrease of the barrier, relative to its value, below which it is rounding. Analytic centres of
 published problems are the same from 1e-16 to 1e-11 (measured)."""
 _STILL = 1e-9
-"""Change of a control with v below which the control counts as constant, see `admissible`."""
+"""Change of a control with v, as a part of its bound, below which the control counts as constant;
+the same number as in `admissible`, where its reason stands.
+"""
 _STEPS_A_DIMENSION = 20
 """Steps of hit-and-run per dimension: with them the mean of 1500 samples is within 3 % of the
 centroid of a triangle (test_routes)."""

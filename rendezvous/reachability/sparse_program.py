@@ -156,6 +156,8 @@ class SparseProgram:
         raise NoSolutionError(f"a linear program was not solved: {solution.status}")
 
     def _stacked(self, blocks: list[_Block]) -> tuple[csr_array, Floats]:
+        """Return the rows of all blocks as one matrix, and their limits."""
+        # Empty arrays come first: there may be no block.
         first = np.cumsum([0, *(len(block.limits) for block in blocks)])
         rows = [block.rows + start for block, start in zip(blocks, first[:-1], strict=True)]
         entries = (
@@ -170,6 +172,7 @@ class SparseProgram:
 
 
 def _entries(function: Affine) -> _Block:
+    """Return the block of function(v) <= 0 or = 0: its nonzero entries, and minus its constant."""
     rows = []
     columns = []
     values = []

@@ -144,6 +144,7 @@ def _times(arrival_s: float, step_s: float) -> Floats:
 
 
 def _straight(position_m: Floats, velocity_m_s: Floats, step_s: float) -> Coasting:
+    """Return the motion without gravity, in closed form."""
     axes = len(position_m)
     times_s = _times(-position_m[-1] / velocity_m_s[-1], step_s)
     time = times_s[:, None, None]
@@ -186,6 +187,9 @@ ROW_OF_X = 8
 
 
 def _kepler(position_m: Floats, velocity_m_s: Floats, sun: Sun, step_s: float) -> Coasting:
+    """Return the motion with gravity, integrated in units of the first range and of the flight time
+    without gravity. Motion in a plane has the last two of three axes.
+    """
     axes = len(position_m)
     metres = float(position_m[-1])
     seconds = float(-position_m[-1] / velocity_m_s[-1])
@@ -235,6 +239,7 @@ def _kepler_flight(relative: Floats, craft: Floats, parameter: float) -> _Kepler
 
     def rates(_time: float, state: Floats) -> Floats:
         transition = state[TRANSITION].reshape(6, 6)
+        # 12 numbers of the two craft and 36 of the transition matrix, then 12 of `pushed`.
         changes = np.empty(60)
         changes[:48] = pair_rates(state[:48], parameter)
         # Phi^-1 (0, unit acceleration): columns of the inverse, which is symplectic.

@@ -156,6 +156,9 @@ class _Course:
 
 
 def _course(scenario: Scenario) -> _Course:
+    """Return the data of the flight, whose range and closing speed e are known: the minimum range
+    of the box is its only range.
+    """
     model = on_board_model(scenario)
     box = model.bounds
     e = model.closing_speed_m_s

@@ -166,6 +166,7 @@ def gravity_reserve(
 def _reserve_in_free_space(
     motion: Coasting, reach_m: float, thruster: Thruster, step_s: float
 ) -> GravityReserve:
+    """Return the reserve without gravity: its effects are 0, and the impulses are counted."""
     closing = motion.closing_speed_m_s
     minimum = float(closing.min())
     return GravityReserve(
@@ -226,6 +227,7 @@ def _domain(
 
 
 def _lemma_21(motion: Coasting, domain: _Domain) -> _GravityChanges:
+    """Return the bounds of Lemma 21, whose three conditions `domain` satisfies."""
     axes = motion.axes
     distances = np.linalg.norm(motion.states[:axes], axis=0)
     speeds = np.linalg.norm(motion.states[axes:], axis=0)

@@ -258,6 +258,7 @@ def _with_integers(rows: Floats, limits: Floats, origin: Floats, sizes: Floats) 
     rows = rows[~is_noise]
     limits = limits[~is_noise]
     centre, scale = exact_coordinates(exact.box())
+    # Scales are powers of two, so that scaling is exact; here the next ones below.
     least = np.ldexp(1.0, np.frexp(_LEAST_WIDTH * sizes)[1] - 1) * (sizes > 0.0)
     scale = np.maximum(scale, least)
     points = scaled_points(exact.points, centre, scale)
@@ -486,7 +487,9 @@ def settled(rough: PolytopeArrays, known: int) -> PolytopeArrays | None:
     if _is_flat(on, rough.dimension):
         return _flat_part(replace(rough, incidence=on), known)
 
-    # The incidence of the steps of the double description is finer than by distances, if it is all.
+    # First the incidence that the steps of the double description left: it tells apart even
+    # vertices that are within SNAP of each other, but may lack points of a facet. Then the
+    # incidence by distances.
     for incidence in (rough.incidence, on):
         needed = without_redundant(incidence, rough.dimension)
         is_lost = loses_points(

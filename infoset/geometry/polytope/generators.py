@@ -176,7 +176,7 @@ def polytope_of(kind: Any, centre: Floats, generators: Floats) -> Any:
         inner = _of_faces(kind, faces, span, kept)
     else:
         scale = span.scale[span.own]
-        segments = _sum_of_segments(kind, centre[span.own], kept.rows * scale)
+        segments = _sum_of_segments(kind, centre[span.own], kept.rows, scale)
         inner = segments.enlarged(kept.missed * scale)
     return inner if inner.space == len(centre) else _lifted(kind, inner, span, centre)
 
@@ -184,8 +184,8 @@ def polytope_of(kind: Any, centre: Floats, generators: Floats) -> Any:
 def _independent(generators: Floats) -> tuple[Integers, Integers]:
     """Return independent coordinates and generators of a zonotope, shapes (d,), by elimination.
 
-    Each step eliminates the coordinate in which the rest of the set is widest, until no rest is
-    wider than SNAP.
+    The generators are in coordinates in which the set is about one wide. Each step eliminates the
+    coordinate in which the rest of the set is widest, until no rest is wider than SNAP.
     """
     rest = generators.copy()
     columns: list[int] = []
@@ -198,6 +198,7 @@ def _independent(generators: Floats) -> tuple[Integers, Integers]:
 
         row = int(np.abs(rest[:, column]).argmax())
         rest -= np.outer(rest[:, column] / rest[row, column], rest[row])
+        # Exactly zero: the rounding of the elimination could be chosen again.
         rest[:, column] = 0.0
         rest[row] = 0.0
         columns.append(column)
@@ -524,9 +525,14 @@ def _ahead(points: Floats, facets: Floats, faces: Faces) -> tuple[Floats, Flags]
     return points + (is_blunt * needs)[:, None] * means, is_blunt
 
 
-def _sum_of_segments(kind: Any, centre: Floats, generators: Floats) -> Any:
-    """Return a zonotope as the sum of a parallelepiped and segments, one after the other."""
-    _, basis = _independent(generators)
+def _sum_of_segments(kind: Any, centre: Floats, rows: Floats, scale: Floats) -> Any:
+    """Return a zonotope as the sum of a parallelepiped and segments, one after the other.
+
+    Its generators are `rows`, shape (p, n), in units of `scale`, shape (n,).
+    """
+    # Independent in these units: in others, a set thinner than SNAP would have no generator.
+    _, basis = _independent(rows)
+    generators = rows * scale
     cube = kind.from_box(-np.ones(len(basis)), np.ones(len(basis)))
     found = cube.affine_map(generators[basis].T, centre)
     for row in np.delete(generators, basis, axis=0):

@@ -154,6 +154,7 @@ def around(
     if not by.any():
         return points, facets
     for k in range(len(facets)):
+        # 8 ulp are more than the n + 1 roundings of this line, each at most half an ulp.
         reach = (1.0 + 8.0 * EPS) * dot(by, np.abs(facets[k]))
         facets[k, -1] += reach + EPS * abs(facets[k, -1])
     most = ON + MAX_MOVE * by.max()
@@ -228,6 +229,7 @@ def _push(
                 factor = needs[m] / along
         step *= factor
 
+    # 1e-300: a step of zero keeps the quotient defined.
     share = min(1.0, most / math.sqrt(dot(step, step) + 1e-300))
     for j in range(len(point)):
         point[j] += share * step[j]

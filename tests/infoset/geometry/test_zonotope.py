@@ -404,6 +404,14 @@ def test_far_and_small_zonotope_keeps_its_shape() -> None:
     assert far.volume() == pytest.approx(near.volume(), rel=1e-12)
 
 
+@pytest.mark.parametrize("size", [2.0**-40, 2.0**-100])
+def test_polytope_of_a_small_zonotope_is_a_scaled_one(size: float) -> None:
+    """The sum of segments, in four dimensions, finds independent generators of any size."""
+    generators = np.random.default_rng(1).uniform(-1.0, 1.0, (6, 4))
+    small = Zonotope(np.zeros(4), size * generators).polytope()
+    assert (small.vertices == size * Zonotope(np.zeros(4), generators).polytope().vertices).all()
+
+
 def test_volume_is_computed_by_the_polytope_if_the_subsets_are_many() -> None:
     generators = np.random.default_rng(0).normal(size=(1500, 2))
     zonotope = Zonotope(np.zeros(2), generators)  # 1.1e6 pairs
