@@ -42,17 +42,17 @@ engagements (measured): with 250 it is small, and some batches remain for thread
 # average, with a standard deviation of 0.5 m. From a quarter to four times of each number the
 # average changes by 0.1 m; with 0.06 or 0.9 for FIRST_SHARE it is 0.5 m smaller (measured).
 GENERATION = 100
-"""Engagements between two selections: a few times `ELITE`."""
+"""Engagements between two selections: a few times `ELITE`; chosen, see above."""
 ELITE = 24
-"""Number of plans with the maximum values so far that are changed further."""
+"""Number of plans with the maximum values so far that are changed further; chosen, see above."""
 LINEAGE_SHARE = 6
 """Maximum number of the elite that comes from one first plan in the first part of the search: a
 quarter, so that at least four first plans compete.
 """
 YOUNG_SHARE = 0.5
-"""Share of the budget that is the first part of the search."""
+"""Share of the budget that is the first part of the search; chosen, see above."""
 FIRST_SHARE = 0.25
-"""Share of the budget for first plans."""
+"""Share of the budget for first plans; chosen, see above."""
 
 
 class Objective(Enum):
@@ -255,6 +255,7 @@ class _AdversarySearch:
     def run(
         self, budget: int, pool: ThreadPoolExecutor, progress: Callable[[float], None] | None
     ) -> None:
+        """Simulate `budget` engagements: first plans, then generations of changed plans."""
         flights = _in_chunks(*self._planner.first(max(1, round(FIRST_SHARE * budget))))
         while flights:
             for plans, emptied in pool.map(self._evaluate, *zip(*flights, strict=True)):
@@ -271,6 +272,7 @@ class _AdversarySearch:
                 flights = _in_chunks(self._planner.children(self.elite, size), None)
 
     def worst(self) -> WorstEngagement:
+        """Return the best plan of the elite, flown again alone for all its results."""
         if self.elite is None or not np.isfinite(self.elite.value[0]):
             raise NothingCountsError(
                 "in every simulated engagement the set became empty, or the miss was not finite"

@@ -362,8 +362,8 @@ def p_values(runs: ArrayLike, count: ArrayLike, share: ArrayLike) -> tuple[Float
     from scipy.special import betainc, betaln  # slow to load, and few commands need it
 
     n, k, q = (np.asarray(values, dtype=np.float64) for values in (runs, count, share))
-    # The integral of the likelihood over the shares above q is an incomplete beta function;
-    # likewise below q.
+    # The likelihood at q by the mean of the likelihood over the shares above q: their length is
+    # 1 - q, and the integral an incomplete beta function. Likewise below q.
     likelihood = k * np.log(q) + (n - k) * np.log1p(-q) - betaln(k + 1.0, n - k + 1.0)
     with np.errstate(divide="ignore", over="ignore"):
         above = np.log1p(-q) + likelihood - np.log(betainc(n - k + 1.0, k + 1.0, 1.0 - q))

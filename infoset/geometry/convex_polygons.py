@@ -179,6 +179,7 @@ class ConvexPolygons(ConvexSet):
         table[..., :2] = rows
         table[..., 2] = limits
         lines = table.reshape(-1, shape[-1], 3, 1)
+        # The kernel needs room for the four sides of its box, too.
         sets = cls.empty(shape[:-1])._make(shape[-1] + 4, kernels.intersect_lines, lines)
         if (sets.counts < 0).any():
             index = np.argwhere(sets.counts < 0)[0].tolist()

@@ -116,7 +116,8 @@ def max_disc(points: Points, count: int) -> Disc:
 
         radius += duration
         corners[:n] += duration * speeds[:n]
-        # The ends of the side have met: keep the first one.
+        # The ends of the side have met, and one of them goes: its second end, or of the last side,
+        # whose second end is corner 0, its first end. So side i still begins at corner i.
         remove_row(normals, vanishing, n)
         remove_row(corners, min(vanishing + 1, n - 1), n)
         n -= 1

@@ -106,8 +106,8 @@ def _capture(game: Game, units: Units, node: Node) -> Capture:
         direction=node.nu,
         closing_speed_m_s=node.closing * units.speed_m_s,
         curvature=node.curvature,
-        # An extremal has minus the costate of the evader (`_extremal`).
         pursuer=end(game.pursuer, node.pursuer, node.costates[0]),
+        # An extremal has minus the costate of the evader (`_extremal`).
         evader=end(game.evader, node.evader, -node.costates[1]),
         residual=node.residual,
         extremal=node,
