@@ -146,6 +146,7 @@ def draw_convergence(by_noise: dict[str, pd.DataFrame]) -> Figure:
 
 
 def _draw_quantiles(axes: Axes, sample: Floats, colour: str) -> None:
+    """Draw the quantiles of the first n values over n, with their confidence intervals."""
     # Quantiles of fewer than ten runs are not of interest: only the median would be known.
     counts = np.unique(
         np.geomspace(min(10, sample.size), sample.size, _LOOKS).astype(np.int64)

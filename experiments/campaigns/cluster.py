@@ -16,7 +16,8 @@ from infoset.sim.parallel import worker_processes
 PATIENCE_S = 8.0
 """Time limit for the scheduler's answer, and then for its workers, s; chosen."""
 RUNS_OF_A_PROCESS = 1500
-"""Minimum number of runs for each process: a process takes as long to start as a second of runs.
+"""Minimum number of runs for each process, from which processes are used instead of threads: a
+process takes a second or two to start, and so many runs take a core some seconds.
 
 Later, processes are up to 1.2 times as fast as threads, which share the interpreter's lock.
 """

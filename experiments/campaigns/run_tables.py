@@ -136,6 +136,10 @@ def _redrawn_share(runs: pd.DataFrame) -> dict[str, float]:
 
 
 def _quantiles(runs: pd.DataFrame, levels: Sequence[float]) -> dict[str, float]:
+    """Return the quantiles of the only column with their intervals, and its maximum.
+
+    NaN is a quantile that the sample does not show, and an end beyond the sample.
+    """
     (quantity,) = runs
     known = runs[quantity].dropna().to_numpy()
     names = [f"{quantity}_{level_name(level)}" for level in levels]

@@ -158,6 +158,9 @@ def limits(table: SweepTable) -> pd.DataFrame:
 
 
 def _limits_along(axis: Axis, cells: pd.DataFrame) -> Iterator[dict[str, float]]:
+    """Yield the limits of the cells along an axis: where two decided cells, between which none is
+    decided, have different decisions.
+    """
     above = above_bound(cells)
     met = (cells["requirement"] == Decision.MET.value).to_numpy()
     is_decided = met | (cells["requirement"] == Decision.NOT_MET.value)

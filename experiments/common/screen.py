@@ -209,6 +209,7 @@ class _Report:
             self._report(bar, name, done)
 
     def _report(self, bar: TaskID, name: str, done: float) -> None:
+        """Show what is done of a bar; print the estimated time once, and lines into a log."""
         self._bars.update(bar, completed=done)
         self._done[bar] = done
         now_s = self._clock()

@@ -113,6 +113,10 @@ class _Sets(NamedTuple):
 def _sets_of(
     record: Record, kept: Sequence[int], before: Mapping[int, tuple[Section, ...]]
 ) -> _Sets:
+    """Return the sets of the steps `kept`; `before` has the sets predicted to a step.
+
+    The set before a measurement is stored once: after a step that is kept it is its predicted set.
+    """
     sets = _Sets([], [])
     for previous, step in zip([-2, *kept], kept, strict=False):
         if step != previous + 1:
@@ -304,7 +308,8 @@ def computed_again(
     misses_m = {}
     sets = replayed(record.scenario, record.measured, record.impulse_m_s)
 
-    # The sets before and after the measurement of a step follow each other.
+    # The sets before and after the measurement of a step follow each other. One before it is also
+    # the set predicted from the step before.
     for number, information in enumerate(sets):
         step, is_measured = divmod(number, 2)
         if is_measured and step in wanted:

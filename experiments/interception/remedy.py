@@ -109,6 +109,7 @@ def find_remedies(task: Task, results: Results, progress: Progress) -> list[Reme
 
 
 def _remedy(task: Task, results: Results, cause: MissCause, key: str) -> Remedy:
+    """Return the least change of a key without a cause, and the hits of other runs with it."""
     scenario = task.scenario
     cores = os.cpu_count() or 1
     values = _values(scenario, key)

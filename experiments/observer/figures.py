@@ -75,7 +75,7 @@ def draw_bounds(report: ObserverReport) -> Figure:
                 "marker": "|",
                 "label": "no measurement",
             }
-            low = np.full(missing.sum(), 0.02)
+            low = np.full(missing.sum(), 0.02)  # along the lower frame, in parts of the height
             panel.plot(time[missing], low, transform=panel.get_xaxis_transform(), **mark)
         _mark_findings(report, time, (panel, width))
         panel.set_ylabel(name)
@@ -122,6 +122,7 @@ def draw_sets(report: ObserverReport) -> Figure:
     figure, ((panel,),) = subplots(115.0)
     shown = [estimate for estimate in report.estimates if not estimate.is_empty]
     shown = shown[:: -(-len(shown) // _MAX_OUTLINES)] if shown else []
+    # Lighter greys than 0.3 could not be seen, and darker ones not be told from black.
     shades = mpl.colormaps["Greys"](np.linspace(0.3, 0.9, len(shown)))
     polygons = []
     edges = []

@@ -71,6 +71,7 @@ def solve_pursuit(problem: PursuitProblem, options: Pursuit, begin: BeginProgres
 def _fly(
     solution: CaptureSolution, options: Pursuit, policy: str, begin: BeginProgress
 ) -> Feedback | None:
+    """Simulate the pursuer with feedback against a policy; None if there is no capture."""
     if solution.capture is None:
         say("no feedback: there is no capture, and so no plan to start from", options.quiet)
         return None

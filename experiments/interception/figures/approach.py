@@ -96,6 +96,9 @@ def draw_approach(records: Sequence[Record]) -> Figure:
 
 
 def _draw_possible(axes: Axes, record: Record) -> None:
+    """Draw the farthest point of the box of predicted misses, half the diagonal of the box, and the
+    miss of the true state, with the levels of the guaranteed miss and of the body.
+    """
     known = complete_steps(record)
     misses = record.predicted_miss_m[known]
     times = Clock(counts_down=True).at(record)

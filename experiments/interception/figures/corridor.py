@@ -90,6 +90,7 @@ def draw_corridor(curves: Sequence[Curve], courses: Sequence[Courses]) -> Figure
 
 
 def _draw_possible(axes: Axes, course: Courses) -> None:
+    """Draw quantiles of the possible miss while half of the runs and more have a complete set."""
     shown = np.count_nonzero(~np.isnan(course.possible_m), axis=0) >= 0.5 * len(course.possible_m)
     times = course.before_arrival_s[shown]
     axes.set_yscale("log")
@@ -107,6 +108,7 @@ def _draw_possible(axes: Axes, course: Courses) -> None:
 
 
 def _draw_impulses(axes: Axes, course: Courses) -> None:
+    """Draw quantiles of the impulses as bars, the higher ones behind the median."""
     maximum = float(course.impulse_m_s.max()) or 1.0
     minimum = float(course.impulse_m_s[course.impulse_m_s > 0.0].min(initial=maximum))
     # A factor of 2 below the smallest impulse shown, and above the largest one: a short bar is
@@ -119,7 +121,7 @@ def _draw_impulses(axes: Axes, course: Courses) -> None:
     for level, name, look in drawn:
         sizes = np.quantile(course.impulse_m_s, level, axis=0)
         given = sizes > bottom
-        # From 1e-12 m/s, below every axis: a logarithmic one has no zero.
+        # From 1e-12 m/s, far below the axis: a logarithmic one has no zero.
         axes.vlines(course.before_arrival_s[given], 1e-12, sizes[given], label=name, **look)
     axes.set(yscale="log", ylim=(bottom, 2.0 * maximum))
     plain_ticks(axes.yaxis)
