@@ -175,6 +175,7 @@ def first_to_vanish(corners: Points, normals: Points, speeds: Points, n: int) ->
             corners[j, 1] - corners[i, 1]
         ) * along_y
         closing = (speeds[i, 0] - speeds[j, 0]) * along_x + (speeds[i, 1] - speeds[j, 1]) * along_y
+        # A product, not a quotient: a side that does not become shorter is never taken.
         if length < duration * closing:
             duration = max(0.0, length) / closing
             vanishing = i

@@ -239,9 +239,11 @@ def extremes(points: Points, count: int) -> tuple[int, int, int, int]:
 def tip_move(
     points: Points, count: int, i: int, part: int, after: int, half_x: float, half_y: float
 ) -> tuple[float, float]:
-    """Move of an extreme vertex between two parts of the boundary, in boxes.
+    """Move of vertex i, in units of half the widths of the box; zero if it must be divided.
 
-    It is zero if the vertex must be divided.
+    The edge to the vertex belongs to the part `part` of the boundary and the edge from it to
+    `after`: the vertex is extreme along after - part axes, which may be one or two. A vertex that
+    is extreme along three axes is a sharp tip.
     """
     if after - part > 2:
         return 0.0, 0.0

@@ -112,6 +112,7 @@ def _plan(
             needed = _relaxation_for_start(problem, start, estimated)
             fraction = max(2.0 * fraction, needed * _MORE, _MIN_RELAXATION)
         except EmptyTubeError as error:
+            # The error's relaxation is a part of the bounds that were relaxed already.
             fraction = (fraction + error.relaxation * (1.0 + fraction)) * _MORE + _MIN_RELAXATION
 
         if fraction > _MAX_RELAXATION:

@@ -383,6 +383,8 @@ class _OptimumSearch:
         for first in range(0, self._lifted.size, group):
             mine = slice(first, first + group)
             room = 0.5 * (1.0 - float(start[mine] @ start[mine])) / scale
+            # The constraint is start . z + scale |z|^2 / 2 <= room; with |z_i| <= _REACH its left
+            # side is less than this.
             is_out_of_reach = room > group * _REACH + scale * group * _REACH**2
             if is_out_of_reach:
                 continue
