@@ -39,10 +39,16 @@ class Step(NamedTuple):
 
 @compiled
 def across(nu: Floats) -> Floats:
-    """Return two unit vectors across a unit vector and each other, shape (2, 3)."""
+    """Return two unit vectors across a unit vector and each other, shape (2, 3).
+
+    References
+    ----------
+    Duff et al. (2017), Building an orthonormal basis, revisited.
+    """
     x = nu[0]
     y = nu[1]
     z = nu[2]
+    # With the sign of z, the divisor is never nearer to zero than 1.
     sign = 1.0 if z >= 0.0 else -1.0
     a = -1.0 / (sign + z)
     b = x * y * a

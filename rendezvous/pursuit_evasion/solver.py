@@ -90,6 +90,7 @@ def solve(
 
 
 def _capture(game: Game, units: Units, node: Node) -> Capture:
+    """Return the capture at the end of an extremal, in SI."""
     time_s = node.duration * units.time_s
 
     def end(player: Player, state: Floats, costate: Floats) -> PlayerEnd:

@@ -284,7 +284,10 @@ class LiftedSets:
         return result
 
     def _tube_bounds(self) -> Floats:
-        """A state that is at its bound on the path of an optimal control needs no program."""
+        """Return the minimum and the maximum of each state at each time, shape (T + 1, n, 2).
+
+        A state that is at its bound on a path found before needs no program.
+        """
         block = self._optimum.block
         lifted, program = self._set(SetKind.TUBE, block.periods)
         # Maxima of -x and of x over the paths found so far.
