@@ -213,6 +213,7 @@ class _Checked(NamedTuple):
 def _checked_scenario(file: str, settings: Sequence[str] | None) -> _Checked:
     from infoset.experiments.interception.scenario_file import (
         all_warnings,
+        brightness_json,
         flight_facts,
         load_scenario,
         possible_miss_json,
@@ -225,6 +226,7 @@ def _checked_scenario(file: str, settings: Sequence[str] | None) -> _Checked:
         "scenario_hash": fingerprint(scenario),
         "schedule": schedule_json(scenario),
         "possible_miss": possible_miss_json(scenario),
+        "centre_of_brightness": brightness_json(scenario),
     }
     return _Checked(
         scenario.name,

@@ -112,7 +112,8 @@ class GameNoise:
             return chosen
         side = self.truth_side
         shift_m = self.shift_m[:, min(sight.step, self.shift_m.shape[1] - 1), None]
-        shifted = sensor.nearest(sight, sight.alpha_rad - side * shift_m / sight.range_m)
+        true = sensor.true_value(sight)
+        shifted = sensor.nearest(sight, true - side * shift_m / sight.range_m)
         return np.where(side == 0.0, chosen, shifted)
 
     def _upper_is_worse(self, miss: PredictedMiss, step: int) -> Flags:
@@ -154,10 +155,15 @@ def _angle(
     """
     upper = miss.upper_point
     lower = miss.lower_point
-    worst = np.where(upper_is_worse, upper.alpha_rad, lower.alpha_rad)
-    other = np.where(upper_is_worse, lower.alpha_rad, upper.alpha_rad)
+    upper_rad = sensor.expected(upper.alpha_rad, upper.range_m)
+    lower_rad = sensor.expected(lower.alpha_rad, lower.range_m)
+    worst = np.where(upper_is_worse, upper_rad, lower_rad)
+    other = np.where(upper_is_worse, lower_rad, upper_rad)
     reach = sensor.error_bounds(np.where(upper_is_worse, upper.range_m, lower.range_m))
     minimum, maximum, range_of_min, range_of_max = angles
+    minimum = sensor.expected(minimum, range_of_min)
+    maximum = sensor.expected(maximum, range_of_max)
+    true = sensor.true_value(sight)
     bound = sensor.bound(sight)
     return keep_point(
         (worst > other) | ((worst == other) & upper_is_worse),
@@ -165,8 +171,8 @@ def _angle(
         point_at_bottom=worst + reach,
         min_at_bottom=minimum + sensor.error_bounds(range_of_min),
         max_at_top=maximum - sensor.error_bounds(range_of_max),
-        lower=sight.alpha_rad - bound,
-        upper=sight.alpha_rad + bound,
+        lower=true - bound,
+        upper=true + bound,
     )
 
 

@@ -64,7 +64,11 @@ def _quantile(uniform: Floats) -> Floats:
 
 
 def gaussian_noise(
-    uniform: Mapping[str, Floats], bias: Floats | None, sigma: float, correlation: float = 0.0
+    uniform: Mapping[str, Floats],
+    bias: Floats | None,
+    sigma: float,
+    correlation: float = 0.0,
+    drift: Floats | None = None,
 ) -> RandomNoise:
     """Return a noise with truncated Gaussian errors.
 
@@ -78,11 +82,13 @@ def gaussian_noise(
         Standard deviation before the truncation, in units of the bound.
     correlation : float
         As in `correlated_uniform`, for errors that are correlated in time; 0 is independent errors.
+    drift : ndarray, shape (C, B, steps), or None
+        The same for the drift of a camera's attitude, correlated in time (`RandomNoise`).
     """
     errors = {}
     for name, independent in uniform.items():
         numbers = correlated_uniform(independent, correlation) if correlation else independent
         errors[name] = truncated_gaussian(numbers, sigma)
-    if bias is None:
-        return RandomNoise(errors)
-    return RandomNoise(errors, truncated_gaussian(bias, sigma))
+    bias_errors = None if bias is None else truncated_gaussian(bias, sigma)
+    drift_errors = None if drift is None else truncated_gaussian(drift, sigma)
+    return RandomNoise(errors, bias_errors, drift_errors)

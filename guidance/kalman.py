@@ -12,7 +12,7 @@ from infoset.guidance.estimate import MissEstimate
 from infoset.guidance.situation import Situation
 from infoset.limits import Checked, NotNegative, Positive
 from infoset.model import SetModel
-from infoset.sensors import BearingSensor, RangeSensor
+from infoset.sensors import RangeSensor
 
 Z, VZ, X, SPEED, ACCELERATION = range(5)
 """Components of a state: lateral offset, its rate, range, closing speed and lateral
@@ -129,14 +129,17 @@ class KalmanBank:
         self._measure(situation, "range", self.mean[..., X], gradient, variance)
 
     def _measure_angle(self, situation: Situation) -> None:
-        z = self.mean[..., Z]
+        model = situation.information.model
+        shifts_m = [model.axis(axis).angle_sensor.shift_m for axis in model.axes]
+        # The images show a point beside the centre.
+        z = self.mean[..., Z] + np.reshape(shifts_m, (-1, 1, 1))
         x = self._positive_ranges_m(situation)
         square = z * z + x * x
         gradient = np.zeros_like(self.mean)
         gradient[..., Z] = x / square
         gradient[..., X] = -z / square
         expected = np.arctan2(z, x)
-        variance = _independent_error_rad(situation.information.model, x) ** 2 / 3.0
+        variance = _independent_error_rad(model, x) ** 2 / 3.0
 
         precise = self._is_precise(gradient, variance)
         if precise.any():
@@ -161,7 +164,7 @@ class KalmanBank:
         mean = (weight * miss).sum(axis=-1)
         # Rounding may leave a small variance just below zero.
         spread = (weight * (np.maximum(variance, 0.0) + (miss - mean[..., None]) ** 2)).sum(axis=-1)
-        constant_m = _constant_error_m(situation.information.model.angle_sensor)
+        constant_m = _constant_error_m(situation.information.model)
         deviation = np.sqrt(spread + constant_m**2 / 3.0)
 
         lever = np.maximum(to_go - situation.lead_s, 0.0)
@@ -221,8 +224,8 @@ class KalmanBank:
         self.mean[..., X] = 0.5 * (edges[:-1] + edges[1:])
         self.mean[..., SPEED] = -0.5 * (bounds.vx_m_s[0] + bounds.vx_m_s[1])
         for axis, plane in enumerate(map(model.axis, model.axes)):
-            z_m = plane.bounds.z_m
-            vz_m_s = plane.bounds.vz_m_s
+            z_m = plane.seen_bounds.z_m
+            vz_m_s = plane.seen_bounds.vz_m_s
             self.mean[axis, ..., Z] = 0.5 * (z_m[0] + z_m[1])
             self.mean[axis, ..., VZ] = 0.5 * (vz_m_s[0] + vz_m_s[1])
             widths = [
@@ -370,13 +373,15 @@ def _independent_error_rad(model: SetModel, range_m: Floats) -> Floats:
     return bound
 
 
-def _constant_error_m(sensor: BearingSensor) -> float:
-    """Return the bound of the part of the errors that is constant in a flight, m.
+def _constant_error_m(model: SetModel) -> Floats:
+    """Return the bound of the part of the errors that is constant in a flight, m, shape (C, 1).
 
     The angles then show a point at this lateral distance from the centre, which no measurement can
     tell from the centre: the error of an estimated miss contains it unchanged.
     """
-    return sensor.centroid_error_m if sensor.has_constant_bias else 0.0
+    sensors = [model.axis(axis).angle_sensor for axis in model.axes]
+    bounds_m = [each.centroid_bound_m if each.has_constant_bias else 0.0 for each in sensors]
+    return np.reshape(bounds_m, (-1, 1))
 
 
 @dataclass(frozen=True)

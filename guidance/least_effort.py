@@ -117,7 +117,7 @@ def unavoidable_m(situation: Situation) -> Floats:
     to_go_s: Floats = whole.step_s * np.arange(1.0, math.ceil(x0 / (e * whole.step_s)))
     correctable_m = thruster.max_impulse_m_s * (np.cumsum(to_go_s) - to_go_s)
     for axis, model in enumerate(map(whole.axis, whole.axes)):
-        box = model.bounds
+        box = model.seen_bounds
         h = model.angle_sensor.error_bound
         apart_m = e * to_go_s * (h(e * to_go_s) + h(x0)) / (1.0 - e * to_go_s / x0)
         widest_m = 0.5 * (min(np.ptp(box.z_m), 2.0 * h(x0) * x0) + np.ptp(box.vz_m_s) * x0 / e)

@@ -57,6 +57,9 @@ class NoiseBatch(NamedTuple):
         Random numbers by sensor, independent and uniform in [-1, 1].
     bias : ndarray, shape (C, B), or None
         Random numbers of the constant error of a camera's centroid; None without such an error.
+    drift : ndarray, shape (C, B, steps), or None
+        Random numbers of the drift of a camera's attitude, uniform in [-1, 1] and correlated in
+        time; None without a drift.
     tie : ndarray, shape (C, B, steps)
         Random numbers of `TieRule.RANDOM`.
     worst_shift_m, target_side : callable
@@ -66,6 +69,7 @@ class NoiseBatch(NamedTuple):
 
     errors: Mapping[str, Floats]
     bias: Floats | None
+    drift: Floats | None
     tie: Floats
     worst_shift_m: Callable[[], Floats | None]
     target_side: Callable[[], Floats | None]
@@ -88,16 +92,16 @@ class _RegisteredNoise(NamedTuple):
 
 
 def _random(_settings: NoiseSettings, batch: NoiseBatch) -> MeasurementNoise:
-    return RandomNoise(batch.errors, batch.bias)
+    return RandomNoise(batch.errors, batch.bias, batch.drift)
 
 
 def _gaussian(settings: NoiseSettings, batch: NoiseBatch) -> MeasurementNoise:
-    return gaussian_noise(batch.errors, batch.bias, settings.noise_sigma)
+    return gaussian_noise(batch.errors, batch.bias, settings.noise_sigma, drift=batch.drift)
 
 
 def _correlated(settings: NoiseSettings, batch: NoiseBatch) -> MeasurementNoise:
     correlation = math.exp(-settings.step_s / settings.correlation_time_s)
-    return gaussian_noise(batch.errors, batch.bias, settings.noise_sigma, correlation)
+    return gaussian_noise(batch.errors, batch.bias, settings.noise_sigma, correlation, batch.drift)
 
 
 def _game(settings: NoiseSettings, batch: NoiseBatch) -> MeasurementNoise:

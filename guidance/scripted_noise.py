@@ -78,6 +78,9 @@ class RandomNoise(ScriptedNoise):
     bias : ndarray, shape (C, B), or None
         Constant errors of the centroid part of a camera's bound, in units of this part; `errors`
         are then errors of the pixel part. None means errors of the whole bound.
+    drift : ndarray, shape (C, B, steps), or None
+        Errors of the drift of a camera's attitude, in units of this part of the bound; `errors` are
+        then errors of the others.
 
     Raises
     ------
@@ -90,6 +93,7 @@ class RandomNoise(ScriptedNoise):
     """
 
     bias: Floats | None = None
+    drift: Floats | None = None
 
     name: ClassVar[str] = "random"
 
@@ -97,6 +101,8 @@ class RandomNoise(ScriptedNoise):
         super().__post_init__()
         if self.bias is not None:
             need_draws("bias", self.bias[..., None])
+        if self.drift is not None:
+            need_draws("drift", self.drift)
 
     def errors_of_step(self, sight: LineOfSight) -> dict[str, Floats]:
         """Return the errors of a step by sensor, in units of their bounds.
@@ -112,10 +118,15 @@ class RandomNoise(ScriptedNoise):
             If there is a bias, but `errors` has none of the camera.
         """
         errors = super().errors_of_step(sight)
-        if self.bias is None:
-            return errors
         camera = sight.sensors.get(Camera.name)
-        if isinstance(camera, Camera):
+        if not isinstance(camera, Camera):
+            return errors
+        if self.drift is not None:
+            drift = draws_of_step("drift", self.drift, sight.step, sight.shape(camera))
+            errors[camera.name] = camera.with_drift(
+                sight, errors[camera.name], drift, is_whole=self.bias is None
+            )
+        if self.bias is not None:
             errors[camera.name] = camera.with_bias(sight, errors[camera.name], self.bias)
         return errors
 

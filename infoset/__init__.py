@@ -48,6 +48,7 @@ if TYPE_CHECKING:
         RateSensor,
         Sensor,
     )
+    from infoset.sensors.jitter import Jitter, jitter
     from infoset.set_queries import Section
     from infoset.sim import GuaranteeWarning, find_worst, fly_one, lower_bound, simulate
 
@@ -85,6 +86,7 @@ _MODULES = {
         "RateSensor",
         "Sensor",
     ),
+    "infoset.sensors.jitter": ("Jitter", "jitter"),
     "infoset.set_queries": ("Section",),
     "infoset.sim": ("GuaranteeWarning", "find_worst", "fly_one", "lower_bound", "simulate"),
 }
@@ -105,6 +107,7 @@ __all__ = [
     "InformationSetView",
     "InitialSet",
     "InputError",
+    "Jitter",
     "LinearObserver",
     "Model",
     "Polytope",
@@ -121,6 +124,7 @@ __all__ = [
     "Zonotope",
     "find_worst",
     "fly_one",
+    "jitter",
     "load_problem",
     "load_record",
     "load_results",

@@ -318,13 +318,21 @@ class SetModel(SetSettings):
             self._check_planar()
         check_period(self.angle_sensor, self.step_s)
         self.check_start("bounds", self.bounds)
-        nearest_m = CENTROID_ERRORS_AT_THRESHOLD * self.angle_sensor.centroid_error_m
-        if self.range_threshold_m < nearest_m:
-            raise ValueError(
-                f"SetModel: range_threshold_m must be at least {CENTROID_ERRORS_AT_THRESHOLD:g} "
-                f"times {self.angle_sensor.table}.centroid_error_m, {nearest_m:g} m: got "
-                f"{self.range_threshold_m!r}"
-            )
+        self._check_threshold()
+
+    def _check_threshold(self) -> None:
+        """Refuse a range threshold at which the error of a camera is no small angle."""
+        sensor = self.angle_sensor
+        nearest_m = CENTROID_ERRORS_AT_THRESHOLD * sensor.farthest_m
+        if self.range_threshold_m >= nearest_m:
+            return
+        length = f"{sensor.table}.centroid_error_m"
+        if sensor.farthest_m > sensor.centroid_error_m:
+            length += " and the offset of the centre of brightness"
+        raise ValueError(
+            f"SetModel: range_threshold_m must be at least {CENTROID_ERRORS_AT_THRESHOLD:g} "
+            f"times {length}, {nearest_m:g} m: got {self.range_threshold_m!r}"
+        )
 
     def _check_planar(self) -> None:
         """Refuse values for an engagement in space."""
@@ -411,6 +419,25 @@ class SetModel(SetSettings):
             return 0.0
         e = self.closing_speed_m_s
         return max(abs(speed + e) for speed in self.bounds.vx_m_s) / e + self.gravity_speed_change
+
+    @property
+    def seen_bounds(self) -> StateBox:
+        """Possible states at t = 0 in the turned axes of a misaligned camera, of a planar model.
+
+        With the misalignment b of slopes, z + b x and V_z + b V_x have the angles that the camera
+        measures. See docs/guarantee-space.md.
+        """
+        turn = self.angle_sensor.misalignment_rad
+        if turn == 0.0:
+            return self.bounds
+        box = self.bounds
+        z_m = turn * box.x_m[1]
+        vz_m_s = turn * self.closing_speed_m_s * (1.0 + self.speed_error)
+        return replace(
+            box,
+            z_m=(box.z_m[0] - z_m, box.z_m[1] + z_m),
+            vz_m_s=(box.vz_m_s[0] - vz_m_s, box.vz_m_s[1] + vz_m_s),
+        )
 
     @property
     def acceleration_m_s2(self) -> float:

@@ -184,7 +184,7 @@ def _worst_difference(model: SetModel, images_s: Floats, arrival_s: float) -> tu
     last_s = images_s[-1]
     earlier_s = images_s[:-1] - last_s
     disturbance = model.disturbance_m_s2
-    minimum, maximum = model.bounds.vz_m_s
+    minimum, maximum = model.seen_bounds.vz_m_s
     by_images_m_s = np.min(2.0 * (bound_m[-1] + bound_m[:-1]) / earlier_s + disturbance * earlier_s)
     by_start_m_s = maximum - minimum + 2.0 * disturbance * (arrival_s - last_s)
     return bound_m[-1], min(by_images_m_s, by_start_m_s)
@@ -246,13 +246,13 @@ def possible_miss_of(scenario: Scenario, *, constant_bias: bool = False) -> floa
     along = (
         possible_miss_m(
             model.closing_speed_m_s,
-            camera.constant_error_rad,
-            camera.centroid_error_m,
+            axis.angle_sensor.constant_error_rad,
+            axis.angle_sensor.centroid_bound_m,
             float(images_s[0]),
             float(images_s[-1]),
-            disturbance_m_s2=model.axis(axis).disturbance_m_s2,
+            disturbance_m_s2=axis.disturbance_m_s2,
             constant_bias=constant_bias,
         )
-        for axis in model.axes
+        for axis in map(model.axis, model.axes)
     )
     return math.hypot(*along)

@@ -11,14 +11,15 @@ import numpy as np
 
 from infoset.arrays import Flags, Floats, Integers
 from infoset.guidance import NoiseKind, TieRule
-from infoset.sensors import Sensor
+from infoset.guidance.gaussian_noise import correlated_uniform
+from infoset.sensors import Camera, Sensor
 from infoset.sim.covariance import Covariance
 from infoset.sim.gravity import max_impulses_m_s, with_gravity
 from infoset.sim.scenario import Scenario, corners
 from infoset.sim.wrong_images import WrongImages, draw_wrong_measurements
 
 START, TIE, EXECUTION, TARGET, POINTING, BIAS, IMAGES = 0, 3, 5, 6, 7, 8, 9
-WRONG_IMAGES, WRONG_RANGES = 11, 12
+MISALIGNMENT, WRONG_IMAGES, WRONG_RANGES, DRIFT = 10, 11, 12, 13
 """Streams of a run; each kind of sensor has a separate one (`Sensor.stream`). Their numbers are
 never changed or used again: runs of a seed would change.
 """
@@ -57,6 +58,11 @@ class Draws:
     bias : ndarray, shape (C, B), or None
         Constant errors of the centroid of a camera in units of their bound; None for a camera with
         random errors.
+    misalignment : ndarray, shape (C, B), or None
+        Constant shifts of the slopes that a camera sees; None is zero.
+    drift : ndarray, shape (C, B, steps), or None
+        Errors of the drift of a camera's attitude in units of their bound, uniform in [-1, 1] and
+        correlated in time; None is zero.
     images : ndarray, shape (B, steps), or None
         Uniform in [0, 1); an image is lost if its number is less than the probability of a loss.
         None loses no image.
@@ -80,6 +86,8 @@ class Draws:
     target: Floats | None = None
     pointing: Floats | None = None
     bias: Floats | None = None
+    misalignment: Floats | None = None
+    drift: Floats | None = None
     images: Floats | None = None
     wrong: Floats | None = None
     wrong_by_noise: Flags | None = None
@@ -130,7 +138,14 @@ def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
     if scenario.noise is NoiseKind.GAME and scenario.tie is TieRule.RANDOM:
         tie = lateral(TIE)
     thruster = scenario.thruster
-    camera = scenario.set_model.angle_sensor
+    camera = scenario.bearing_sensor
+    turned = None
+    if camera.misalignment_rad > 0.0:
+        turned = camera.misalignment_rad * lateral(MISALIGNMENT, 1)[..., 0]
+    drift = None
+    if isinstance(camera, Camera) and camera.drift_rad > 0.0:
+        correlation = math.exp(-scenario.set_model.step_s / scenario.drift_time_s)
+        drift = correlated_uniform(lateral(DRIFT), correlation)
     images = None
     if camera.miss_probability > 0.0:
         images = np.stack([generator(seed, run, IMAGES).uniform(size=steps) for run in runs])
@@ -143,6 +158,8 @@ def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
         target=lateral(TARGET) if scenario.target is not None else None,
         pointing=uniform(POINTING) if thruster.pointing_error_rad > 0.0 else None,
         bias=lateral(BIAS, 1)[..., 0] if camera.has_constant_bias else None,
+        misalignment=turned,
+        drift=drift,
         images=images,
         wrong=_wrong_images(scenario, runs, seed, steps),
         wrong_ranges=_wrong_ranges(scenario, runs, seed, steps),

@@ -135,7 +135,10 @@ class Engagements:
         sight = self._flight.sight()
         pending = self._impulses.pending()
         tracking = self._flight.flying & self._information.tracking
-        measured = self._measure(sight, pending, tracking)
+        seen = sight
+        if self._draws.misalignment is not None:
+            seen = sight.turned(self._draws.misalignment)
+        measured = self._measure(seen, pending, tracking)
         miss = self._information.predicted_miss(pending)
         # A measurement may have ended the tracking of a set.
         tracking = tracking & self._information.tracking
@@ -221,7 +224,7 @@ class Engagements:
 
     def _measure(self, sight: Sight, pending: Pending, tracking: Flags) -> Measurements:
         """Measure with the sensors that are due, cut the sets, and return the values of the sensors
-        that measured.
+        that measured. `sight` is the geometry in the axes of the camera, which the sets have too.
         """
         measured = self._instruments.measure(self.step, sight, pending, tracking, self._view)
         for values, where in measured.cuts:
@@ -353,6 +356,7 @@ def _make_noise(scenario: Scenario, draws: Draws) -> MeasurementNoise:
     batch = NoiseBatch(
         errors=draws.errors,
         bias=draws.bias,
+        drift=draws.drift,
         tie=draws.tie,
         worst_shift_m=lambda: worst_shift_m(scenario),
         target_side=lambda: constant_side(scenario.target, draws.target),

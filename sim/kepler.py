@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -63,6 +63,11 @@ class Sight:
     range_m: Floats
     slope: Floats
     slope_rate_per_s: Floats
+
+    def turned(self, slope: Floats) -> Sight:
+        """Return the geometry in which all slopes are greater by a constant, shape (C, B)."""
+        turned = self.slope + slope
+        return replace(self, alpha_rad=np.arctan(turned), slope=turned)
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,16 @@ from infoset.limits import (
     shown,
 )
 from infoset.model import SetModel, SetSettings, StateBox, check_period
-from infoset.sensors import AngleSensor, BearingSensor, Camera, RangeSensor, RateSensor, Sensor
+from infoset.sensors import (
+    AngleSensor,
+    BearingSensor,
+    Camera,
+    OffsetCamera,
+    RangeSensor,
+    RateSensor,
+    Sensor,
+)
+from infoset.sensors.brightness import offset_share
 from infoset.sim.covariance import Covariance
 from infoset.sim.wrong_images import WrongImages, WrongRanges
 
@@ -72,6 +81,10 @@ STEPS_ROUNDING = 1e-9
 """Relative rounding error of the number of steps: a flight of exactly `MAX_STEPS` is allowed.
 
 Chosen: far above the rounding of a quotient, and less than one step.
+"""
+SUN_ROUNDING = 1e-9
+"""Share of the direction of the Sun along an axis that is zero: the cosine of 90 deg is 6e-17 in
+floats.
 """
 MIN_SHARE_WITHIN = 0.01
 """Minimum share of the starts of a covariance within the dispersion; a start is drawn again at most
@@ -361,14 +374,15 @@ class Scenario:
                 "the deviations"
             )
 
-    @property
+    @cached_property
     def bearing_sensor(self) -> BearingSensor:
-        """The sensor of the line-of-sight angles.
+        """The sensor of the line-of-sight angles; with a phase angle it has the offset of the
+        images.
 
         Raises
         ------
         ValueError
-            If the scenario has none, or two.
+            If the scenario has none, or two, or if a phase angle does not fit the scenario.
         """
         fitted = [sensor for sensor in (self.angle_sensor, self.camera) if sensor is not None]
         if len(fitted) != 1:
@@ -377,7 +391,37 @@ class Scenario:
                 "bound is linear in the range, or the table camera: got "
                 f"{'both' if fitted else 'neither'}"
             )
-        return fitted[0]
+        sensor = fitted[0]
+        if not isinstance(sensor, Camera) or sensor.phase_angle_rad is None:
+            return sensor
+        values = {field.name: getattr(sensor, field.name) for field in fields(Camera)}
+        return OffsetCamera(**values, offset_m=self._offset_m(sensor))
+
+    def _offset_m(self, camera: Camera) -> tuple[float, ...]:
+        """Return the offset of the centre of brightness along each lateral axis, m."""
+        phase_rad = camera.phase_angle_rad
+        sun_rad = camera.sun_angle_rad
+        if phase_rad is None or sun_rad is None:
+            return (0.0,) * len(self.uncertainty.axes)
+        if self.body is None:
+            raise ValueError(
+                "camera.phase_angle_rad needs the radius of the body, of which the offset is a "
+                "share: add the table body with radius_m"
+            )
+
+        length_m = offset_share(phase_rad, camera.brightness) * self.body.radius_m
+        along_y, along_z = (
+            0.0 if abs(share) < SUN_ROUNDING else share
+            for share in (math.cos(sun_rad), math.sin(sun_rad))
+        )
+        if len(self.uncertainty.axes) > 1:
+            return length_m * along_y, length_m * along_z
+        if along_y != 0.0:
+            raise ValueError(
+                "camera.sun_angle_rad must be along the lateral axis of a plane, 90 or -90 deg: "
+                f"got {math.degrees(sun_rad):g} deg"
+            )
+        return (math.copysign(length_m, along_z),)
 
     @property
     def nominal_arrival_s(self) -> float:
@@ -402,6 +446,13 @@ class Scenario:
         if self.noise_correlation_s is None:
             return 0.1 * self.nominal_arrival_s
         return self.noise_correlation_s
+
+    @property
+    def drift_time_s(self) -> float:
+        """Time constant of the drift of a camera's attitude, s."""
+        if self.camera is None or self.camera.drift_time_s is None:
+            return 0.1 * self.nominal_arrival_s
+        return self.camera.drift_time_s
 
     @property
     def impulse_steps(self) -> Sequence[int] | None:
@@ -442,6 +493,8 @@ def of_model(model: SetModel) -> dict[str, Any]:
     scenario.
     """
     sensor = model.angle_sensor
+    if isinstance(sensor, OffsetCamera):
+        sensor = sensor.of_file
     return {
         "closing_speed_m_s": model.closing_speed_m_s,
         "step_s": model.step_s,

@@ -26,6 +26,8 @@ MAX_VALUES = 1000
 """Maximum number of values of an axis: more than a figure can show."""
 SCALE = "scale"
 """Name, after the table of a sensor, of the factor of its error bounds."""
+DRIFT = "drift_rad"
+"""An error bound whose key does not say so."""
 _NUMBER = r"([+-]?(?:[0-9]{1,20}\.?[0-9]{0,20}|\.[0-9]{1,20})(?:[eE][+-]?[0-9]{1,4})?)"
 _RANGE = re.compile(rf"(log:)?\s*{_NUMBER}\s*:\s*{_NUMBER}\s*:\s*([0-9]{{1,9}})")
 
@@ -105,7 +107,7 @@ def _error_bounds(scenario: Scenario) -> dict[str, dict[str, float]]:
         factors[f"{sensor.table}.{SCALE}"] = {
             f"{sensor.table}.{name}": value
             for name, value in vars(sensor).items()
-            if "error" in name and value and isinstance(value, float)
+            if ("error" in name or name == DRIFT) and value and isinstance(value, float)
         }
     return factors
 

@@ -222,7 +222,7 @@ def _axis_data(record: Record, axis: int, kept: Sequence[int]) -> dict[str, obje
         "axis": name,
         "angle_error_rad": model.angle_sensor.constant_error_rad,
         "angle_error_slope_rad_m": model.angle_sensor.error_slope_rad_per_m,
-        "centroid_error_m": model.angle_sensor.centroid_error_m,
+        "centroid_error_m": model.angle_sensor.centroid_bound_m,
         "disturbance_m_s2": model.disturbance_m_s2,
     }
     unknown = np.full(record.true_angle_rad.shape, np.nan)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -15,6 +16,13 @@ from infoset.experiments.interception.strategies import is_own
 from infoset.experiments.interception.study import percent, some_wrong_images
 from infoset.guidance import strategy_names
 from infoset.model import Model, SetModel
+from infoset.sensors import OffsetCamera
+from infoset.sensors.brightness import (
+    AXIS_RATIO,
+    RADIUS_ERROR,
+    CorrectionResidual,
+    correction_residual,
+)
 from infoset.sim.closed_form import PossibleMiss
 from infoset.sim.feasibility import Feasibility, feasibility
 from infoset.sim.gravity import on_board_model
@@ -231,6 +239,7 @@ def flight_facts(scenario: Scenario) -> list[str]:
     lines = [
         f"flight: {duration_text(scenario.nominal_arrival_s)} in {steps}",
         *schedule_lines(scenario),
+        *brightness_lines(scenario),
         (
             f"miss without impulses: up to {length_text(found.unguided_miss_m)}; all impulses "
             f"correct up to {length_text(found.budget_corrects_m)}"
@@ -288,6 +297,67 @@ def schedule_lines(scenario: Scenario) -> list[str]:
         lines.append(f"{line} (nearest possible times)")
 
     return lines
+
+
+def brightness_lines(scenario: Scenario) -> list[str]:
+    """Return lines about the centre of brightness and the residual of its correction.
+
+    There are none without a phase angle.
+    """
+    camera = scenario.bearing_sensor
+    residual = _residual(scenario)
+    if not isinstance(camera, OffsetCamera) or residual is None:
+        return []
+
+    axes = scenario.set_model.axes
+    along = ", ".join(
+        f"{name} {offset_m:.3g} m" for name, offset_m in zip(axes, camera.offset_m, strict=True)
+    )
+    if camera.phase_correction:
+        use = f"the set subtracts it and allows for centroid_error_m, {camera.centroid_error_m:g} m"
+    else:
+        allowed = ", ".join(
+            f"{scenario.set_model.axis(name).angle_sensor.centroid_bound_m:.3g} m" for name in axes
+        )
+        use = f"the set does not subtract it and allows for {allowed}"
+    parts = (
+        f"{residual.size_m:.2g} m by the radius, {residual.law_m:.2g} m by the brightness, "
+        f"{residual.shape_m:.2g} m by the shape"
+    )
+    return [
+        f"centre of brightness: {math.hypot(*camera.offset_m):.3g} m from the centre ({along}); "
+        f"{use}",
+        f"residual of a correction: {residual.total_m:.3g} m ({parts}) if the radius is known to "
+        f"{percent(RADIUS_ERROR)} and the axis ratio is at least {AXIS_RATIO:g}; centroid_error_m "
+        f"is {camera.centroid_error_m:g} m",
+    ]
+
+
+def brightness_json(scenario: Scenario) -> dict[str, Any] | None:
+    """Return the key `centre_of_brightness` of JSON; None without a phase angle."""
+    camera = scenario.bearing_sensor
+    residual = _residual(scenario)
+    if not isinstance(camera, OffsetCamera) or residual is None:
+        return None
+    return {
+        "offset_m": camera.offset_m,
+        "phase_correction": camera.phase_correction,
+        "centroid_error_m": camera.centroid_error_m,
+        "residual_m": residual.total_m,
+        "residual_parts_m": residual._asdict(),
+        "radius_error": RADIUS_ERROR,
+        "axis_ratio": AXIS_RATIO,
+    }
+
+
+def _residual(scenario: Scenario) -> CorrectionResidual | None:
+    """Return the residual of a correction of the centre of brightness."""
+    camera = scenario.bearing_sensor
+    if not isinstance(camera, OffsetCamera) or scenario.body is None:
+        return None
+    return correction_residual(
+        camera.phase_angle_rad or 0.0, scenario.body.radius_m, law=camera.brightness
+    )
 
 
 def _arrivals_line(scenario: Scenario, times: Schedule) -> str:

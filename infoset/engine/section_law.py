@@ -69,6 +69,15 @@ class SectionLaw(NamedTuple):
         Part of the error bound of both angles that falls with the range x: centroid_error / x, m.
     min_range : float
         Minimum range of a label in the set, m.
+    other_centroid_error : float
+        `centroid_error` of the angle of the other axis.
+    shift, shift_error : float
+        Distance of the measured point from the centre along the axis, and the bound of its change
+        by the scale, m: o and |o| eta / (1 - eta) of (21').
+    farthest_shift : float
+        Maximum distance of the measured point from the centre along both axes, m.
+    misalignment : float
+        Bound of the difference of the slopes that the camera sees from the true ones.
     """
 
     closing_speed: float
@@ -99,6 +108,11 @@ class SectionLaw(NamedTuple):
     other: int
     centroid_error: float
     min_range: float
+    other_centroid_error: float
+    shift: float
+    shift_error: float
+    farthest_shift: float
+    misalignment: float
 
 
 Laws = NDArray[np.record]
@@ -116,6 +130,8 @@ def section_laws(model: SetModel) -> tuple[SectionLaw, ...]:
         law._replace(
             other_error_at_zero_range=laws[1 - channel].error_at_zero_range,
             other_error_slope=laws[1 - channel].error_slope,
+            other_centroid_error=laws[1 - channel].centroid_error,
+            farthest_shift=max(law.farthest_shift, laws[1 - channel].farthest_shift),
             pointing_along=(1.0 - math.cos(psi)) * (1.0 + law.impulse_error),
             pointing_across=math.sin(psi) * (1.0 + law.impulse_error),
             channel=channel,
@@ -157,7 +173,7 @@ def _law(model: SetModel) -> SectionLaw:
     maximum error bound of an angle over the ranges that correspond to a label, and adds eta to the
     engine's error of an impulse. See docs/guarantee.md.
     """
-    box = model.bounds
+    box = model.seen_bounds
     sensor = model.angle_sensor
     eta = model.speed_error
     slope = sensor.error_slope_rad_per_m
@@ -173,7 +189,9 @@ def _law(model: SetModel) -> SectionLaw:
     z_min, z_max = _scaled_outward(box.z_m, eta)
     vz_min, vz_max = _scaled_outward(box.vz_m_s, eta)
     # The true distance of a label is at least (1 - eta) x.
-    centroid = sensor.centroid_error_m * (1.0 + BOUND_SLACK) / (1.0 - eta)
+    centroid = sensor.centroid_bound_m * (1.0 + BOUND_SLACK) / (1.0 - eta)
+    shift = float(sensor.shift_m)
+    shift_error = abs(shift) * eta * (1.0 + BOUND_SLACK) / (1.0 - eta)
     min_label, max_label = model.label_limits_m
     if guaranteed:
         # Gravity changes the scale 1/(1 + eta), and thereby V where z is not zero. The rounding
@@ -211,7 +229,7 @@ def _law(model: SetModel) -> SectionLaw:
         vx_min=float(box.vx_m_s[0]),
         vx_max=float(box.vx_m_s[1]),
         rectangle=not model.starts_as_box,
-        linear_band=centroid > 0.0 or (guaranteed and slope > 0.0),
+        linear_band=centroid > 0.0 or shift != 0.0 or (guaranteed and slope > 0.0),
         other_error_at_zero_range=0.0,
         other_error_slope=0.0,
         pointing_along=0.0,
@@ -220,6 +238,11 @@ def _law(model: SetModel) -> SectionLaw:
         other=-1,
         centroid_error=centroid,
         min_range=float(model.min_range_m),
+        other_centroid_error=0.0,
+        shift=shift,
+        shift_error=shift_error,
+        farthest_shift=abs(shift) + shift_error,
+        misalignment=float(sensor.misalignment_rad),
     )
 
 

@@ -105,7 +105,9 @@ def steepest_angles(
     the measured angles of this axis and of the other one. The distance is at most x/(cos(own)
     cos(other)). If one of the angles is unbounded, the first is pi/2 and the second zero.
 
-    The bound of a camera is largest at the minimum distance, which the nearest label has. Another
+    The bound of a camera is largest at the minimum distance, which the nearest label has, and so is
+    the angle between the centre and a point beside it that the images show. A misaligned camera
+    shows other slopes. Another
     error bound that grows with the distance r grows with the angles: in a plane r = x/cos(alpha),
     in space r is at most x/(cos(alpha_y) cos(alpha_z)). The maximum angles are the minimum solution
     of s = |alpha_m| + a + h(r(s)). Three fixed-point iterations approach it from below; a fourth
@@ -114,10 +116,13 @@ def steepest_angles(
     growth = max(law.error_slope, 0.0) * range_m
     other_growth = max(law.other_error_slope, 0.0) * range_m
     centroid = 0.0
-    if law.centroid_error > 0.0:
-        centroid = law.centroid_error / nearest_range(law.label_max - range_m, law)
-    minimum = abs(alpha) + law.error_at_zero_range + centroid
-    other_min = abs(across) + law.other_error_at_zero_range + centroid
+    other_centroid = 0.0
+    if law.linear_band:
+        nearest = nearest_range(law.label_max - range_m, law)
+        centroid = (law.centroid_error + law.farthest_shift) / nearest
+        other_centroid = (law.other_centroid_error + law.farthest_shift) / nearest
+    minimum = abs(alpha) + law.error_at_zero_range + centroid + law.misalignment
+    other_min = abs(across) + law.other_error_at_zero_range + other_centroid + law.misalignment
 
     own = minimum + growth
     other = other_min + other_growth
@@ -182,13 +187,16 @@ def linear_slope_band(
     Therefore these two error bounds have a wider band, whose product with x is linear. If the bound
     h(x) rises with range, x h(x) is convex: a chord and a tangent are above it. With the bound p +
     c/x of a camera, x tan(alpha + p + c/x) is convex: a tangent in the angle, with the slope at the
-    steepest angle of all labels, is above it. The band is unbounded if an angle may be pi/2.
+    steepest angle of all labels, is above it. The band is unbounded if an angle may be pi/2. If the
+    images show a point beside the centre, the band of z is shifted by its distance, (21').
     """
     bound = law.error_at_zero_range + law.error_slope * x
-    if law.centroid_error > 0.0 and x > 0.0:
+    shift = 0.0
+    if x > 0.0:
         bound += law.centroid_error / x
+        shift = law.shift / x
     if not law.exact_angles:
-        return alpha - bound, alpha + bound
+        return alpha - shift - bound, alpha - shift + bound
 
     far = law.label_max - travelled
     own, other = steepest_angles(alpha, across, far, law)
@@ -202,7 +210,10 @@ def linear_slope_band(
         distance = chord / cosine / math.cos(other)
         bound = law.error_at_zero_range + law.error_slope * distance
     bound = bound / cosine**2
-    return math.tan(alpha) - bound, math.tan(alpha) + bound
+    if law.shift != 0.0 and x > 0.0:
+        bound += law.shift_error / x
+    middle = math.tan(alpha) - shift
+    return middle - bound, middle + bound
 
 
 @inlined
@@ -222,7 +233,7 @@ def measure_section(
     bound = law.error_at_zero_range + law.error_slope * x
     lower, upper = slope_band(alpha, across, law.closing_speed * (law.step * elapsed), x, law)
     terms = label * (abs(alpha) + bound) + section.right.reach * (label / law.closing_speed)
-    slack = CUT_SLACK * terms
+    slack = CUT_SLACK * (terms + abs(law.shift))
     return chains.cut(section, x / law.closing_speed, x * lower - slack, x * upper + slack)
 
 

@@ -126,7 +126,8 @@ def window_after(window: Window, event: AxisEvent, elapsed: int, law: SectionLaw
         most += (size + doubt) * tau
     elif event.kind == RATE and range_of(near, elapsed, law) > 0.0:
         # |z/x| is at most |Pi|/x + |V|/e.
-        steepest = most / range_of(near, elapsed, law) + fastest / law.closing_speed
+        seen = most / range_of(near, elapsed, law) + fastest / law.closing_speed
+        steepest = seen + law.misalignment
         widest = 1.0 + steepest * steepest if law.exact_angles else 1.0
         most = min(most, (size + event.error) * widest * range_of(far, elapsed, law) * tau)
     return Window(near, far, turned, loose, fastest, most)
@@ -177,13 +178,15 @@ def measure_in_window(
     turn = window.turned * ((label - section.label) / e)
     bound = law.error_at_zero_range + law.error_slope * x
     terms = section.label * (abs(alpha) + bound) + section.right.reach * (section.label / e)
-    slack = CUT_SLACK * terms + room
+    slack = CUT_SLACK * (terms + abs(law.shift)) + room
 
-    # Most bands cut nothing: a narrower one without tangents shows it in half the time.
+    # Most bands cut nothing: a narrower one without tangents shows it in half the time. Between the
+    # ends of a window the shift of (21') is between those of its ends.
     minimum, maximum = chains.heights(section, middle / e)
     if abs(alpha) + bound < 0.5:
-        lower = scale * nearly_tangent(alpha - bound, -1.0, law) + turn - slack
-        upper = scale * nearly_tangent(alpha + bound, 1.0, law) + turn + slack
+        shifted = turn - law.shift
+        lower = scale * nearly_tangent(alpha - bound, -1.0, law) + shifted - slack
+        upper = scale * nearly_tangent(alpha + bound, 1.0, law) + shifted + slack
         if lower <= minimum and maximum <= upper:
             return True, min(maximum - lower, upper - minimum), False
 
@@ -226,8 +229,8 @@ def rate_band(
 
 @allocation_free
 def max_slope(elapsed: int, sight: LastSight, window: Window, law: SectionLaw) -> float:
-    """Return a bound of |z/x| in a window, from the last angle, or from the initial box without
-    one, and the motion since.
+    """Return a bound of the true |z/x| in a window, from the last angle, or from the initial box
+    without one, and the motion since.
     """
     e = law.closing_speed
     travelled = law.closing_speed * (law.step * elapsed)
@@ -246,11 +249,13 @@ def max_slope(elapsed: int, sight: LastSight, window: Window, law: SectionLaw) -
     else:
         steepest = max(abs(law.z_min), abs(law.z_max)) / near_then
     if sight.steps == 0:
-        return steepest
+        return steepest + law.misalignment
 
     fastest = max(abs(law.vz_min), abs(law.vz_max)) + sight.fired * (1.0 + law.impulse_error)
     fastest += law.disturbance * (law.step * elapsed)
-    return (steepest * far_then + fastest * ago) / near if near > 0.0 else np.inf
+    if near <= 0.0:
+        return np.inf
+    return (steepest * far_then + fastest * ago) / near + law.misalignment
 
 
 @allocation_free

@@ -1,6 +1,14 @@
 """Sensors with bounded errors of unknown distribution: one class for each kind."""
 
-from infoset.sensors.bearing import AngleSensor, BearingSensor, Bias, Camera, RangeOrRanges
+from infoset.sensors.bearing import (
+    AngleSensor,
+    BearingSensor,
+    Bias,
+    Camera,
+    OffsetCamera,
+    RangeOrRanges,
+)
+from infoset.sensors.brightness import Brightness
 from infoset.sensors.range_and_rate import RangeSensor, RateSensor
 from infoset.sensors.sensor import Apart, Cuttable, Geometry, Measurements, Sensor
 
@@ -13,10 +21,12 @@ __all__ = [
     "Apart",
     "BearingSensor",
     "Bias",
+    "Brightness",
     "Camera",
     "Cuttable",
     "Geometry",
     "Measurements",
+    "OffsetCamera",
     "RangeOrRanges",
     "RangeSensor",
     "RateSensor",

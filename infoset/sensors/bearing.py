@@ -5,17 +5,19 @@ The error bound of an `AngleSensor` is linear in the range, the bound of a `Came
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
-from dataclasses import KW_ONLY, dataclass, replace
+from dataclasses import KW_ONLY, dataclass, fields, replace
 from enum import Enum
 from functools import cached_property
-from typing import ClassVar, TypeVar
+from typing import Annotated, ClassVar, TypeVar
 
 import numpy as np
 
 from infoset.arrays import Flags, Floats
 from infoset.clock import steps_between
-from infoset.limits import Fraction, NotNegative, Part, Positive, check_fields
+from infoset.limits import NUMBER, Fraction, Limits, NotNegative, Part, Positive, check_fields
+from infoset.sensors.brightness import Brightness
 from infoset.sensors.sensor import Apart, Cuttable, Geometry, Measurements, Sensor
 
 RangeOrRanges = TypeVar("RangeOrRanges", float, Floats)
@@ -26,6 +28,12 @@ NEGLIGIBLE_ERROR_RAD = 1e-60
 The sensor of one axis (`axis`) has it too, so that errors in units of it exist; it is far below the
 rounding of an angle. `error_bound` and `error_bounds` of the whole sensor still return zero.
 """
+
+
+_PHASE = Limits(minimum=0.0, maximum=math.radians(170.0))
+"""Limits of a phase angle; beyond, the lit part is too narrow for a centre of brightness."""
+_TURN = Limits(minimum=-2.0 * math.pi, maximum=2.0 * math.pi)
+"""Limits of an angle in a plane: any turn, counted from -180 or from 0 degrees."""
 
 
 class Bias(Enum):
@@ -97,6 +105,28 @@ class BearingSensor(Sensor):
         return 0.0
 
     @property
+    def centroid_bound_m(self) -> float:
+        """The same part of the bound that the set uses, m; in space of the angle of z."""
+        return self.centroid_error_m
+
+    @property
+    def shift_m(self) -> float:
+        """Distance of the measured point from the centre that the set subtracts, m; in space along
+        z.
+        """
+        return 0.0
+
+    @property
+    def farthest_m(self) -> float:
+        """Maximum distance of the measured point from the centre across the line of sight, m."""
+        return self.centroid_error_m
+
+    @property
+    def misalignment_rad(self) -> float:
+        """Bound of a constant that all measured slopes have in addition to their errors."""
+        return 0.0
+
+    @property
     def has_constant_bias(self) -> bool:
         """Whether the centroid part of the random errors is constant in a run."""
         return False
@@ -131,6 +161,13 @@ class BearingSensor(Sensor):
         """Return the line-of-sight angles, rad."""
         return sight.alpha_rad
 
+    def expected(self, alpha_rad: Floats, range_m: Floats) -> Floats:
+        """Return the measured angles, rad, that the set expects of points at line-of-sight angles.
+
+        Both have the shape (C, B).
+        """
+        return alpha_rad
+
     def bound(self, sight: Geometry) -> Floats:
         """Return the error bound at the true range, rad."""
         return self.error_bounds(sight.range_m)
@@ -156,7 +193,8 @@ class BearingSensor(Sensor):
 
     def error(self, sight: Geometry, measured: Floats) -> Floats:
         """Return the error of measured angles in units of the bound."""
-        return (measured - sight.alpha_rad) / np.maximum(self.bound(sight), NEGLIGIBLE_ERROR_RAD)
+        error_rad = measured - self.true_value(sight)
+        return error_rad / np.maximum(self.bound(sight), NEGLIGIBLE_ERROR_RAD)
 
     def cut(self, sets: Cuttable, measured: Measurements, where: Flags) -> None:
         """Cut by the angle."""
@@ -276,7 +314,8 @@ class AngleSensor(BearingSensor):
 
 @dataclass(frozen=True)
 class Camera(BearingSensor):
-    """A sensor of the line-of-sight angles with the bound pixel_error_rad + centroid_error_m / d.
+    """A sensor of the line-of-sight angles with the bound pixel_error_rad + drift_rad +
+    centroid_error_m / d.
 
     d is the distance. The bound is the same for both axes.
 
@@ -284,10 +323,31 @@ class Camera(BearingSensor):
     ----------
     pixel_error_rad : float
         Maximum error of an image, rad, in (0, 1).
+    drift_rad : float
+        Maximum error of the attitude that changes slowly, rad. Its random errors are correlated in
+        time, whatever the noise.
+    drift_time_s : float or None
+        Time constant of their correlation, s; None is a tenth of the time to the nominal arrival.
+    misalignment_rad : float
+        Maximum error of the attitude that is constant in a flight: all slopes tan(angle) are
+        shifted by it, drawn once a run. The set allows for it by a larger start.
     centroid_error_m : float
         Maximum distance between the point of the body that the camera measures and its centre, m.
+        With a phase angle: what remains of it after the offset of the centre of brightness.
     bias : Bias
         Whether the random error of the centroid is constant in a run.
+    phase_angle_rad : float or None
+        Angle between the directions from the body to the Sun and to the camera, rad, constant in a
+        flight. The images then show the centre of brightness of a sphere (`offset_share`). None:
+        they show the centre.
+    sun_angle_rad : float or None
+        Direction of the Sun across the line of approach, from y toward z, rad; in a plane pi/2 or
+        -pi/2. With a phase angle only.
+    brightness : Brightness
+        Law of the brightness.
+    phase_correction : bool
+        Whether the set on board subtracts the offset. If not, it allows for an error of the
+        offset and `centroid_error_m` along each axis.
     **others
         Fields of `BearingSensor`.
     """
@@ -297,11 +357,32 @@ class Camera(BearingSensor):
     pixel_error_rad: Fraction
     centroid_error_m: NotNegative = 0.0
     bias: Bias = Bias.RANDOM
+    drift_rad: Part = 0.0
+    drift_time_s: Positive | None = None
+    misalignment_rad: Part = 0.0
+    phase_angle_rad: Annotated[float, _PHASE] | None = None
+    sun_angle_rad: Annotated[float, _TURN] | None = None
+    brightness: Brightness = Brightness.MEAN
+    phase_correction: bool = True
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if (self.phase_angle_rad is None) != (self.sun_angle_rad is None):
+            missing = "phase_angle_rad" if self.phase_angle_rad is None else "sun_angle_rad"
+            raise ValueError(
+                "Camera: phase_angle_rad and sun_angle_rad must both be set, or neither: "
+                f"{missing} is missing"
+            )
+        if self.phase_angle_rad is None and not self.phase_correction:
+            raise ValueError(
+                "Camera: phase_correction = false needs phase_angle_rad and sun_angle_rad, from "
+                "which the offset follows: set them, or leave phase_correction out"
+            )
 
     @property
     def constant_error_rad(self) -> float:
-        """The error bound of an image, rad."""
-        return self.pixel_error_rad
+        """The error bound of an image and of the drift of the attitude, rad."""
+        return self.pixel_error_rad + self.drift_rad
 
     @property
     def has_constant_bias(self) -> bool:
@@ -314,7 +395,7 @@ class Camera(BearingSensor):
         It does not increase at distances below the centroid error, where c/d is greater than 1 rad.
         """
         distance: RangeOrRanges = np.maximum(range_m, self.centroid_error_m or 1.0)
-        return self.pixel_error_rad + self.centroid_error_m / distance
+        return self.constant_error_rad + self.centroid_error_m / distance
 
     def with_bias(self, sight: Geometry, error: Floats, bias: Floats) -> Floats:
         """Return the error in units of the bound, from the errors of its two parts.
@@ -322,8 +403,137 @@ class Camera(BearingSensor):
         Parameters
         ----------
         error, bias : ndarray, shape (..., B)
-            Errors of the pixel part and of the centroid part, in units of their bounds, within
-            [-1, 1].
+            Errors of the part without the centroid and of the centroid part, in units of their
+            bounds, within [-1, 1].
         """
-        share = self.pixel_error_rad / self.error_bound(sight.range_m)
+        share = self.constant_error_rad / self.bound(sight)
         return share * error + (1.0 - share) * bias
+
+    def with_drift(
+        self, sight: Geometry, error: Floats, drift: Floats, *, is_whole: bool
+    ) -> Floats:
+        """Return the error without or with the centroid part, in units of its bound.
+
+        Parameters
+        ----------
+        error, drift : ndarray, shape (..., B)
+            Errors of the other part and of the drift, in units of their bounds, within [-1, 1].
+        is_whole : bool
+            Whether `error` has the centroid part.
+        """
+        bound = self.bound(sight) if is_whole else self.constant_error_rad
+        share = self.drift_rad / bound
+        return np.asarray((1.0 - share) * error + share * drift)
+
+
+@dataclass(frozen=True)
+class OffsetCamera(Camera):
+    """A camera whose images show a point that is a known distance from the centre of the body.
+
+    The error of an image is about this point. `error_bound` and `error_bounds` are the bounds of
+    the set, about the point that it expects: this point with `phase_correction`, the centre
+    without.
+
+    Parameters
+    ----------
+    offset_m : tuple of float
+        The point minus the centre along each lateral axis, (y, z) or (z,), m.
+    **others
+        Fields of `Camera`.
+    """
+
+    offset_m: Annotated[tuple[float, ...], NUMBER] = (0.0,)
+
+    @property
+    def of_file(self) -> Camera:
+        """The camera without its offset, as in a file."""
+        return Camera(**{field.name: getattr(self, field.name) for field in fields(Camera)})
+
+    @property
+    def centroid_bound_m(self) -> float:
+        """The part of the bound that falls with the distance, m; in space of the angle of z."""
+        if self.phase_correction:
+            return self.centroid_error_m
+        return self.centroid_error_m + abs(self.offset_m[-1])
+
+    @property
+    def shift_m(self) -> float:
+        """Distance of the measured point from the centre that the set subtracts, m; in space along
+        z.
+        """
+        return self.offset_m[-1] if self.phase_correction else 0.0
+
+    @property
+    def farthest_m(self) -> float:
+        """Maximum distance of the measured point from the centre across the line of sight, m."""
+        return self.centroid_error_m + math.hypot(*self.offset_m)
+
+    def axis(self, name: str) -> OffsetCamera:
+        """Return the sensor of one plane angle, "y" or "z"."""
+        return self._planar[name]
+
+    @cached_property
+    def _planar(self) -> dict[str, OffsetCamera]:
+        """The sensors of both plane angles, which strategies need at every step."""
+        return {
+            "y": replace(self, offset_m=self.offset_m[:1]),
+            "z": replace(self, offset_m=self.offset_m[-1:]),
+        }
+
+    def true_value(self, sight: Geometry) -> Floats:
+        """Return the angles of the point that the images show, rad."""
+        return self._angle_of_point(sight.alpha_rad, sight.range_m)
+
+    def expected(self, alpha_rad: Floats, range_m: Floats) -> Floats:
+        """Return the measured angles, rad, that the set expects of points at line-of-sight angles.
+
+        Both have the shape (C, B).
+        """
+        return self._angle_of_point(alpha_rad, range_m) if self.phase_correction else alpha_rad
+
+    def _angle_of_point(self, alpha_rad: Floats, range_m: Floats) -> Floats:
+        """Return atan((z + o)/x) of each axis, rad, shape (C, B), from angles and distances."""
+        slope = np.tan(alpha_rad)
+        distance_per_x = np.sqrt(1.0 + (slope * slope).sum(axis=0))
+        x = np.copysign(range_m / distance_per_x, np.cos(alpha_rad))
+        return np.asarray(np.arctan2(x * slope + np.reshape(self.offset_m, (-1, 1)), x))
+
+    def bound(self, sight: Geometry) -> Floats:
+        """Return the error bound of images about the point that they show, rad."""
+        return super().error_bound(sight.range_m)
+
+    def error_bound(self, range_m: RangeOrRanges) -> RangeOrRanges:
+        """Return the error bound of the set at a range (m), rad; in space of the angle of z."""
+        centroid_m = self.centroid_bound_m
+        distance: RangeOrRanges = np.maximum(range_m, centroid_m or 1.0)
+        return self.constant_error_rad + centroid_m / distance
+
+    def error_bounds(self, range_m: Floats) -> Floats:
+        """Return the error bounds of the set at ranges (m) of shape (..., B), rad.
+
+        The result has the shape (2, B) in space.
+        """
+        if len(self.offset_m) == 1:
+            return self.error_bound(range_m)
+        y, z = np.broadcast_to(range_m, (2, range_m.shape[-1]))
+        return np.stack([self.axis("y").error_bound(y), self.error_bound(z)])
+
+    def band(
+        self, range_m: Floats, closing_speed_m_s: Floats | float, errors: float = 1.0
+    ) -> tuple[bool, Floats]:
+        """Return a band of z, by the errors of images about the point that they show."""
+        return False, errors * super().error_bound(range_m) * range_m
+
+    def share(self, apart: Apart) -> Floats:
+        """Return half of the maximum difference of the angles, in units of the bound, shape (n,).
+
+        The slopes (z + o)/x of two motions differ by at most as much as z/x, and by o times the
+        difference of 1/x.
+        """
+        lengths_m = np.reshape(np.abs(self.offset_m), (-1, 1))
+        inverse = apart.shift_m / apart.range_m**2
+        angles = np.abs(apart.offset_m) / apart.range_m + lengths_m * inverse
+        bounds = np.minimum(
+            super().error_bound(apart.range_m), super().error_bound(apart.farthest_m)
+        )
+        return np.asarray((0.5 * angles / bounds).max(axis=0))

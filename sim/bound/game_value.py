@@ -15,7 +15,7 @@ from infoset.arrays import Flags, Floats
 from infoset.covered_set import classes_left_out
 from infoset.information_set import InformationSet
 from infoset.model import CENTROID_ERRORS_AT_THRESHOLD, SetModel, StateBox
-from infoset.sensors import BearingSensor
+from infoset.sensors import BearingSensor, OffsetCamera
 from infoset.sim.bound.lower_bound import LowerBound
 from infoset.sim.gravity import on_board_model
 from infoset.sim.scenario import Scenario
@@ -90,6 +90,9 @@ def why_no_value(scenario: Scenario) -> tuple[str, ...]:
         # alone.
         "images that can be lost": model.angle_sensor.miss_probability > 0.0,
         "rate sensor": scenario.rate_sensor is not None,
+        # The sets of the value are symmetric about measurements of zero.
+        "images of a point beside the centre": isinstance(model.angle_sensor, OffsetCamera),
+        "misaligned camera": model.angle_sensor.misalignment_rad > 0.0,
     }
     return tuple(reason for reason, is_failed in failed.items() if is_failed)
 

@@ -101,6 +101,29 @@ def test_check_prints_the_schedule_that_will_happen(infoset: Command) -> None:
     assert set(found["possible_miss"]) == {"images_m", "images_and_speeds_m"}
 
 
+def test_check_prints_the_centre_of_brightness(infoset: Command) -> None:
+    """0.389 of 75 m; the residual is 75 m (0.389 (0.3 + 0.06 * 1.3) + 0.85 * 1.3 * 0.3 sin 60)."""
+    settings = ("camera.phase_angle_deg=60", "camera.sun_angle_deg=90", "camera.brightness=mean")
+    options = [option for setting in settings for option in ("--set", setting)]
+    lines = infoset("scenarios", "check", "dart-2022", *options)[1].splitlines()
+    residual = (
+        "residual of a correction: 32.6 m (8.8 m by the radius, 2.3 m by the brightness, 22 m by "
+        "the shape) if the radius is known to 30 % and the axis ratio is at least 0.7; "
+        "centroid_error_m is 10 m"
+    )
+    assert [line for line in lines if line.startswith(("centre", "residual"))] == [
+        "centre of brightness: 29.2 m from the centre (y 0 m, z 29.2 m); the set subtracts "
+        "it and allows for centroid_error_m, 10 m",
+        residual,
+    ]
+    uncorrected = [*options, "--set", "camera.phase_correction=false", "--json"]
+    found = json.loads(infoset("scenarios", "check", "dart-2022", *uncorrected)[1])
+    brightness = found["centre_of_brightness"]
+    assert brightness["phase_correction"] is False
+    assert brightness["offset_m"] == pytest.approx([0.0, 0.389064 * 75.0], abs=1e-4)
+    assert brightness["residual_m"] == pytest.approx(32.6, abs=0.05)
+
+
 def test_check_lists_few_of_many_differences(infoset: Command) -> None:
     settings = (
         "thruster.last_impulse_s=120",

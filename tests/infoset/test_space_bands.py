@@ -14,6 +14,7 @@ from infoset import AngleSensor, Camera, InitialSet, Model, SetModel, StateBox
 from infoset.arrays import Floats
 from infoset.engine import section_life
 from infoset.engine.section_law import section_laws
+from infoset.sensors import OffsetCamera
 from tests.kernels import callable_kernels
 
 EPS = float(np.finfo(np.float64).eps)
@@ -154,6 +155,56 @@ def test_bands_of_a_camera_contain_the_truth_and_are_convex(
     label = minimum + label_share * (maximum - minimum)
     # From the threshold to the start, many of them near the threshold.
     x = threshold_m + (label - threshold_m) * (10.0**far if near < 0.5 else 1e-9 * near)
+    true = sight(x * (1.0 + motion.speed * model.speed_error), motion.angles)
+    contain_and_are_convex(model, true, motion.errors, label, label - x)
+
+
+@settings(deadline=None)
+@given(
+    st.floats(-8.0, -2.0),
+    st.floats(0.0, 3.0),
+    st.tuples(signed, signed),
+    st.booleans(),
+    motions,
+    st.floats(0.0, 0.5),
+    shares,
+    st.floats(-3.0, 0.0),
+)
+def test_bands_with_an_offset_of_the_images_contain_the_truth_and_are_convex(
+    pixel: float,
+    length: float,
+    offset: tuple[float, float],
+    is_corrected: bool,
+    motion: Motion,
+    speed_error: float,
+    label_share: float,
+    far: float,
+) -> None:
+    """The images show a point beside the centre: (21')."""
+    length_m = 10.0**length
+    sensor = OffsetCamera(
+        0.5,
+        10.0**pixel,
+        0.1 * length_m,
+        phase_angle_rad=1.0,
+        sun_angle_rad=0.0,
+        phase_correction=is_corrected,
+        offset_m=(length_m * offset[0], length_m * offset[1]),
+    )
+    threshold_m = 10.0 * sensor.farthest_m * (1.0 + 1e-12)
+    known = replace(KNOWN, vx_m_s=(-58e3 * (1.0 + speed_error), -58e3 * (1.0 - speed_error)))
+    model = SetModel(
+        58e3,
+        0.5,
+        known,
+        sensor,
+        range_threshold_m=threshold_m,
+        initial_set=InitialSet.BOX,
+        model=Model.GUARANTEED,
+    )
+    minimum, maximum = model.label_limits_m
+    label = minimum + label_share * (maximum - minimum)
+    x = threshold_m + (label - threshold_m) * 10.0**far
     true = sight(x * (1.0 + motion.speed * model.speed_error), motion.angles)
     contain_and_are_convex(model, true, motion.errors, label, label - x)
 

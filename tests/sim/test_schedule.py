@@ -149,11 +149,12 @@ def test_times_are_kept_if_the_arrival_is_no_whole_number_of_steps(
     arrival_s: float, step_s: float, asked_s: tuple[float, ...], scheduled_s: tuple[float, ...]
 ) -> None:
     dart = load_scenario("dart-2022")
+    assert dart.camera is not None
     scenario = replace(
         dart,
         nominal_range_m=arrival_s * dart.closing_speed_m_s,
         step_s=step_s,
-        camera=replace(dart.bearing_sensor, period_s=step_s),
+        camera=replace(dart.camera, period_s=step_s),
         thruster=replace(dart.thruster, last_impulse_s=None, impulses_s=asked_s),
     )
     found = schedule(scenario)

@@ -10,6 +10,7 @@ from infoset import Camera
 from infoset.experiments.common.errors import InputError
 from infoset.experiments.common.input_file import read_text, to_toml
 from infoset.experiments.interception.scenario_file import scenario_warnings
+from infoset.sensors import OffsetCamera
 from infoset.sim import Scenario
 from tests.built_in import scenario_text
 
@@ -73,7 +74,7 @@ def test_measurements_after_the_last_impulse_are_warned_of() -> None:
     blind = camera(camera__first_image_s="20", thruster__last_impulse_s="30")
     (line,) = scenario_warnings(blind)
     assert "no impulse follows a measurement" in line
-    assert "the last impulse is 30.0224 s before it" in line
+    assert "the last impulse is 30.0067 s before it" in line
     assert not scenario_warnings(
         camera(camera__first_image_s="30.1", thruster__last_impulse_s="30")
     )
@@ -83,3 +84,45 @@ def test_measurements_after_the_last_impulse_are_warned_of() -> None:
             camera__first_image_s=first_image_s, thruster__delay_steps=delay_steps, **schedule
         )
         assert len(scenario_warnings(late)) == number
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"camera__phase_angle_deg": "60"}, "sun_angle_rad is missing"),
+        ({"camera__phase_correction": "false"}, "needs phase_angle_rad and sun_angle_rad"),
+        (
+            {"camera__phase_angle_deg": "60", "camera__sun_angle_deg": "90"},
+            "needs the radius of the body",
+        ),
+        (
+            {
+                "camera__phase_angle_deg": "60",
+                "camera__sun_angle_deg": "45",
+                "body__radius_m": "100",
+            },
+            "90 or -90 deg: got 45 deg",
+        ),
+        (
+            {
+                "camera__phase_angle_deg": "60",
+                "camera__sun_angle_deg": "90",
+                "body__radius_m": "1300",
+            },
+            "times camera.centroid_error_m and the offset of the centre of brightness",
+        ),
+    ],
+)
+def test_phase_angle_that_does_not_fit_is_refused(values: dict[str, str], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        camera(**values)
+
+
+def test_offset_in_a_plane_is_toward_the_sun() -> None:
+    settings = {"camera__phase_angle_deg": "60", "body__radius_m": "100"}
+    for sun_deg, side in (("90", 1.0), ("-90", -1.0), ("270", -1.0)):
+        scenario = camera(camera__sun_angle_deg=sun_deg, **settings)
+        sensor = scenario.bearing_sensor
+        assert isinstance(sensor, OffsetCamera)
+        assert sensor.offset_m == pytest.approx((side * 38.9064,), abs=1e-3)
+        assert read_text(Scenario, to_toml(scenario), "written") == scenario

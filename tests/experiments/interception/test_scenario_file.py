@@ -277,7 +277,7 @@ def test_value_that_is_probably_not_intended_has_a_warning(setting: str, part: s
         (
             "dart-2022",
             ["step_s=1000", "camera.period_s=1000"],
-            "step_s is 1000 s: impulses can be decided in only 15",
+            "step_s is 1000 s: impulses can be decided in only 14",
         ),
         (
             "dart-2022",
