@@ -158,6 +158,7 @@ class KalmanBank:
         weight = self._weights()
         to_go = np.maximum(self.mean[..., X], 0.0) / self.mean[..., SPEED]
         miss, variance = self._misses(to_go)
+        miss = miss + situation.information.model.lateral_aim_m[:, None, None]
         for time_s, impulse in situation.pending:
             miss = miss - impulse[..., None] * np.maximum(to_go - time_s, 0.0)
 

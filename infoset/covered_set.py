@@ -217,10 +217,12 @@ class CoveredSetView(InformationSetView):
         highest = np.where(counts, upper_ends[..., 0], -np.inf).argmax(axis=2)
         lower = _of_member(lower_ends, lowest)
         upper = _of_member(upper_ends, highest)
+        known = np.asarray(counts.any(axis=1))
+        aim_m = self._aim_of(known)
         return PredictedMiss(
-            np.asarray(counts.any(axis=1)),
-            lower[..., 0],
-            upper[..., 0],
+            known,
+            lower[..., 0] + aim_m,
+            upper[..., 0] + aim_m,
             ExtremePoints(lower[..., 1], lower[..., 2], lower[..., 3]),
             ExtremePoints(upper[..., 1], upper[..., 2], upper[..., 3]),
         )

@@ -8,6 +8,9 @@ from enum import Enum
 from functools import cached_property
 from typing import Annotated
 
+import numpy as np
+
+from infoset.arrays import Floats
 from infoset.limits import NUMBER, POSITIVE, Limits, NotNegative, Part, Positive, check_fields
 from infoset.sensors import BearingSensor, Sensor
 
@@ -289,6 +292,9 @@ class SetModel(SetSettings):
     pointing_error_rad : float
         Bound of the angle between the given and the commanded impulse; used by the guaranteed model
         in space only.
+    aim_m : tuple of float, or None
+        Point at which guidance aims, relative to the centre that the sensors measure, along the
+        lateral axes, m; None is the centre. Misses are those of this point.
     **settings
         Fields of `SetSettings`.
 
@@ -311,11 +317,16 @@ class SetModel(SetSettings):
     gravity_speed_change: NotNegative = 0.0
     execution_error_relative: Part = 0.0
     pointing_error_rad: Part = 0.0
+    aim_m: Annotated[tuple[float, ...], NUMBER] | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if len(self.axes) == 1:
             self._check_planar()
+        if self.aim_m is not None and len(self.aim_m) != len(self.axes):
+            raise ValueError(
+                f"SetModel: aim_m must have {len(self.axes)} components: got {self.aim_m!r}"
+            )
         check_period(self.angle_sensor, self.step_s)
         self.check_start("bounds", self.bounds)
         self._check_threshold()
@@ -354,6 +365,13 @@ class SetModel(SetSettings):
         """Lateral axes: ("z",) in a plane, ("y", "z") in space."""
         return self.bounds.axes
 
+    @property
+    def lateral_aim_m(self) -> Floats:
+        """The aim point along the lateral axes, m, shape (C,)."""
+        if self.aim_m is None:
+            return np.zeros(len(self.axes))
+        return np.array(self.aim_m)
+
     def axis(self, name: str) -> SetModel:
         """Return the planar model of x and one lateral axis, "y" or "z", which is z in it.
 
@@ -385,6 +403,7 @@ class SetModel(SetSettings):
             disturbance_y_m_s2=None,
             gravity_y_m_s2=None,
             pointing_error_rad=0.0,
+            aim_m=None if self.aim_m is None else (self.aim_m[self.axes.index(name)],),
         )
 
     def check_start(self, name: str, box: StateBox) -> None:

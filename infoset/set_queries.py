@@ -179,13 +179,14 @@ class SetQueries:
         Kumkov and Patsko (1997), equations (13) and (14).
         """
         exists, ends = self._state.widest(pending)
+        aim_m = self._aim_of(exists)
         # An end is the predicted miss, and the state that reaches it.
         lower = ends[..., 0, :]
         upper = ends[..., 1, :]
         return PredictedMiss(
             exists,
-            lower[..., 0],
-            upper[..., 0],
+            lower[..., 0] + aim_m,
+            upper[..., 0] + aim_m,
             ExtremePoints(lower[..., 1], lower[..., 2], lower[..., 3]),
             ExtremePoints(upper[..., 1], upper[..., 2], upper[..., 3]),
         )
@@ -197,9 +198,14 @@ class SetQueries:
         """
         summaries = self._state.summaries()
         feasible = self.feasible
-        lower = summaries[..., section_life.LOWER_MISS]
-        upper = summaries[..., section_life.UPPER_MISS]
+        aim_m = self.model.lateral_aim_m[:, None, None]
+        lower = summaries[..., section_life.LOWER_MISS] + aim_m
+        upper = summaries[..., section_life.UPPER_MISS] + aim_m
         return np.where(feasible, lower, 0.0), np.where(feasible, upper, 0.0)
+
+    def _aim_of(self, exists: Flags) -> Floats:
+        """Return the aim point where a predicted miss exists, m, shape (C, B), elsewhere zero."""
+        return np.where(exists, self.model.lateral_aim_m[:, None], 0.0)
 
     def sections(self, engagement: int = 0) -> list[Section]:
         """Return the feasible sections of one engagement in order of increasing range."""

@@ -1,6 +1,7 @@
 """The simulator: scenarios, true motion, closed loop, records, campaigns, bounds and statistics."""
 
 from infoset.sim.adversary import NothingCountsError, Objective, WorstEngagement, find_worst
+from infoset.sim.body import Body
 from infoset.sim.bound.lower_bound import LowerBound, lower_bound
 from infoset.sim.campaign import Campaign, RunsUntil
 from infoset.sim.closed_form import possible_miss_of
@@ -10,7 +11,7 @@ from infoset.sim.parallel import CampaignNoise
 from infoset.sim.record import Record, RecordedInconsistency, fly_one
 from infoset.sim.requirement import HitRequirement, Requirement
 from infoset.sim.results import GuaranteeWarning, Outcome, Results
-from infoset.sim.scenario import Body, Manoeuvre, Scenario, Sun, Target
+from infoset.sim.scenario import Manoeuvre, Scenario, Sun, Target
 from infoset.sim.simulate import simulate
 from infoset.sim.statistics import (
     Distribution,

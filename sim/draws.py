@@ -19,7 +19,7 @@ from infoset.sim.scenario import Scenario, corners
 from infoset.sim.wrong_images import WrongImages, draw_wrong_measurements
 
 START, TIE, EXECUTION, TARGET, POINTING, BIAS, IMAGES = 0, 3, 5, 6, 7, 8, 9
-MISALIGNMENT, WRONG_IMAGES, WRONG_RANGES, DRIFT = 10, 11, 12, 13
+MISALIGNMENT, WRONG_IMAGES, WRONG_RANGES, DRIFT, AXIS_ANGLE = 10, 11, 12, 13, 14
 """Streams of a run; each kind of sensor has a separate one (`Sensor.stream`). Their numbers are
 never changed or used again: runs of a seed would change.
 """
@@ -76,6 +76,8 @@ class Draws:
         range.
     redraws : ndarray of int, shape (B,), or None
         Normal starts outside the dispersion that were drawn again; None for uniform starts.
+    axis_angle_rad : ndarray, shape (B,), or None
+        Directions of the ellipse of the body, uniform; None where it is known, or not drawn.
     """
 
     position_m: Floats
@@ -93,6 +95,7 @@ class Draws:
     wrong_by_noise: Flags | None = None
     wrong_ranges: Floats | None = None
     redraws: Integers | None = None
+    axis_angle_rad: Floats | None = None
 
     @property
     def steps(self) -> int:
@@ -164,7 +167,15 @@ def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
         wrong=_wrong_images(scenario, runs, seed, steps),
         wrong_ranges=_wrong_ranges(scenario, runs, seed, steps),
         redraws=starts.redraws,
+        axis_angle_rad=_axis_angles(scenario, runs, seed),
     )
+
+
+def _axis_angles(scenario: Scenario, runs: Sequence[int], seed: int) -> Floats | None:
+    """Return the directions of the ellipse of the body, shape (B,); None if it is known."""
+    if scenario.body is None or not scenario.body.is_turned_by_chance:
+        return None
+    return np.array([generator(seed, run, AXIS_ANGLE).uniform(0.0, np.pi) for run in runs])
 
 
 def _wrong_images(scenario: Scenario, runs: Sequence[int], seed: int, steps: int) -> Floats | None:

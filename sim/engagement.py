@@ -32,10 +32,10 @@ from infoset.sim.instruments import Instruments
 from infoset.sim.kepler import KeplerMotion, Sight
 from infoset.sim.label_ends import LabelEnds
 from infoset.sim.miss_cause import DecisionLog
-from infoset.sim.results import Outcome, Results
+from infoset.sim.results import MaskedFlags, Outcome, Results
 from infoset.sim.scenario import Scenario
 from infoset.sim.target import constant_side
-from infoset.sim.true_flight import TrueFlight
+from infoset.sim.true_flight import Miss, TrueFlight
 from infoset.sim.truth_section import TruthSection
 from infoset.sim.wrong_images import proved_columns
 
@@ -192,20 +192,23 @@ class Engagements:
         """
         arrivals_s = self._flight.arrivals_s(self.step)
         miss = self._flight.miss()
-        radius_m = self.scenario.radius_m
-        hit = np.ma.MaskedArray(miss.distance_m <= (radius_m or 0.0), mask=radius_m is None)
+        hit = self._hit(miss)
         missed = ~hit.filled(True)  # Without a radius nothing counts as missed.
         set_emptied = self._information.inconsistent
+        bound_m = self._guaranteed_miss_m()
+        aim_m = self._model.lateral_aim_m[:, None]
         return Results(
             runs=runs,
             miss_m=miss.distance_m,
             impulse_m_s=self._impulses.given_m_s(),
-            guaranteed_miss_m=self._guaranteed_miss_m(),
+            guaranteed_miss_m=bound_m,
             outcomes=self._outcomes(miss.distance_m, set_emptied),
             set_emptied=set_emptied,
             hit=hit,
+            certain_hit=self._certain_hit(bound_m),
+            hit_probability=self._hit_probability(miss),
             # causes, unguided_miss_m, engine_corrects_m, budget_corrects_m, last_possible_m
-            **self._decisions.columns(miss.lateral_m, arrivals_s, missed),
+            **self._decisions.columns(miss.lateral_m + aim_m, arrivals_s, missed),
             truth_margin_m=self._truth_section.min_margin_m(arrivals_s),
             position_m=self._draws.position_m,
             velocity_m_s=self._draws.velocity_m_s,
@@ -337,6 +340,35 @@ class Engagements:
             return np.ma.MaskedArray(bound_m, mask=~known)
         published_m = self._label_ends.published_m.copy()
         return np.ma.MaskedArray(published_m, mask=~self._label_ends.left)
+
+    def _hit(self, miss: Miss) -> MaskedFlags:
+        """Return whether each engagement hits; masked if the body has no size."""
+        body = self.scenario.body
+        if body is None:
+            return np.ma.MaskedArray(np.zeros(len(miss.distance_m), dtype=bool), mask=True)
+        if body.is_sphere_around_aim:
+            return np.ma.MaskedArray(miss.distance_m <= body.inscribed_m, mask=False)
+
+        angle_rad: Floats | float | None = self._draws.axis_angle_rad
+        if not body.is_turned_by_chance:
+            angle_rad = body.axis_angle_rad
+        return np.ma.MaskedArray(body.contains(miss.lateral_m, angle_rad), mask=False)
+
+    def _certain_hit(self, bound_m: MaskedFloats) -> MaskedFlags | None:
+        """Return whether Phi proves each hit; None without a size, and in the paper's model."""
+        radius_m = self.scenario.radius_m
+        if radius_m is None or not self._model.is_guaranteed:
+            return None
+        within = bound_m.filled(np.inf) <= radius_m
+        return np.ma.MaskedArray(within, mask=np.ma.getmaskarray(bound_m))
+
+    def _hit_probability(self, miss: Miss) -> MaskedFloats | None:
+        """Return the probability of each hit if the direction of the body's ellipse is unknown."""
+        body = self.scenario.body
+        if body is None or not body.is_turned_by_chance:
+            return None
+        distance_m = np.hypot.reduce(miss.lateral_m)
+        return np.ma.MaskedArray(body.hit_probability(distance_m), mask=False)
 
     def _outcomes(self, distance_m: Floats, set_emptied: Flags) -> tuple[Outcome, ...]:
         diverged = distance_m > self.scenario.nominal_range_m

@@ -65,7 +65,7 @@ def feasibility(scenario: Scenario) -> Feasibility | None:
     position_m, velocity_m_s, _ = draw_starts(scenario, range(STARTS), 0)
     arrivals_s = position_m[:, -1] / -velocity_m_s[:, -1]
     lateral_m = position_m[:, :-1] + velocity_m_s[:, :-1] * arrivals_s[:, None]
-    unguided_m = np.hypot.reduce(lateral_m, axis=1)
+    unguided_m = np.hypot.reduce(lateral_m + model.lateral_aim_m, axis=1)
 
     steps = scenario.impulse_steps
     if steps is None:

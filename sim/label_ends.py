@@ -114,10 +114,19 @@ class LabelEnds:
         """
         ended = self._has_ended & ~results.set_emptied
         truth_m = np.where(ended & ~results.truth_kept, 0.0, results.miss_m)
-        misses_m = _max(self._misses_m) * self._scale(self._labels_m)
+        misses_m = self._true_misses_m()
         sections_m = np.zeros_like(self.published_m)
         np.maximum.at(sections_m, self._engagements, misses_m)
         return np.maximum(np.where(ended, sections_m, 0.0), truth_m)
+
+    def _true_misses_m(self) -> Floats:
+        """Return the maximum true miss of each section, m."""
+        scale = self._scale(self._labels_m)
+        aim_m = self._model.lateral_aim_m[:, None]
+        if not aim_m.any():
+            return np.asarray(_max(self._misses_m) * scale)
+        # The aim point is a true length already.
+        return _max((self._misses_m - aim_m) * scale + aim_m)
 
     def _scale(self, labels: Floats) -> Floats:
         """Return the maximum of 1 + eta for each label: the ratio of true lengths to the model's.

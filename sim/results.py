@@ -61,7 +61,15 @@ _MARGIN = (
 )
 _HELD = "Miss at most the guaranteed miss; unknown without a guarantee"
 _EMPTY = "A measurement left the set empty, whatever the outcome is"
-_HIT = "Miss at most the radius of the body; unknown if the body has no size"
+_HIT = "Closest approach inside the body; unknown if the body has no size"
+_CERTAIN = (
+    "Whether the bound Phi is at most the radius around the aim point that is certainly inside the "
+    "body: the hit was certain in flight; unknown without a bound"
+)
+_PROBABILITY = (
+    "Probability that the closest approach is inside the ellipse of the body, whose direction is "
+    "unknown"
+)
 _CAUSE = "Why the engagement missed the body; unknown for hits"
 _UNGUIDED = "Miss without impulses, of the same true motion"
 _ENGINE = "Maximum change of the miss by all impulses of the flight, without a limit of their sum"
@@ -102,7 +110,9 @@ class Results:
 
     runs: Integers = field(metadata=columns(Column("run", "", "Run number", int)))
     miss_m: Floats = field(
-        metadata=columns(Column("miss_m", "m", "Minimum distance between the centres of mass"))
+        metadata=columns(
+            Column("miss_m", "m", "Minimum distance from the aim point, by default the centre")
+        )
     )
     impulse_m_s: Floats = field(
         metadata=columns(Column("impulse_m_s", "m/s", "Sum of the impulses' moduli"))
@@ -152,13 +162,21 @@ class Results:
     )
     lateral_miss_m: Floats = field(
         metadata=columns(
-            _optional("miss_y_m", "m", "True y at the closest approach, only in space"),
+            _optional(
+                "miss_y_m", "m", "True y of the centre at the closest approach, only in space"
+            ),
             Column("miss_z_m", "m", "true z"),
         )
     )
     b_plane_m: Floats = field(
         init=False,
         metadata=columns(_optional("b_dot_t_m", "m", _B_DOT_T), _optional("b_dot_r_m", "m", "B.R")),
+    )
+    certain_hit: MaskedFlags | None = field(
+        default=None, metadata=columns(_optional("certain_hit", "", _CERTAIN, bool))
+    )
+    hit_probability: MaskedFloats | None = field(
+        default=None, metadata=columns(_optional("hit_probability", "", _PROBABILITY))
     )
     redraws: Integers | None = field(
         default=None, metadata=columns(_optional("redraws", "", _REDRAWS, int))

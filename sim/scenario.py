@@ -39,6 +39,7 @@ from infoset.sensors import (
     Sensor,
 )
 from infoset.sensors.brightness import offset_share
+from infoset.sim.body import Body
 from infoset.sim.covariance import Covariance
 from infoset.sim.wrong_images import WrongImages, WrongRanges
 
@@ -152,19 +153,6 @@ class Target(Checked):
     acceleration_y_m_s2: NotNegative | None = None
 
 
-@dataclass(frozen=True)
-class Body(Checked):
-    """The size of the object.
-
-    Parameters
-    ----------
-    radius_m : float
-        Radius of a sphere, m: an engagement hits if its miss is at most this radius.
-    """
-
-    radius_m: Positive
-
-
 @dataclass(frozen=True, kw_only=True)
 class Scenario:
     """An interception: true motion, sensors, engine, guidance and noise. Its fields are the keys of
@@ -251,6 +239,7 @@ class Scenario:
 
     def __post_init__(self) -> None:
         check_fields(self)
+        self._check_body()
         for sensor in self.sensors.values():
             check_period(sensor, self.step_s)
         self._check_axes()
@@ -268,6 +257,17 @@ class Scenario:
                 "information_set.wrong_images must be 0 with a rate_sensor, for which there is no "
                 f"proof: got {self.information_set.wrong_images}"
             )
+
+    def _check_body(self) -> None:
+        """Refuse an ellipse and an aim point in a plane."""
+        if self.body is None or self.uncertainty.y_m is not None:
+            return
+        for key in ("semi_axes_m", "aim_m"):
+            if getattr(self.body, key) is not None:
+                raise ValueError(
+                    f"body.{key} is a value of an engagement in space, and uncertainty has no y_m "
+                    "and vy_m_s: set them, or leave the value out"
+                )
 
     def _check_wrong_ranges(self) -> None:
         """Check that wrong ranges fit the model and the sensors."""
@@ -300,10 +300,10 @@ class Scenario:
                 f"got {self.sun.distance_m!r}"
             )
         minimum = min(self.dispersion.x_m[0], self.uncertainty.x_m[0])
-        if self.body is not None and self.body.radius_m >= minimum:
+        if self.body is not None and self.body.longest_m >= minimum:
             raise ValueError(
-                f"body.radius_m must be less than the minimum possible range, {minimum:g} m: got "
-                f"{self.body.radius_m!r}"
+                f"body.{self.body.size_key} must be less than the minimum possible range, "
+                f"{minimum:g} m: got {self.body.longest_m!r}"
             )
 
     @cached_property
@@ -320,6 +320,7 @@ class Scenario:
             step_s=step_s,
             bounds=self.uncertainty,
             angle_sensor=sensor,
+            aim_m=None if self.body is None else self.body.aim_m,
             **vars(self.information_set),
         )
 
@@ -406,10 +407,10 @@ class Scenario:
         if self.body is None:
             raise ValueError(
                 "camera.phase_angle_rad needs the radius of the body, of which the offset is a "
-                "share: add the table body with radius_m"
+                "share: add the table body with radius_m or semi_axes_m"
             )
 
-        length_m = offset_share(phase_rad, camera.brightness) * self.body.radius_m
+        length_m = offset_share(phase_rad, camera.brightness) * self.body.mean_radius_m
         along_y, along_z = (
             0.0 if abs(share) < SUN_ROUNDING else share
             for share in (math.cos(sun_rad), math.sin(sun_rad))
@@ -466,8 +467,11 @@ class Scenario:
 
     @property
     def radius_m(self) -> float | None:
-        """Radius of the body, m; None if it has no size."""
-        return None if self.body is None else self.body.radius_m
+        """Radius around the aim point that is certainly inside the body, m; None without a size.
+
+        It is the radius of a sphere with the aim point in its centre.
+        """
+        return None if self.body is None else self.body.inscribed_m
 
     @property
     def sensors(self) -> dict[str, Sensor]:

@@ -14,7 +14,9 @@ from infoset.sim.target import acceleration_m_s2
 
 
 class Miss(NamedTuple):
-    """Distances (m, shape (B,)) and lateral positions (m, shape (C, B)) at the closest approach."""
+    """Minimum distances from the aim point (m, shape (B,)), and lateral positions of the centre (m,
+    shape (C, B)) at its closest approach.
+    """
 
     distance_m: Floats
     lateral_m: Floats
@@ -44,6 +46,7 @@ class TrueFlight:
         batch, components = draws.position_m.shape
         self._motion = motion or KeplerMotion(draws.position_m, draws.velocity_m_s, scenario.sun)
         self._step_s = scenario.set_model.step_s
+        self._aim_m = scenario.set_model.lateral_aim_m[:, None]
         self._target = scenario.target
         self._target_draws = draws.target
         self._target_m_s2 = target_m_s2
@@ -101,11 +104,30 @@ class TrueFlight:
     def miss(self) -> Miss:
         """Return the misses; without a closest approach so far, the present range and position."""
         passed = np.isfinite(self._distance_m)
-        present_m = self._motion.position_m.T[:-1]
-        return Miss(
-            np.where(passed, self._distance_m, self._motion.sight().range_m),
-            np.where(passed, self._lateral_m, present_m),
-        )
+        present_m = self._motion.position_m.T
+        distance_m = np.where(passed, self._distance_m, self._motion.sight().range_m)
+        lateral_m = np.where(passed, self._lateral_m, present_m[:-1])
+        if self._aim_m.any():
+            distance_m = np.where(
+                passed,
+                self._distance_from_aim_m(lateral_m),
+                np.hypot(np.hypot.reduce(lateral_m + self._aim_m), present_m[-1]),
+            )
+        return Miss(distance_m, lateral_m)
+
+    def _distance_from_aim_m(self, lateral_m: Floats) -> Floats:
+        """Return the minimum distances from the aim point, m, from those of the centre.
+
+        The motion is straight between the two approaches, which are metres apart. At that of the
+        centre r . v = 0, which gives x; the square of the distance of r + a is that of the centre's
+        approach less the part along v.
+        """
+        velocity = self._motion.velocity_m_s.T
+        x_m = -(lateral_m * velocity[:-1]).sum(axis=0) / velocity[-1]
+        along_m = (self._aim_m * velocity[:-1]).sum(axis=0) / np.hypot.reduce(velocity)
+        across_m = np.hypot(np.hypot.reduce(lateral_m + self._aim_m), x_m)
+        squared = (across_m - along_m) * (across_m + along_m)
+        return np.asarray(np.sqrt(np.maximum(squared, 0.0)))
 
     def _acceleration_m_s2(
         self, step: int, sight: Sight, impulse_m_s: Floats, noise_side: Floats | None
@@ -120,7 +142,8 @@ class TrueFlight:
 
         # Signed misses of the true states without further impulses.
         left_s = np.maximum(self._arrival_s - step * self._step_s, 0.0)
-        predicted_m = np.asarray((sight.omega_rad_s * sight.range_m - impulse_m_s) * left_s)
+        centre_m = (sight.omega_rad_s * sight.range_m - impulse_m_s) * left_s
+        predicted_m = np.asarray(centre_m + self._aim_m)
         if noise_side is not None:
             predicted_m = np.where(noise_side == 0.0, predicted_m, noise_side)
         return acceleration_m_s2(self._target, self._target_draws, step, self._step_s, predicted_m)

@@ -68,7 +68,7 @@ def draw_all(folder: CampaignFolder) -> Iterator[Figure]:
     yield draw_convergence(samples_of(folder, tuple(_QUANTITIES)))
     yield draw_dispersion(samples_of(folder, ("miss_m", *start_columns(scenario))))
     if scenario.is_spatial:
-        yield draw_b_plane(_clouds(folder), scenario.radius_m)
+        yield draw_b_plane(_clouds(folder), scenario.body)
 
 
 def _distributions(folder: CampaignFolder) -> list[Sample]:
@@ -98,11 +98,11 @@ def _distributions(folder: CampaignFolder) -> list[Sample]:
 def _clouds(folder: CampaignFolder) -> list[Cloud]:
     """Return the misses of each noise across the approach."""
     scenario = folder.manifest.scenario
-    has_axes = scenario.b_plane_t_rad is not None
-    across = ["b_dot_t_m", "b_dot_r_m"] if has_axes else ["miss_y_m", "miss_z_m"]
+    t_rad = scenario.b_plane_t_rad
+    across = ["b_dot_t_m", "b_dot_r_m"] if t_rad is not None else ["miss_y_m", "miss_z_m"]
 
     clouds = []
-    for noise, runs in samples_of(folder, ("miss_m", "guaranteed_miss_m", *across)).items():
+    for noise, runs in samples_of(folder, ("miss_m", "guaranteed_miss_m", "hit", *across)).items():
         bounds_m = runs["guaranteed_miss_m"]
         guaranteed_m = None
         if scenario.set_model.is_guaranteed and bounds_m.notna().all():
@@ -113,7 +113,8 @@ def _clouds(folder: CampaignFolder) -> list[Cloud]:
                 across_m=runs[across].to_numpy(),
                 miss_m=runs["miss_m"].to_numpy(),
                 guaranteed_m=guaranteed_m,
-                has_axes=has_axes,
+                t_rad=t_rad,
+                hits=int(runs["hit"].sum()) if runs["hit"].count() else None,
             )
         )
 

@@ -16,7 +16,7 @@ from infoset.arrays import Floats
 from infoset.experiments.campaigns.run_tables import LEVELS, or_nan, summary
 from infoset.experiments.campaigns.sample_rows import Step, noises_of
 from infoset.experiments.campaigns.sweep_axes import sweep_cells, tied_keys
-from infoset.sim import Requirement
+from infoset.sim import Requirement, Scenario
 from infoset.sim.closed_form import possible_miss_of
 from infoset.sim.requirement import AnyRequirement, Decision, judge
 from infoset.sim.statistics import shows
@@ -117,10 +117,17 @@ def _decision(
 def _radii_m(folder: CampaignFolder, table: pd.DataFrame) -> Any:
     scenario = folder.manifest.scenario
     axes = folder.manifest.axes
-    if not any("body.radius_" in axis.key for axis in axes):
-        return or_nan(scenario.radius_m)
-    radii_m = [cell.radius_m for cell in sweep_cells(scenario, axes)]
+    if not any("body." in axis.key for axis in axes):
+        return or_nan(_radius_m(scenario))
+    radii_m = [_radius_m(cell) for cell in sweep_cells(scenario, axes)]
     return table["cell"].map(dict(enumerate(radii_m)))
+
+
+def _radius_m(scenario: Scenario) -> float | None:
+    """Return the radius of a body whose hits follow from the misses, m; None for another one."""
+    if scenario.body is None or not scenario.body.is_sphere_around_aim:
+        return None
+    return scenario.radius_m
 
 
 def _closed_forms(folder: CampaignFolder) -> list[float]:

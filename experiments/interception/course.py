@@ -147,7 +147,8 @@ def true_predicted_misses(record: Record) -> Floats:
     slopes = np.tan(record.true_angle_rad)
     x_squared = record.true_range_m**2 / (1.0 + (slopes**2).sum(axis=1))
     speed = -float(record.result.velocity_m_s[0, -1])
-    return np.asarray(record.true_rate_rad_s * x_squared[:, None] * (1.0 + slopes**2) / speed)
+    centre_m = record.true_rate_rad_s * x_squared[:, None] * (1.0 + slopes**2) / speed
+    return np.asarray(centre_m + record.scenario.set_model.lateral_aim_m)
 
 
 def complete_steps(record: Record) -> Integers:

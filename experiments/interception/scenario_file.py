@@ -356,7 +356,7 @@ def _residual(scenario: Scenario) -> CorrectionResidual | None:
     if not isinstance(camera, OffsetCamera) or scenario.body is None:
         return None
     return correction_residual(
-        camera.phase_angle_rad or 0.0, scenario.body.radius_m, law=camera.brightness
+        camera.phase_angle_rad or 0.0, scenario.body.mean_radius_m, law=camera.brightness
     )
 
 
@@ -468,29 +468,29 @@ def _authority_warnings(scenario: Scenario, found: Feasibility) -> Iterator[str]
 def _body_warnings(scenario: Scenario, found: Feasibility) -> Iterator[str]:
     """Yield lines about a radius that is small beside the possible misses, or very large."""
     radius_m = scenario.radius_m
-    if radius_m is None:
+    if scenario.body is None or radius_m is None:
         return
+    size = f"body.radius_m is {radius_m:g}"
+    if not scenario.body.is_sphere_around_aim:
+        size = f"the circle around the aim point that is inside the body has {radius_m:.4g} m"
 
     possible = found.possible_miss
     if possible is not None and possible.images_and_speeds_m > radius_m:
         yield (
             "the images before the last decision and the speeds of [uncertainty] leave misses of "
-            f"up to {length_text(possible.images_and_speeds_m)} possible, and body.radius_m is "
-            f"{radius_m:g}: no hit is certain before the flight; smaller errors of the images or a "
+            f"up to {length_text(possible.images_and_speeds_m)} possible, and "
+            f"{size}: no hit is certain before the flight; smaller errors of the images or a "
             "later last impulse would change it"
         )
 
     if found.unguided_miss_m <= radius_m:
         yield (
-            f"body.radius_m is {radius_m:g}, and the starts of [dispersion] miss by at most "
+            f"{size}, and the starts of [dispersion] miss by at most "
             f"{length_text(found.unguided_miss_m)}: all of them hit without impulses; check the "
             "unit of the radius"
         )
     elif radius_m > LARGEST_BODY_M:
-        yield (
-            f"body.radius_m is {radius_m:g}: no near-Earth asteroid and hardly a comet is so "
-            "large; check its unit"
-        )
+        yield (f"{size}: no near-Earth asteroid and hardly a comet is so large; check its unit")
 
 
 def _step_warnings(scenario: Scenario, found: Feasibility) -> Iterator[str]:

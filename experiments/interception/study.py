@@ -15,7 +15,7 @@ from infoset.guidance import NoiseKind, Strategy, TieRule
 from infoset.guidance.noise import NoiseSource
 from infoset.guidance.noise_registry import noise_note
 from infoset.model import Model, SetSettings
-from infoset.sim import HitEstimate, MissCause, Results, Scenario, estimate_hits
+from infoset.sim import Body, HitEstimate, MissCause, Results, Scenario, estimate_hits
 from infoset.sim.requirement import (
     MAX_RUNS_NEEDED,
     AnyRequirement,
@@ -320,9 +320,40 @@ def hit_text(hits: HitEstimate | None, scenario: Scenario) -> str:
         return ""
     interval = f"{percent(hits.lower)} to {percent(hits.upper)}"
     return (
-        f"hit (miss at most {scenario.body.radius_m:g} m): {hits.hits} of {some_runs(hits.runs)} "
+        f"hit ({hit_meaning(scenario.body)}): {hits.hits} of {some_runs(hits.runs)} "
         f"({percent(hits.probability)}), 95 % CI {interval}"
     )
+
+
+def hit_meaning(body: Body) -> str:
+    """Return what counts as a hit: ``miss at most 75 m``."""
+    if body.is_sphere_around_aim:
+        return f"miss at most {body.inscribed_m:g} m"
+    longer_m, shorter_m = body.axes_m
+    if longer_m == shorter_m:
+        return f"inside the disc of radius {longer_m:g} m"
+    text = f"inside the ellipse of {longer_m:g} m x {shorter_m:g} m"
+    if body.is_turned_by_chance:
+        text += " in a direction that is drawn in each run"
+    return text
+
+
+def certain_hits_text(results: Results, scenario: Scenario) -> str:
+    """Return in how many runs the hit was certain, and the mean probability of a hit of an ellipse
+    in an unknown direction; an empty text if nothing is known of them.
+    """
+    texts = []
+    if results.certain_hit is not None and (known := int(results.certain_hit.count())):
+        texts.append(
+            f"hit certain in flight (Phi at most {scenario.radius_m:.4g} m): "
+            f"{int(results.certain_hit.sum())} of {some_runs(known)}"
+        )
+    if results.hit_probability is not None:
+        mean = float(results.hit_probability.mean())
+        texts.append(
+            f"mean probability of a hit for all directions of the ellipse: {percent(mean)}"
+        )
+    return "; ".join(texts)
 
 
 def needed_notes(required: AnyRequirement, runs: int) -> list[str]:

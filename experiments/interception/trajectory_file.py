@@ -23,9 +23,10 @@ from infoset.experiments.interception.trajectory.files import named_file
 from infoset.limits import NUMBER, Description, Line, Name, Positive, check_fields
 from infoset.model import StateBox
 from infoset.sim.approach import Approach, find_approach
+from infoset.sim.body import Body
 from infoset.sim.covariance import Covariance
 from infoset.sim.gravity import on_board_model
-from infoset.sim.scenario import Body, Scenario
+from infoset.sim.scenario import Scenario
 
 _Text = Line(longest=1000)
 """Names and paths: one line, because messages and comments of the scenario repeat them."""

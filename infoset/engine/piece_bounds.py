@@ -218,7 +218,8 @@ def miss_at(outlines: Outlines, i: int, past: Past) -> float:
         later, _ = later_impulses(label, label, -1.0, past, law)
         lower = support(points, count, -tau, -1.0) + turn - later
         drift = 0.5 * law.disturbance * time_to_go(label, past.log.elapsed, law) ** 2
-        miss = math.hypot(miss, max(upper, lower) + room + drift)
+        farther = max(upper + law.aim, lower - law.aim) + law.aim_error
+        miss = math.hypot(miss, farther + room + drift)
     return miss
 
 
@@ -444,7 +445,8 @@ def bound_piece(
         lower = bound_between(labels, supports[MINUS_LOWER_MISS], first, near, far, -slope - turn)
         lower = lower - offset - moved
         drift = 0.5 * law.disturbance * time_to_go(far, past.log.elapsed, law) ** 2
-        total = math.hypot(total, max(upper, lower) + room + drift)
+        farther = max(upper + law.aim, lower - law.aim) + law.aim_error
+        total = math.hypot(total, farther + room + drift)
     return total
 
 

@@ -78,6 +78,9 @@ class SectionLaw(NamedTuple):
         Maximum distance of the measured point from the centre along both axes, m.
     misalignment : float
         Bound of the difference of the slopes that the camera sees from the true ones.
+    aim, aim_error : float
+        Coordinate of the point at which guidance aims, relative to the centre, m, and the maximum
+        change of it by the unknown scale of the lengths.
     """
 
     closing_speed: float
@@ -113,6 +116,8 @@ class SectionLaw(NamedTuple):
     shift_error: float
     farthest_shift: float
     misalignment: float
+    aim: float
+    aim_error: float
 
 
 Laws = NDArray[np.record]
@@ -193,6 +198,7 @@ def _law(model: SetModel) -> SectionLaw:
     shift = float(sensor.shift_m)
     shift_error = abs(shift) * eta * (1.0 + BOUND_SLACK) / (1.0 - eta)
     min_label, max_label = model.label_limits_m
+    aim = float(model.lateral_aim_m[0])
     if guaranteed:
         # Gravity changes the scale 1/(1 + eta), and thereby V where z is not zero. The rounding
         # term keeps coordinates that are known exactly inside the set.
@@ -243,6 +249,9 @@ def _law(model: SetModel) -> SectionLaw:
         shift_error=shift_error,
         farthest_shift=abs(shift) + shift_error,
         misalignment=float(sensor.misalignment_rad),
+        aim=aim,
+        # The miss (1 + eta) Pi + a is (1 + eta) (Pi + a) - eta a.
+        aim_error=eta * abs(aim),
     )
 
 

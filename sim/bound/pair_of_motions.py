@@ -427,9 +427,11 @@ class PairApproach:
         correction = self._correction(-1, late_s, reserve)
         speeds = np.abs(self._middle[1] + start.velocity_m_s)
         slope = self._slope(speeds + self._by_manoeuvre(start.acceleration_m_s2), reserve)
+        # A single motion misses the centre; the aim point may be on its side.
+        aim_m = float(np.hypot.reduce(self.scenario.set_model.lateral_aim_m))
         losses = _Losses(
             correction.straight_m,
-            0.5 * reserve.position_m + correction.by_gravity_m + slope * float(along_m),
+            0.5 * reserve.position_m + correction.by_gravity_m + slope * float(along_m) + aim_m,
             slope,
         )
         return self._truths(last, track, start, (1.0, 1.0), losses)

@@ -31,6 +31,7 @@ from infoset.experiments.interception.course import (
 )
 from infoset.experiments.interception.figures.b_plane import RADIUS_SHOWN
 from infoset.experiments.interception.figures.shared import (
+    aim_in_plane,
     count_down,
     draw_body,
     draw_end,
@@ -147,15 +148,17 @@ def _draw_b_plane(axes: Axes, record: Record) -> None:
     known = complete_steps(record)
     end = record.result.lateral_miss_m[0]
     guaranteed = max_guarantee_m(record.result)
-    radius = record.scenario.radius_m
-    sizes = [float(np.abs(end).max()), guaranteed or 0.0]
+    body = record.scenario.body
+    # Predicted misses are those of the aim point, and the plane is drawn around the centre.
+    aim_m = aim_in_plane(body)
+    sizes = [float(np.abs(end).max()), (guaranteed or 0.0) + float(np.hypot(*aim_m))]
     if len(known):
-        y, z = record.predicted_miss_m[known[-1]]
+        y, z = record.predicted_miss_m[known[-1]] + aim_m[:, None]
         sizes.append(float(np.abs([y, z]).max()))
         label = "possible misses at the last decision"
         axes.add_patch(Rectangle((y[0], z[0]), y[1] - y[0], z[1] - z[0], label=label, **SET))
-    if radius is not None and radius <= RADIUS_SHOWN * max(sizes):
-        sizes.append(radius)
-    axes.plot(*true_predicted_misses(record).T, zorder=3.0, **_TRUE)
-    draw_body(axes, 1.15 * max(sizes) or 1.0, guaranteed, radius)
+    if body is not None and body.longest_m <= RADIUS_SHOWN * max(sizes):
+        sizes.append(body.longest_m)
+    axes.plot(*(true_predicted_misses(record) + aim_m).T, zorder=3.0, **_TRUE)
+    draw_body(axes, 1.15 * max(sizes) or 1.0, guaranteed, body)
     axes.plot(*end, zorder=4.0, label="closest approach", **_END)

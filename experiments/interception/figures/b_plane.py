@@ -27,9 +27,14 @@ from infoset.experiments.common.figure_style import (
 )
 from infoset.experiments.common.screen import number, some_runs
 from infoset.experiments.interception.figures.distributions import axis_limit
-from infoset.experiments.interception.figures.shared import MAX_VECTORS, draw_body, ring
+from infoset.experiments.interception.figures.shared import (
+    MAX_VECTORS,
+    aim_in_plane,
+    draw_body,
+    ring,
+)
 from infoset.experiments.interception.study import max_guarantee_m
-from infoset.sim import Results
+from infoset.sim import Body, Results
 from infoset.sim.statistics import shows
 
 _MAX_COLUMNS = 3
@@ -79,18 +84,22 @@ class Cloud:
     across_m : ndarray, shape (N, 2)
         Positions (y, z), or (B.T, B.R), at the closest approach, m.
     miss_m : ndarray, shape (N,)
-        Distances at the closest approach, m.
+        Distances of the closest approach from the aim point, m.
     guaranteed_m : float or None
         Maximum guaranteed miss of the runs, m; None if a run has no guarantee.
-    has_axes : bool
-        Whether the axes are T, to the right, and R, downward; otherwise they are y and z.
+    t_rad : float or None
+        Direction of the axis T from y toward z, rad: the axes are T, to the right, and R, downward.
+        None: they are y and z.
+    hits : int or None
+        Number of hits; None if the body has no size.
     """
 
     title: str
     across_m: Floats
     miss_m: Floats
     guaranteed_m: float | None = None
-    has_axes: bool = False
+    t_rad: float | None = None
+    hits: int | None = None
 
 
 def cloud(title: str, samples: Sequence[Results]) -> Cloud:
@@ -99,8 +108,8 @@ def cloud(title: str, samples: Sequence[Results]) -> Cloud:
     With several results of the same runs, the worst result of each run is taken.
     """
     misses = np.array([results.miss_m for results in samples])
-    has_axes = samples[0].b_plane_t_rad is not None
-    if has_axes:
+    t_rad = samples[0].b_plane_t_rad
+    if t_rad is not None:
         across = np.array([results.b_plane_m for results in samples])
     else:
         across = np.array([results.lateral_miss_m for results in samples])
@@ -109,7 +118,11 @@ def cloud(title: str, samples: Sequence[Results]) -> Cloud:
 
     bounds = [bound for bound in map(max_guarantee_m, samples) if bound is not None]
     guaranteed_m = max(bounds) if len(bounds) == len(samples) else None
-    return Cloud(title, across[worst, runs], misses[worst, runs], guaranteed_m, has_axes)
+    hits = None
+    if samples[0].hit.count():
+        hit = np.array([results.hit.filled(False) for results in samples])
+        hits = int(hit[worst, runs].sum())
+    return Cloud(title, across[worst, runs], misses[worst, runs], guaranteed_m, t_rad, hits)
 
 
 def ellipse(across_m: Floats, level: float, within_m: float = np.inf) -> Floats | None:
@@ -135,21 +148,23 @@ def ellipse(across_m: Floats, level: float, within_m: float = np.inf) -> Floats 
 
 
 @style()
-def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figure:
+def draw_b_plane(clouds: Sequence[Cloud], body: Body | None = None) -> Figure:
     """Draw the miss of each run as a point in the plane across the approach.
 
     Each cloud has a panel.
 
     Ellipses contain 50 % and 99 % of the runs. The radii of the circles are the median and the 90 %
     quantile of the miss, and the maximum guaranteed miss. All panels have the same limits, unless
-    the median misses differ much. The radius of the body, m, is drawn as a disc; if it is small
-    beside the misses, each cloud has a second panel at the scale of the body.
+    the median misses differ much. The body is drawn with its aim point; if it is small beside the
+    misses, each cloud has a second panel at the scale of the body.
     """
+    size_m = None if body is None else body.longest_m
+    aim_m = float(np.hypot(*aim_in_plane(body)))
     medians = [float(np.median(each.miss_m)) for each in clouds]
     has_own_limits = max(medians) > _OWN_LIMITS_FROM * min(medians)
-    halves = [_half_width([each] if has_own_limits else clouds, radius_m) for each in clouds]
-    if radius_m is not None and max(halves) > _BODY_FROM * radius_m:
-        halves += [_BODY_SCALE * radius_m] * len(clouds)
+    halves = [_half_width([each] if has_own_limits else clouds, size_m, aim_m) for each in clouds]
+    if size_m is not None and max(halves) > _BODY_FROM * size_m:
+        halves += [_BODY_SCALE * size_m] * len(clouds)
 
     # A single cloud has its two panels in one row.
     columns = len(halves)
@@ -165,9 +180,9 @@ def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figu
     for place, (axes, each, half) in enumerate(
         zip(panels, itertools.cycle(clouds), halves, strict=False)
     ):
-        lines = _draw_cloud(axes, each, half, radius_m)
+        lines = _draw_cloud(axes, each, half, body)
         if place >= len(clouds):
-            # The last line of `_draw_cloud` is the hits: there is a radius here.
+            # The last line of `_draw_cloud` is the hits: the body has a size here.
             lines = [_AT_BODY_SCALE, lines[-1]]
         titles.append("\n".join([plain(each.title), *lines]))
 
@@ -180,25 +195,27 @@ def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figu
     return figure
 
 
-def _half_width(clouds: Sequence[Cloud], radius_m: float | None) -> float:
+def _half_width(clouds: Sequence[Cloud], size_m: float | None, aim_m: float) -> float:
     """Return half the length of the axes, so that all misses are visible.
 
-    The radius of the body and Φ are visible, too, if they are not much greater.
+    The longer semi-axis of the body and Φ are visible, too, if they are not much greater. Misses
+    and Φ are around the aim point, which is at the distance `aim_m` from the middle of the axes.
     """
-    maximum = axis_limit([each.miss_m for each in clouds]) or 1.0
+    maximum = aim_m + (axis_limit([each.miss_m for each in clouds]) or 1.0)
+    bounds_m = [aim_m + each.guaranteed_m for each in clouds if each.guaranteed_m is not None]
     half = maximum
-    for size in (radius_m, *(each.guaranteed_m for each in clouds)):
+    for size in (size_m, *bounds_m):
         if size is not None and size <= RADIUS_SHOWN * maximum:
             half = max(half, size)
     return 1.08 * half  # a margin, so that the farthest point is not on the frame; chosen
 
 
-def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) -> list[str]:
+def _draw_cloud(axes: Axes, each: Cloud, half: float, body: Body | None) -> list[str]:
     """Draw the points and lines of a panel, and return the lines of its title."""
     count = len(each.miss_m)
-    known = _draw_points(axes, each)
-    draw_body(axes, half, each.guaranteed_m, radius_m)
-    if each.has_axes:
+    known = _draw_points(axes, each, aim_in_plane(body, each.t_rad))
+    draw_body(axes, half, each.guaranteed_m, body, each.t_rad)
+    if each.t_rad is not None:
         axes.set(xlabel=r"$B\cdot T$, m", ylabel=r"$B\cdot R$, m", ylim=(half, -half))
     outside = int((np.abs(each.across_m) > half).any(axis=1).sum())
 
@@ -216,16 +233,16 @@ def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) ->
     lines = [", ".join(known)]
     if each.guaranteed_m is not None:
         lines.append(f"maximum Φ {number(each.guaranteed_m)} m")
-    if radius_m is not None:
-        hits = int((each.miss_m <= radius_m).sum())
-        lines.append(f"hits: {hits} of {some_runs(count)}")
+    if each.hits is not None:
+        lines.append(f"hits: {each.hits} of {some_runs(count)}")
     return lines
 
 
-def _draw_points(axes: Axes, each: Cloud) -> list[str]:
+def _draw_points(axes: Axes, each: Cloud, aim_m: Floats) -> list[str]:
     """Draw the misses with circles and ellipses, and return the quantiles that the sample shows.
 
-    Each quantile is one text. The more points, the smaller and paler they are (`_MARKER_PT`).
+    Circles are around the aim point, m, shape (2,). Each quantile is one text. The more points, the
+    smaller and paler they are (`_MARKER_PT`).
     """
     count = len(each.miss_m)
     point: dict[str, Any] = {
@@ -245,7 +262,7 @@ def _draw_points(axes: Axes, each: Cloud) -> list[str]:
     for level, name, dashes in _CIRCLES:
         if shows(count, level):
             quantile = float(np.quantile(each.miss_m, level))
-            circle = ring(quantile)
+            circle = aim_m[:, None] + ring(quantile)
             axes.plot(*circle, label=name, color=GAME, linestyle=dashes, linewidth=0.9, **line)
             level_text = "median" if level == 0.5 else f"{100 * level:g} %"
             known.append(f"{level_text} {number(quantile)} m")

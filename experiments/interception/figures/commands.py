@@ -50,7 +50,7 @@ def draw_experiment(
             if curve.noise == noise:
                 sensor = "with" if curve.range_sensor else "no"
                 clouds.append(cloud(f"{noise} noise,\n{sensor} range sensor", [curve.results]))
-        yield draw_b_plane(clouds, scenario.radius_m)
+        yield draw_b_plane(clouds, scenario.body)
 
 
 def draw_compared(scenario: Scenario, compared: Sequence[Comparison]) -> Iterator[Figure]:
@@ -67,7 +67,7 @@ def draw_compared(scenario: Scenario, compared: Sequence[Comparison]) -> Iterato
             for one in compared
             if one.noise == noise
         ]
-        yield draw_b_plane(clouds, scenario.radius_m)
+        yield draw_b_plane(clouds, scenario.body)
 
 
 def draw_flights(records: Sequence[Record], times_s: Sequence[float]) -> Iterator[Figure]:

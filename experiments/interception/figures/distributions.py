@@ -193,7 +193,7 @@ def draw_radius(axes: Axes, radius_m: float | None) -> None:
     """Draw the radius of the body, if it is known, as a line on a scaled axis of misses."""
     if radius_m is None:
         return
-    label = f"body radius, {radius_m:g} m"
+    label = f"body radius, {radius_m:.4g} m"
     look = RADIUS | {"transform": axes.get_xaxis_transform()}
     if radius_m <= axes.get_xlim()[1]:
         axes.plot(

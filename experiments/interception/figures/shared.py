@@ -9,10 +9,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullFormatter
 
+from infoset.arrays import Floats
 from infoset.experiments.common.figure_style import BODY_FILL, EVENT, GUARANTEED, HALO, INK
 from infoset.experiments.common.units import SECONDS, duration_text, length_unit
 from infoset.experiments.interception.course import marks, min_to_go_s
-from infoset.sim import Scenario
+from infoset.sim import Body, Scenario
+from infoset.sim.results import b_plane
 
 RADIUS: dict[str, Any] = {"color": INK, "linestyle": (0, (6, 1.5, 1, 1.5)), "linewidth": 0.9}
 """Line of the radius of the body."""
@@ -44,7 +46,7 @@ def draw_levels(axes: Axes, guaranteed_m: float | None, radius_m: float | None) 
     if guaranteed_m:
         axes.axhline(guaranteed_m, label="guaranteed miss Φ", **GUARANTEE)
     if radius_m:
-        axes.axhline(radius_m, label=f"body radius, {radius_m:g} m", **RADIUS)
+        axes.axhline(radius_m, label=f"body radius, {radius_m:.4g} m", **RADIUS)
 
 
 def draw_end(axes: Axes, time_s: float, miss_m: float, scenario: Scenario) -> None:
@@ -66,20 +68,22 @@ def draw_end(axes: Axes, time_s: float, miss_m: float, scenario: Scenario) -> No
 
 
 def draw_body(
-    axes: Axes, half_m: float, guaranteed_m: float | None, radius_m: float | None
+    axes: Axes,
+    half_m: float,
+    guaranteed_m: float | None,
+    body: Body | None,
+    t_rad: float | None = None,
 ) -> None:
-    """Draw the B-plane around the centre of the body: disc, guaranteed miss and labels.
+    """Draw the B-plane around the centre of the body: its outline, guaranteed miss and labels.
 
-    The axes extend by `half_m` in each direction.
+    The axes extend by `half_m` in each direction. They are y and z, or with `t_rad` B.T and B.R.
     """
-    if radius_m is not None and radius_m >= _MIN_DISC * half_m:
-        label = f"body radius, {radius_m:g} m"
-        if radius_m > half_m:
-            label += ": beyond the axes"
-        fill = axes.fill(*ring(radius_m), facecolor=BODY_FILL, zorder=0.6, label=label)
-        fill[0].set(edgecolor=INK, linestyle=RADIUS["linestyle"])
+    aim_m = aim_in_plane(body, t_rad)
+    if body is not None and body.longest_m >= _MIN_DISC * half_m:
+        _draw_outline(axes, half_m, body, t_rad)
     if guaranteed_m is not None and guaranteed_m <= half_m:
-        axes.plot(*ring(guaranteed_m), label="guaranteed miss Φ", zorder=3.1, **GUARANTEE)
+        circle = aim_m[:, None] + ring(guaranteed_m)
+        axes.plot(*circle, label="guaranteed miss Φ", zorder=3.1, **GUARANTEE)
     centre: dict[str, Any] = {
         "color": INK,
         "marker": "+",
@@ -88,6 +92,9 @@ def draw_body(
         "zorder": 4.0,
     }
     axes.plot(0.0, 0.0, markeredgewidth=1.1, label="centre of the body", **centre)
+    if aim_m.any():
+        circle = {"marker": "o", "markersize": 5.0, "markerfacecolor": "none"}
+        axes.plot(*aim_m, markeredgewidth=1.1, label="aim point", **{**centre, **circle})
 
     unit, per_m = length_unit(half_m)
     axes.set(xlim=(-half_m, half_m), ylim=(-half_m, half_m), aspect="equal")
@@ -95,6 +102,49 @@ def draw_body(
     for one in (axes.xaxis, axes.yaxis):
         one.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 5, 10]))
         one.set_major_formatter(lambda tick, _: f"{tick * per_m:g}".replace("-", "\N{MINUS SIGN}"))
+
+
+def _draw_outline(axes: Axes, half_m: float, body: Body, t_rad: float | None) -> None:
+    """Draw the silhouette of a body; for an unknown direction, the discs inside and around it."""
+    longer_m, shorter_m = body.axes_m
+    label = f"body radius, {longer_m:g} m"
+    if longer_m != shorter_m:
+        label = f"body, {longer_m:g} m x {shorter_m:g} m"
+    if body.is_turned_by_chance:
+        axes.plot(
+            *ring(longer_m), zorder=0.7, label=f"its longer semi-axis, {longer_m:g} m", **RADIUS
+        )
+        label = f"body, shorter semi-axis, {shorter_m:g} m"
+    if shorter_m > half_m:
+        label += ": beyond the axes"
+
+    outline = ring(shorter_m)
+    if body.axis_angle_rad is not None:
+        # A point of the plane of y and z and its opposite are both on the outline.
+        angle_rad = body.axis_angle_rad - (t_rad or 0.0)
+        along, across = ring(1.0)
+        outline = np.stack(
+            [
+                longer_m * along * np.cos(angle_rad) - shorter_m * across * np.sin(angle_rad),
+                longer_m * along * np.sin(angle_rad) + shorter_m * across * np.cos(angle_rad),
+            ]
+        )
+    fill = axes.fill(*outline, facecolor=BODY_FILL, zorder=0.6, label=label)
+    fill[0].set(edgecolor=INK, linestyle=RADIUS["linestyle"])
+
+
+def aim_in_plane(body: Body | None, t_rad: float | None = None) -> Floats:
+    """Return where closest approaches without a miss are in the B-plane, m, shape (2,).
+
+    In the axes y and z of the body's position it is opposite to the aim point, in those of B.T and
+    B.R it is the aim point.
+    """
+    if body is None or body.aim_m is None:
+        return np.zeros(2)
+    closest_m = -np.array(body.aim_m)
+    if t_rad is None:
+        return closest_m
+    return np.asarray(b_plane(closest_m[None], t_rad)[0])
 
 
 def ring(radius: float) -> Any:

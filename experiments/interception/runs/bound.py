@@ -219,8 +219,8 @@ def _summary(
         "lower_bound_m": lower.bound_m,
         "lower_bound_without_wrong_images_m": exact_m,
     }
-    if scenario.radius_m is not None:
-        keys["hit_cannot_be_guaranteed"] = lower.bound_m > scenario.radius_m
+    if scenario.body is not None:
+        keys["hit_cannot_be_guaranteed"] = lower.bound_m > scenario.body.certain_miss_m
     keys["reached_at"] = _where(lower.pair, scenario)
     keys["at_nominal_range"] = {**_where(nominal, scenario), "bound_m": nominal.bound_m}
     keys["by_label"] = [
@@ -380,9 +380,11 @@ def _bound_parts(
             "without wrong images)"
         )
     yield line
-    if scenario.radius_m is not None:
+    if scenario.body is not None:
         body = f"the body of radius {scenario.radius_m:g} m"
-        if lower.bound_m > scenario.radius_m:
+        if not scenario.body.is_sphere_around_aim:
+            body = f"the body, within {scenario.body.certain_miss_m:.4g} m of the aim point,"
+        if lower.bound_m > scenario.body.certain_miss_m:
             yield f"a hit of {body} cannot be guaranteed by any strategy"
         else:
             yield f"this does not exclude a strategy that guarantees a hit of {body}"

@@ -190,7 +190,10 @@ def _set_table(scenario: Scenario, compared: Sequence[Comparison]) -> Table:
     """Return the table of the sets, and of the hits if the body has a size."""
     titles = ["true state in the\nset at every step", "set became\nempty"]
     if scenario.body is not None:
-        titles += [f"hit: miss at\nmost {scenario.body.radius_m:g} m", "95 % CI\nof a hit"]
+        hit = "hit"
+        if scenario.body.is_sphere_around_aim:
+            hit = f"hit: miss at\nmost {scenario.radius_m:g} m"
+        titles += [hit, "95 % CI\nof a hit"]
     table = number_table("noise", "strategy", *titles, left=2)
 
     for comparison in compared:

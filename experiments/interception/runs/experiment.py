@@ -45,6 +45,7 @@ from infoset.experiments.interception.study import (
     Curve,
     SetCounts,
     case_title,
+    certain_hits_text,
     curve_scenarios,
     hit_text,
     is_of_paper,
@@ -300,6 +301,7 @@ def _curve_lines(scenario: Scenario, curve: Curve) -> Iterator[str]:
     outcomes = Counter(outcome.value for outcome in results.outcomes)
     lines = [
         hit_text(results.hits, scenario),
+        certain_hits_text(results, scenario),
         certificate(sets, int(held.sum()), len(held)),
         *(f"{outcome}: {count}" for outcome, count in outcomes.items()),
     ]

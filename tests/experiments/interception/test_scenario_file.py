@@ -19,8 +19,9 @@ from infoset.guidance import NoiseKind, TieRule
 from infoset.guidance.thruster import Thruster
 from infoset.model import Model, SetModel, SetSettings, StateBox
 from infoset.sensors import AngleSensor, Camera, RangeSensor, RateSensor
+from infoset.sim.body import Body
 from infoset.sim.covariance import Covariance
-from infoset.sim.scenario import Body, Scenario, Sun, Target, of_model
+from infoset.sim.scenario import Scenario, Sun, Target, of_model
 from infoset.sim.storage.codec import fingerprint
 from tests.built_in import scenario_names, scenario_text
 

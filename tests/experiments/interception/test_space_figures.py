@@ -23,7 +23,7 @@ from infoset.experiments.interception.scenario_file import load_scenario
 from infoset.experiments.interception.study import Curve
 from infoset.guidance import NoiseKind
 from infoset.guidance.thruster import modulus
-from infoset.sim import Record, Results, fly_one, simulate
+from infoset.sim import Body, Record, Results, fly_one, simulate
 from infoset.sim.scenario import of_model
 
 RUNS = 12
@@ -115,16 +115,17 @@ def test_ellipses_contain_their_share_of_the_runs_within_the_guaranteed_miss() -
 def test_wide_misses_have_a_panel_at_the_scale_of_the_body() -> None:
     across = 1e3 * np.random.default_rng(5).normal(size=(50, 2))
     across[:4] *= 1e-3
-    wide = Cloud("wide", across, np.hypot(*across.T))
-    figure = draw_b_plane([wide, wide], 100.0)
-    hits = int((wide.miss_m <= 100.0).sum())
+    misses = np.hypot(*across.T)
+    hits = int((misses <= 100.0).sum())
+    wide = Cloud("wide", across, misses, hits=hits)
+    figure = draw_b_plane([wide, wide], Body(100.0))
     assert 4 <= hits < 50
     assert [axes.get_title("left").splitlines()[-1] for axes in figure.axes] == [
         f"hits: {hits} of 50 runs"
     ] * 4
     assert [axes.get_xlim()[1] == 200.0 for axes in figure.axes] == [False, False, True, True]
     assert "body radius, 100 m" in legend(figure)
-    assert len(draw_b_plane([wide], 1500.0).axes) == 1
+    assert len(draw_b_plane([wide], Body(1500.0)).axes) == 1
     far = draw_b_plane(
         [replace(wide, across_m=20.0 * across, miss_m=20.0 * wide.miss_m)], None
     ).axes[0]
