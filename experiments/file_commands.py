@@ -40,6 +40,17 @@ Sigmas = Annotated[
         help="Standard deviations that uncertainty and dispersion contain.",
     ),
 ]
+MagnitudeText = Annotated[
+    str | None,
+    typer.Option(
+        "--magnitude",
+        metavar="H=H,limit=V,phase=DEG",
+        help=(
+            "Print the first image in which the body is bright enough: from its absolute magnitude "
+            "H, the limiting magnitude of the camera and the phase angle, deg."
+        ),
+    ),
+]
 BodyRadius = Annotated[
     float | None,
     typer.Option(
@@ -157,16 +168,29 @@ def _commands(noun: str, of_what: str, example: str) -> typer.Typer:
             quiet,
         )
 
-    @app.command(
+    command = app.command(
+        "check",
         help=f"Check a {noun} file. The exit code is 2 if it has errors; all are listed.",
         epilog=f"Example: {name} check mine.toml",
     )
-    def check(
-        file: FileName, settings: Settings = None, json: AsJson = False, quiet: Quiet = False
-    ) -> None:
-        _print_check(file, settings, kinds, json, quiet)
-
+    command(_check_scenario if noun == SCENARIO else _check_problem)
     return app
+
+
+def _check_scenario(
+    file: FileName,
+    settings: Settings = None,
+    magnitude: MagnitudeText = None,
+    json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    _print_check(_checked_scenario(file, settings, magnitude), json, quiet)
+
+
+def _check_problem(
+    file: FileName, settings: Settings = None, json: AsJson = False, quiet: Quiet = False
+) -> None:
+    _print_check(_checked_problem(file, settings), json, quiet)
 
 
 def _named(text: str, name: str, like: str) -> str:
@@ -210,7 +234,8 @@ class _Checked(NamedTuple):
     warnings: Sequence[str] = ()
 
 
-def _checked_scenario(file: str, settings: Sequence[str] | None) -> _Checked:
+def _checked_scenario(file: str, settings: Sequence[str] | None, magnitude: str | None) -> _Checked:
+    from infoset.experiments.interception.first_image import first_image, read_magnitude
     from infoset.experiments.interception.scenario_file import (
         all_warnings,
         brightness_json,
@@ -222,17 +247,22 @@ def _checked_scenario(file: str, settings: Sequence[str] | None) -> _Checked:
     from infoset.sim.storage.codec import fingerprint
 
     scenario = load_scenario(file, settings)
-    keys = {
+    keys: dict[str, object] = {
         "scenario_hash": fingerprint(scenario),
         "schedule": schedule_json(scenario),
         "possible_miss": possible_miss_json(scenario),
         "centre_of_brightness": brightness_json(scenario),
     }
+    facts = flight_facts(scenario)
+    if magnitude is not None:
+        first = first_image(scenario, read_magnitude(magnitude))
+        keys["first_image"] = first
+        facts = [*facts, str(first)]
     return _Checked(
         scenario.name,
         fingerprint(scenario),
         keys,
-        flight_facts(scenario),
+        facts,
         all_warnings(scenario),
     )
 
@@ -246,18 +276,12 @@ def _checked_problem(file: str, settings: Sequence[str] | None) -> _Checked:
     return _Checked(problem.name, fingerprint(problem), keys)
 
 
-def _print_check(
-    file: str, settings: Sequence[str] | None, kinds: Sequence[str], json: bool, quiet: bool
-) -> None:
-    """Check a file of one of these kinds; print its name, fingerprint, schedule and warnings."""
+def _print_check(checked: _Checked, json: bool, quiet: bool) -> None:
+    """Print the name, fingerprint, schedule and warnings of a file without errors."""
     from infoset.experiments.common.output import to_json
     from infoset.experiments.common.screen import say_warnings
     from infoset.sim.versions import versions
 
-    if SCENARIO in kinds:
-        checked = _checked_scenario(file, settings)
-    else:
-        checked = _checked_problem(file, settings)
     if json:
         keys = {"versions": versions(), "name": checked.name, **checked.keys}
         typer.echo(to_json({**keys, "warnings": checked.warnings}), nl=False)
