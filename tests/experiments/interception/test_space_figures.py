@@ -184,8 +184,9 @@ def test_approach_shows_possible_misses_and_the_schedule(records: list[Record]) 
         centred[:, 1], np.hypot(*(0.5 * np.diff(intervals, axis=2)[:, :, 0].T))
     )
     before = record.scenario.nominal_arrival_s - record.time_s
-    np.testing.assert_allclose(known[:, 0], np.maximum(before[:count], 0.25))
-    np.testing.assert_allclose(shown[:, 0], np.maximum(before, 0.25))
+    half_step_s = 0.5 * model.step_s
+    np.testing.assert_allclose(known[:, 0], np.maximum(before[:count], half_step_s))
+    np.testing.assert_allclose(shown[:, 0], np.maximum(before, half_step_s))
     seconds = record.true_range_m[-1] / model.closing_speed_m_s
     end = true_predicted_misses(record)[-1] - seconds * record.impulse_m_s[-1]
     np.testing.assert_allclose(end, record.result.lateral_miss_m[0], atol=0.01)
