@@ -27,7 +27,7 @@ ROOT = Path(__file__).resolve().parents[2]
 _STEPS = "--set step_s={0} --set camera.period_s={0}"
 REDUCED = (
     (r"^infoset experiment\b(?!.* --runs)", "infoset experiment --runs 2"),
-    (r"--runs \d+", "--runs 2"),
+    (r"--runs (\d+|needed)", "--runs 2"),
     (r"--single-runs \d+", "--single-runs 2"),
     (r"--engagements (\d+|N)", "--engagements 8"),
     (r"--budget \d+", "--budget 20"),
