@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -171,7 +172,7 @@ def solve_guarantee(
             bound = max((lower_bound(part).value for part in parts), default=0.0)
             radius = max((information_radius(part).value for part in parts), default=0.0)
     progress(0.6)
-    plan, drifts = _checked_plan(rendezvous, plan)
+    plan, drifts = _checked_plan(rendezvous, plan, progress)
     progress(0.9)
     count = FLIGHTS if options.flights is None else options.flights
     flown = rendezvous.problem
@@ -185,7 +186,7 @@ def solve_guarantee(
 
 
 def _checked_plan(
-    rendezvous: Rendezvous, plan: AffinePlan
+    rendezvous: Rendezvous, plan: AffinePlan, progress: Callable[[float], None]
 ) -> tuple[AffinePlan, DriftCertificate | None]:
     """Return a plan whose drifts are safe and whose guarantee holds for nonlinear motion, as the
     problem asks, and the distances of its drifts; `plan` if it asks for neither.
@@ -196,12 +197,23 @@ def _checked_plan(
     if safety is None and not rendezvous.nonlinear:
         return plan, None
     drifts = rendezvous.drifts
+    programs = itertools.count(1)
+
+    def on_program() -> None:
+        # From 60 % to 90 %: how many programs there will be is not known.
+        progress(0.9 - 0.3 * 0.9 ** next(programs))
 
     def solve(problem: OutputProblem) -> AffinePlan:
         if safety is None:
-            return best_plan(rendezvous, problem)
-        safe = PassiveSafety(drifts, safety.keep_out_m)
-        return _within(rendezvous, problem, lambda each: safe_plan(each, safe, WINDOW).plan)
+            found = best_plan(rendezvous, problem)
+            on_program()
+            return found
+        keep_out = PassiveSafety(drifts, safety.keep_out_m)
+
+        def safe(each: OutputProblem) -> AffinePlan:
+            return safe_plan(each, keep_out, WINDOW, on_program).plan
+
+        return _within(rendezvous, problem, safe)
 
     # With the constraints that the plan needed already.
     problem = replace(plan.problem, caps=None)

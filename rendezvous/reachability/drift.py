@@ -5,16 +5,26 @@ Theorem 8 of `docs/guaranteed-rendezvous.md`.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
 from infoset.rendezvous._arrays import Flags, Floats
 from infoset.rendezvous.reachability.coasting import Coasting, CoastTube
 from infoset.rendezvous.reachability.conic import NoSolutionError
-from infoset.rendezvous.reachability.guaranteed import PlanVariables, affine_plan, row_sizes
+from infoset.rendezvous.reachability.guaranteed import (
+    PlanVariables,
+    PlanWithRows,
+    best_with_rows,
+    is_broken,
+    no_rows,
+    plan_with_rows,
+    row_sizes,
+)
 from infoset.rendezvous.reachability.motion import IMPULSE
 from infoset.rendezvous.reachability.outputs import AffinePlan, OutputProblem, PathRows, joined
 from infoset.rendezvous.reachability.robust import NoRobustPlanError
@@ -159,8 +169,31 @@ def _unit(vectors: Floats) -> Floats:
     return np.where(lengths > 0.0, vectors / safe, first)
 
 
+class _SafePlan(NamedTuple):
+    """A certificate, and the constraints that its program had.
+
+    They are intervals of the drifts, shape (K, N), and rows of the path, shape (k,).
+    """
+
+    certificate: DriftCertificate
+    intervals: Flags
+    path: Flags
+
+
+class _Search(NamedTuple):
+    """What is searched for: the arguments of `safe_plan`."""
+
+    problem: OutputProblem
+    safety: PassiveSafety
+    window: int | None
+    on_program: Callable[[], None]
+
+
 def safe_plan(
-    problem: OutputProblem, safety: PassiveSafety, window: int | None = None
+    problem: OutputProblem,
+    safety: PassiveSafety,
+    window: int | None = None,
+    on_program: Callable[[], None] = lambda: None,
 ) -> DriftCertificate:
     """Return the affine plan with the smallest guarantee that was found with safe drifts.
 
@@ -168,6 +201,7 @@ def safe_plan(
     and impulses in m/s. The plan's problem has the constraints of the drifts as further rows of the
     path. The normals of the constraints are those of the plan without safety at first, and are then
     renewed until the guarantee stays: the plan is a local optimum. Its distances are certificates.
+    `on_program` is called after each program that was solved.
 
     Raises
     ------
@@ -176,23 +210,25 @@ def safe_plan(
     ValueError, NoSolutionError, UnboundedCoastError
         As in `affine_plan` and `drift_certificate`.
     """
-    free = _at_own_caps(affine_plan(problem, window))
-    found = drift_certificate(free, safety.coasting)
-    if found.least_distance >= safety.keep_out_m:
-        return found
+    best = best_with_rows(problem, window, no_rows(problem))
+    free = _at_own_caps(best.plan)
+    certificate = drift_certificate(free, safety.coasting)
+    if certificate.least_distance >= safety.keep_out_m:
+        return certificate
 
-    found = _first_safe(problem, safety, free, window)
+    search = _Search(problem, safety, window, on_program)
+    found = _first_safe(search, best._replace(plan=free))
     for _ in range(_MAX_ROUNDS):
-        if found.plan.guarantee <= (1.0 + _GAIN) * free.guarantee:
-            return found
-        better = _safe_with(problem, safety, found, window)
-        if better is None or better.plan.guarantee >= found.plan.guarantee:
-            return found
-        gain = found.plan.guarantee - better.plan.guarantee
+        guarantee = found.certificate.plan.guarantee
+        if guarantee <= (1.0 + _GAIN) * free.guarantee:
+            break
+        better = _safe_with(search, found)
+        if better is None or better.certificate.plan.guarantee >= guarantee:
+            break
         found = better
-        if gain <= _GAIN * found.plan.guarantee:
-            return found
-    return found
+        if guarantee - found.certificate.plan.guarantee <= _GAIN * guarantee:
+            break
+    return found.certificate
 
 
 def _at_own_caps(plan: AffinePlan) -> AffinePlan:
@@ -205,32 +241,36 @@ def _at_own_caps(plan: AffinePlan) -> AffinePlan:
     return plan.under(replace(problem, caps=np.minimum(limits, caps)))
 
 
-def _first_safe(
-    problem: OutputProblem, safety: PassiveSafety, free: AffinePlan, window: int | None
-) -> DriftCertificate:
+def _first_safe(search: _Search, free: PlanWithRows) -> _SafePlan:
     """Return a safe plan, with normals of the plan without safety at first.
 
     Errors proportional to the controls are bounded at caps, which are constraints: those of the
     plan without safety may exclude the safe plans, and larger ones make the errors larger.
     """
-    starts = [free]
+    problem = search.problem
+    safety = search.safety
+    starts = [free.plan]
     if problem.relative_error is not None:
-        own = free.control_ranges.largest
+        own = free.plan.control_ranges.largest
         same = np.broadcast_to(own.max(axis=0), own.shape)
-        starts = [free.under(replace(problem, caps=caps)) for caps in (own, same, problem.limits)]
+        starts = [
+            free.plan.under(replace(problem, caps=caps)) for caps in (own, same, problem.limits)
+        ]
     nearest = 0.0
+    path = free.entered
     for start in starts:
-        found = drift_certificate(start, safety.coasting)
-        nearest = max(nearest, found.least_distance)
+        certificate = drift_certificate(start, safety.coasting)
+        found = _SafePlan(certificate, np.zeros(certificate.distances.shape, dtype=bool), path)
+        nearest = max(nearest, certificate.least_distance)
         for _ in range(_MAX_ROUNDS):
-            safe = _safe_with(problem, safety, found, window)
+            safe = _safe_with(search, found)
             if safe is not None:
                 return safe
-            nearer = _least_violation(problem, safety, found, window)
-            nearest = max(nearest, nearer.least_distance)
-            if nearer.distances.min() <= found.distances.min() + _GAIN * safety.keep_out_m:
+            least = found.certificate.distances.min()
+            found = _least_violation(search, found)
+            nearest = max(nearest, found.certificate.least_distance)
+            if found.certificate.distances.min() <= least + _GAIN * safety.keep_out_m:
                 break
-            found = nearer
     raise NoRobustPlanError(
         f"no plan was found whose drifts stay {safety.keep_out_m:g} m from the target for all "
         f"errors; the best one stays {nearest:.3g} m away; reduce the keep-out distance, the "
@@ -238,42 +278,63 @@ def _first_safe(
     )
 
 
-def _safe_with(
-    problem: OutputProblem, safety: PassiveSafety, found: DriftCertificate, window: int | None
-) -> DriftCertificate | None:
-    """Return the best plan with the normals of a certificate, or None if there is none."""
-    limited = replace(problem, caps=found.plan.problem.caps)
-    normals = found.normals
-    extents = found.tube.extents(normals)
-    sagittas = found.tube.sagittas
-    entered = _worst(found.distances, (1.0 + _AHEAD) * safety.keep_out_m)
+def _safe_with(search: _Search, found: _SafePlan) -> _SafePlan | None:
+    """Return the best plan with the normals of a certificate, or None if there is none.
+
+    Errors proportional to the controls are first those at the caps of the certificate's plan, and
+    then those at the caps of each safe plan.
+    """
+    problem = search.problem
+    safety = search.safety
+    caps = found.certificate.plan.problem.caps
+    normals = found.certificate.normals
+    extents = found.certificate.tube.extents(normals)
+    sagittas = found.certificate.tube.sagittas
+    ahead = (1.0 + _AHEAD) * safety.keep_out_m
+    intervals = found.intervals | _lowest(found.certificate.distances, ahead)
+    path = found.path
+    best = None
     for _ in range(_MAX_CHECKS):
-        rows = _rows(safety, normals, extents + sagittas[..., None], entered)
+        rows = _rows(safety, normals, extents + sagittas[..., None], intervals)
+        limited = replace(problem, caps=caps, path=joined(problem.path, rows))
+        known = np.concatenate([path, np.ones(len(rows.times), dtype=bool)])
         try:
-            safe = replace(limited, path=joined(problem.path, rows))
-            plan = affine_plan(safe, window, every_row=True)
+            plan, entered = plan_with_rows(limited, search.window, known)
         except (NoRobustPlanError, NoSolutionError):
-            return None
+            return best
+        search.on_program()
+        path = entered[: len(path)]
         own = _at_own_caps(plan)
         tube = safety.coasting.tube(own)
         distances = tube.certain_distances(normals)
-        if distances.min() >= safety.keep_out_m:
-            return drift_certificate(own, safety.coasting, normals)
+        if distances.min() < safety.keep_out_m:
+            intervals = intervals | _lowest(distances, safety.keep_out_m)
+            # The bounds between instants may be larger for the new plan: they are the next caps.
+            extents = np.maximum(extents, tube.extents(normals))
+            sagittas = np.maximum(sagittas, tube.sagittas)
+            continue
 
-        entered = entered | _worst(distances, safety.keep_out_m)
-        # The bounds between instants may be larger for the new plan: they are the next caps.
-        extents = np.maximum(extents, tube.extents(normals))
-        sagittas = np.maximum(sagittas, tube.sagittas)
-    return None
+        if best is not None and own.guarantee >= (1.0 - _GAIN) * best.certificate.plan.guarantee:
+            return best
+        certificate = drift_certificate(own, safety.coasting, normals)
+        best = _SafePlan(certificate, intervals, path)
+        if problem.relative_error is None:
+            return best
+        caps = own.problem.caps
+        extents = tube.extents(normals)
+        sagittas = tube.sagittas
+    return best
 
 
-def _worst(distances: Floats, below: float) -> Flags:
-    """Return flags of the interval of each drift with the least distance, if it is too small."""
-    flags = np.zeros(distances.shape, dtype=bool)
-    drifts = np.arange(len(distances))
-    lowest = distances.argmin(axis=1)
-    flags[drifts, lowest] = distances[drifts, lowest] < below
-    return flags
+def _lowest(distances: Floats, below: float) -> Flags:
+    """Return flags of the intervals in which the distance of a drift is least, if too small.
+
+    They are local minima over the time of the drift.
+    """
+    ends = np.full((len(distances), 1), np.inf)
+    around = np.hstack([ends, distances, ends])
+    is_lowest = (distances <= around[:, :-2]) & (distances <= around[:, 2:])
+    return np.asarray(is_lowest & (distances < below))
 
 
 def _rows(safety: PassiveSafety, normals: Floats, allowances: Floats, entered: Flags) -> PathRows:
@@ -296,46 +357,67 @@ def _rows(safety: PassiveSafety, normals: Floats, allowances: Floats, entered: F
     )
 
 
-def _least_violation(
-    problem: OutputProblem, safety: PassiveSafety, found: DriftCertificate, window: int | None
-) -> DriftCertificate:
+def _least_violation(search: _Search, found: _SafePlan) -> _SafePlan:
     """Return the plan whose drifts violate the constraints least, with renewed normals."""
-    limited = replace(problem, caps=found.plan.problem.caps)
-    allowances = found.tube.extents(found.normals) + found.tube.sagittas[..., None]
+    problem = search.problem
+    safety = search.safety
+    certificate = found.certificate
+    limited = replace(problem, caps=certificate.plan.problem.caps)
+    known = certificate.tube
+    allowances = known.extents(certificate.normals) + known.sagittas[..., None]
     aim = (1.0 + _AHEAD) * safety.keep_out_m
-    entered = _worst(found.distances, aim)
-    if not entered.any():
+    intervals = found.intervals | _lowest(certificate.distances, aim)
+    if not intervals.any():
         return found
+    path = found.path
     while True:
-        rows = _rows(safety, found.normals, allowances, entered)
-        plan = _plan_of_least_violation(limited, rows, window, -_AHEAD * safety.keep_out_m)
+        rows = _rows(safety, certificate.normals, allowances, intervals)
+        plan, path = _plan_of_least_violation(
+            limited, rows, search.window, path, -_AHEAD * safety.keep_out_m
+        )
+        search.on_program()
         violation = float((rows.lower - plan.ranges_of(rows).lower).max())
         tube = safety.coasting.tube(plan)
-        distances = tube.certain_distances(found.normals) + tube.sagittas - found.tube.sagittas
+        distances = tube.certain_distances(certificate.normals)
+        distances = distances + tube.sagittas - known.sagittas
         reached = min(aim, safety.keep_out_m - violation)
-        new = _worst(distances, reached - _GAIN * safety.keep_out_m) & ~entered
+        new = _lowest(distances, reached - _GAIN * safety.keep_out_m) & ~intervals
         if not new.any():
-            return drift_certificate(plan, safety.coasting, found.normals)
-        entered = entered | new
+            renewed = drift_certificate(plan, safety.coasting, certificate.normals)
+            return _SafePlan(renewed, intervals, path)
+        intervals = intervals | new
 
 
 def _plan_of_least_violation(
-    problem: OutputProblem, rows: PathRows, window: int | None, least: float
-) -> AffinePlan:
-    """Return the plan that minimises the largest violation of rows, which is `least` or more."""
-    program = SparseProgram()
-    plan = PlanVariables(program, problem, window, problem.periods)
-    violation = program.variables(1)
-    less_violation = variable_sum(violation, -np.ones((1, 1)))
-    program.keep(less_violation.plus(Affine(np.array([least]))))
-    for k in range(len(rows.times)):
-        middle, errors = plan.row(int(rows.times[k]), rows.states[k], rows.controls[k])
-        under = middle.times(-1.0).plus(program.maxima(problem.errors, errors).below)
-        program.keep(under.plus(Affine(rows.lower[k : k + 1])).plus(less_violation))
+    problem: OutputProblem, rows: PathRows, window: int | None, known: Flags, least: float
+) -> PlanWithRows:
+    """Return the plan that minimises the largest violation of rows, which is `least` or more.
 
+    The constraints of the problem enter as in `plan_with_rows`.
+    """
     kept = problem.rows
-    plan.keep_rows(kept, _SPARE * row_sizes(problem, kept))
-    try:
-        return plan.plan(program.minimise(variable_sum(violation, np.ones((1, 1)))))
-    except InfeasibleProgramError as error:
-        raise NoRobustPlanError("no plan keeps the constraints for all errors") from error
+    limits = len(kept.times) - len(known)
+    entered = ~np.asarray(kept.states.any(axis=1))
+    entered[limits:] |= known
+    while True:
+        program = SparseProgram()
+        plan = PlanVariables(program, problem, window, problem.periods)
+        violation = program.variables(1)
+        less_violation = variable_sum(violation, -np.ones((1, 1)))
+        program.keep(less_violation.plus(Affine(np.array([least]))))
+        for k in range(len(rows.times)):
+            middle, errors = plan.row(int(rows.times[k]), rows.states[k], rows.controls[k])
+            under = middle.times(-1.0).plus(program.maxima(problem.errors, errors).below)
+            program.keep(under.plus(Affine(rows.lower[k : k + 1])).plus(less_violation))
+
+        inside = kept.chosen(entered)
+        plan.keep_rows(inside, _SPARE * row_sizes(problem, inside))
+        try:
+            point = program.minimise(variable_sum(violation, np.ones((1, 1))))
+        except InfeasibleProgramError as error:
+            raise NoRobustPlanError("no plan keeps the constraints for all errors") from error
+        found = plan.plan(point)
+        broken = is_broken(found.row_ranges, kept)
+        if not (broken & ~entered).any():
+            return PlanWithRows(found, entered[limits:])
+        entered = entered | broken

@@ -131,9 +131,14 @@ class PlanVariables:
         return AffinePlan(self.problem, values[self.nominal], values[self.gains])
 
 
-def affine_plan(
-    problem: OutputProblem, window: int | None = None, *, every_row: bool = False
-) -> AffinePlan:
+class PlanWithRows(NamedTuple):
+    """A plan, and which constraints of the path its program had, shape (k,)."""
+
+    plan: AffinePlan
+    entered: Flags
+
+
+def affine_plan(problem: OutputProblem, window: int | None = None) -> AffinePlan:
     """Return the affine plan with the smallest certified guarantee.
 
     A `window` of w outputs makes the program sparser: u(t) depends on p(t - w + 1), ..., p(t).
@@ -146,8 +151,7 @@ def affine_plan(
     next program, until the guarantee stays. The guarantee holds in every round and does not
     increase, but the caps may be a local optimum.
 
-    Constraints of the path enter the program when they are broken, or all at first with
-    `every_row`, which is faster if most of them are needed.
+    Constraints of the path enter the program when they are broken.
 
     Raises
     ------
@@ -158,33 +162,55 @@ def affine_plan(
     NoSolutionError
         If the program was not solved.
     """
+    return best_with_rows(problem, window, no_rows(problem)).plan
+
+
+def best_with_rows(problem: OutputProblem, window: int | None, known: Flags) -> PlanWithRows:
+    """Return the plan of `affine_plan`; `known` constraints are in its program at first.
+
+    The flags, shape (k,), are those of `plan_with_rows`.
+    """
     if problem.relative_error is None:
-        return plan_at_caps(problem, window, every_row)
+        return plan_with_rows(problem, window, known)
     if not np.isfinite(problem.limits).all():
         raise ValueError("errors proportional to the controls need limits of all controls")
 
-    plan = plan_at_caps(replace(problem, caps=problem.limits), window, every_row)
+    found = plan_with_rows(replace(problem, caps=problem.limits), window, known)
     for _ in range(_MAX_CAP_ROUNDS - 1):
-        smaller = replace(problem, caps=plan.control_ranges.largest)
+        smaller = replace(problem, caps=found.plan.control_ranges.largest)
         try:
-            better = plan_at_caps(smaller, window, every_row)
+            better = plan_with_rows(smaller, window, found.entered)
         except (NoRobustPlanError, NoSolutionError):
             # Only the margin for the solver's errors can be missing.
-            return plan
-        if better.guarantee >= plan.guarantee:
-            return plan
-        gain = plan.guarantee - better.guarantee
-        plan = better
-        if gain <= _CAP_GAIN * plan.guarantee:
-            return plan
-    return plan
+            return found
+        gain = found.plan.guarantee - better.plan.guarantee
+        if gain <= 0.0:
+            return found
+        found = better
+        if gain <= _CAP_GAIN * found.plan.guarantee:
+            return found
+    return found
 
 
-def plan_at_caps(problem: OutputProblem, window: int | None, every_row: bool = False) -> AffinePlan:
+def plan_at_caps(problem: OutputProblem, window: int | None) -> AffinePlan:
     """Return the affine plan with the smallest guarantee at the caps of the problem.
 
-    Constraints on the path enter the program when they are broken, or at once if `every_row`. The
-    arguments are those of `affine_plan`.
+    The arguments and the errors are those of `plan_with_rows`.
+    """
+    return plan_with_rows(problem, window, no_rows(problem)).plan
+
+
+def no_rows(problem: OutputProblem) -> Flags:
+    """Return flags of the constraints of the path, shape (k,), none of which is chosen."""
+    count = 0 if problem.path is None else len(problem.path.times)
+    return np.zeros(count, dtype=bool)
+
+
+def plan_with_rows(problem: OutputProblem, window: int | None, known: Flags) -> PlanWithRows:
+    """Return the affine plan with the smallest guarantee at the caps of the problem.
+
+    The limits and the constraints of the path that are `known`, shape (k,), are in the program at
+    first; the others enter when they are broken, those of the controls alone at once.
 
     Raises
     ------
@@ -194,14 +220,15 @@ def plan_at_caps(problem: OutputProblem, window: int | None, every_row: bool = F
         If the program was not solved.
     """
     rows = problem.rows
-    on_path = np.asarray(rows.states.any(axis=1)) & (not every_row)
+    limits = len(rows.times) - len(known)
+    entered = ~np.asarray(rows.states.any(axis=1))
+    entered[limits:] |= known
     for spare in _SPARES:
-        entered = ~on_path
         while True:
             plan = _plan_with(problem, window, entered, spare)
             broken = is_broken(plan.row_ranges, rows)
             if not broken.any():
-                return plan
+                return PlanWithRows(plan, entered[limits:])
             if not (broken & ~entered).any():
                 break
             entered = entered | broken

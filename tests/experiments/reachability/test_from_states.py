@@ -53,7 +53,7 @@ def active(origin: Floats, relative: Floats) -> Floats:
     axes_rate = rate * np.array([[-sine, -cosine, 0.0], [cosine, -sine, 0.0], [0.0, 0.0, 0.0]])
     position = axes @ relative[:3]
     velocity = axes_rate @ relative[:3] + axes @ relative[3:]
-    return origin + np.array([position, velocity])
+    return np.asarray(origin + np.array([position, velocity]))
 
 
 def tilted() -> Floats:

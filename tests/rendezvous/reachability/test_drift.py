@@ -18,6 +18,7 @@ from infoset.rendezvous.reachability import (
     NoRobustPlanError,
     OutputProblem,
     PassiveSafety,
+    PathRows,
     affine_plan,
     drift_certificate,
     impulsive,
@@ -232,6 +233,33 @@ def test_safety_in_low_orbit_costs_no_guarantee() -> None:
     assert found.plan.excess <= 0.0
     # The renewal of the normals stops at 1e-3.
     assert free.guarantee * (1.0 - 1e-6) <= found.plan.guarantee <= free.guarantee * (1.0 + 1e-3)
+
+
+def test_bounds_that_no_flight_reaches_need_no_programs() -> None:
+    orbit = orbit_of()
+    problem = rendezvous(orbit)
+    instants = PERIODS + 1
+    count = 6 * instants
+    wide = PathRows(
+        np.repeat(np.arange(instants), 6),
+        np.tile(np.eye(6), (instants, 1)),
+        np.zeros((count, 3)),
+        np.full(count, -1e5),
+        np.full(count, 1e5),
+    )
+    safety = PassiveSafety(Coasting(orbit, 240.0, PERIODS, PERIODS), KEEP_OUT_M)
+    programs = []
+
+    for path in (None, wide):
+        programs.append(0)
+
+        def on_program() -> None:
+            programs[-1] += 1
+
+        found = safe_plan(replace(problem, path=path), safety, 3, on_program)
+        assert found.plan.guarantee == pytest.approx(leo_certificate().plan.guarantee, rel=1e-12)
+
+    assert programs[0] == programs[1] > 0
 
 
 def test_drifts_after_failures_stay_outside() -> None:

@@ -27,6 +27,8 @@ from infoset.rendezvous.reachability import (
     lower_bound,
     multipliers,
 )
+from infoset.rendezvous.reachability.guaranteed import no_rows, plan_with_rows
+from infoset.rendezvous.reachability.sparse_program import Affine, SparseProgram
 from infoset.rendezvous.relative_motion import EllipticOrbit, TschaunerHempel
 from tests.rendezvous.reachability.arch_rendezvous import (
     START,
@@ -364,9 +366,8 @@ def test_proportional_errors_without_limits_are_refused() -> None:
         affine_plan(problem)
 
 
-def test_path_holds_for_all_errors_and_costs_guarantee() -> None:
-    free = affine_plan(arch(10, 10.0, 6.0), 3)
-    speed = 0.8 * float(free.state_ranges.largest[1:10, 2:].max())
+def slow(speed: float) -> OutputProblem:
+    """The rendezvous with a limit of the velocities before each impulse but the first."""
     times = np.repeat(np.arange(1, 10), 2)
     rows = PathRows(
         times,
@@ -375,7 +376,13 @@ def test_path_holds_for_all_errors_and_costs_guarantee() -> None:
         np.full(18, -speed),
         np.full(18, speed),
     )
-    problem = replace(arch(10, 10.0, 6.0), path=rows)
+    return replace(arch(10, 10.0, 6.0), path=rows)
+
+
+def test_path_holds_for_all_errors_and_costs_guarantee() -> None:
+    free = affine_plan(arch(10, 10.0, 6.0), 3)
+    speed = 0.8 * float(free.state_ranges.largest[1:10, 2:].max())
+    problem = slow(speed)
 
     plan = affine_plan(problem, 3)
 
@@ -384,6 +391,29 @@ def test_path_holds_for_all_errors_and_costs_guarantee() -> None:
     for z in corners(50, problem.errors.size, 7):
         states, _ = fly(problem, by_plan(plan), *errors_of(problem, z))
         assert np.abs(states[1:10, 2:]).max() <= speed + 1e-9
+
+
+def test_constraints_that_were_needed_before_need_one_program(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    free = affine_plan(arch(10, 10.0, 6.0), 3)
+    problem = slow(0.8 * float(free.state_ranges.largest[1:10, 2:].max()))
+    first = plan_with_rows(problem, 3, no_rows(problem))
+    programs = []
+    minimise = SparseProgram.minimise
+
+    def counted(program: SparseProgram, cost: Affine) -> Floats:
+        programs.append(program)
+        return minimise(program, cost)
+
+    monkeypatch.setattr(SparseProgram, "minimise", counted)
+
+    again = plan_with_rows(problem, 3, first.entered)
+
+    assert 0 < np.count_nonzero(first.entered) < len(first.entered)
+    assert len(programs) == 1
+    # The margin for the solver's errors is 1e-7 of the limits.
+    assert again.plan.guarantee == pytest.approx(first.plan.guarantee, rel=1e-5)
 
 
 def test_constraints_that_no_plan_keeps_are_refused() -> None:
