@@ -118,6 +118,8 @@ CentralParameter = Annotated[
 ProblemOut = Annotated[
     Path, typer.Option("--out", metavar="FILE", help="The problem file to write; - is stdout.")
 ]
+_NAME = r"\w[\w .-]{0,99}"
+"""Stems of files that are names of their problems; that of stdout, "-", is none."""
 NewFile = Annotated[Path, typer.Argument(metavar="FILE", help="The file to write; - is stdout.")]
 
 
@@ -195,7 +197,7 @@ def _check_problem(
 
 def _named(text: str, name: str, like: str) -> str:
     """Return the text of a copy with another name and description, which its results have."""
-    if not re.fullmatch(r"\w[\w .-]{0,99}", name):  # "-" among others
+    if not re.fullmatch(_NAME, name):
         return text
     description = f'description = "Copy of {like}, changed"'
     text = re.sub(r'(?m)^name = ".*"', f'name = "{name}"', text, count=1)
@@ -359,10 +361,10 @@ def _from_orbits(options: FromOrbits) -> None:
         options.like,
         options.settings,
         options.gravitational_parameter,
+        name=options.out.stem if re.fullmatch(_NAME, options.out.stem) else None,
     )
-    text = _named(found.text, options.out.stem, options.like)
     note = f"with the values of {options.like}; change them, then: infoset reach {options.out}"
-    _write(options.out, text, note, options.overwrite, options.quiet)
+    _write(options.out, found.text, note, options.overwrite, options.quiet)
     say_warnings(found.warnings, options.quiet, found.notes)
 
 

@@ -24,7 +24,9 @@ from infoset.rendezvous.reachability import (
 )
 
 noises_m = np.array([1.0, 3.0, 10.0])
-affine_m, answered_m, bounds_m = [], [], []
+affine_m = []
+answered_m = []
+bounds_m = []
 for noise_m in noises_m:
     problem = load_problem("approach-guaranteed", [f"sensor.position_error_m={noise_m}"])
     # The benchmark is planar: its motion along the orbit's normal rests, and is left out.
@@ -76,9 +78,10 @@ figure, panels = plt.subplots(2, 1, figsize=(7, 6.6), sharex=True, layout="const
 for axes, name, found in zip(panels, ("without", "with"), (free, safe), strict=True):
     axes.fill(keep_out_m * np.cos(turn), keep_out_m * np.sin(turn), color="#f0e6d8")
     drifts = found.tube.middles + np.einsum("kicz,fz->fkic", found.tube.columns, errors)
-    outward, along = drifts[..., 0], drifts[..., 1]
-    axes.plot(along.reshape(-1, along.shape[2]).T, outward.reshape(-1, along.shape[2]).T, **thin)
-    path, aim = found.plan.nominal_states, found.plan.problem.aim
+    lines = drifts.reshape(-1, *drifts.shape[2:])
+    axes.plot(lines[..., 1].T, lines[..., 0].T, **thin)
+    path = found.plan.nominal_states
+    aim = found.plan.problem.aim
     axes.plot(path[:, 1], path[:, 0], "o", color="#08306b", markersize=4, label="impulses")
     axes.plot(aim[1], aim[0], "*", color="#2f6b3a", markersize=10, label="hold point")
     axes.set(xlim=(-1100, 150), ylim=(-300, 250), aspect="equal", ylabel="radially outward, m")

@@ -61,6 +61,7 @@ def problem_of(
     like: str,
     settings: Sequence[str] | None = None,
     mu_m3_s2: float | None = None,
+    name: str | None = None,
 ) -> FoundProblem:
     """Return a rendezvous whose t = 0 is an epoch of two OEM files.
 
@@ -79,6 +80,8 @@ def problem_of(
         KEY=VALUE: values that replace those of this problem.
     mu_m3_s2 : float or None
         The gravitational parameter. None is that of the centre of the files.
+    name : str or None
+        The name of the problem. None is that of the other problem.
 
     Raises
     ------
@@ -86,6 +89,7 @@ def problem_of(
         If a file is invalid, the files do not fit together, or the start breaks a constraint.
     """
     model = read_file(Rendezvous, like, settings)
+    epoch = " ".join(epoch.split())
     files = [read_oem(read_input(file, MAX_OEM_BYTES), str(file)) for file in (chaser, target)]
     if mu_m3_s2 is None:
         mu_m3_s2 = _gravitational_parameter(files)
@@ -108,7 +112,14 @@ def problem_of(
         f"{chaser} and {target} with the values of {like}",
         "; change them with --set KEY=VALUE, or take another problem with --like",
     ):
-        problem = replace(model, model=MotionModel.TIME_VARYING, orbit=orbit, initial=start)
+        problem = replace(
+            model,
+            name=name or model.name,
+            description=f"As {model.name}, from two states at {epoch}",
+            model=MotionModel.TIME_VARYING,
+            orbit=orbit,
+            initial=start,
+        )
 
     warnings = [*craft.chaser.warnings, *craft.target.warnings]
     head = [

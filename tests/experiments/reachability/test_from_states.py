@@ -133,6 +133,7 @@ def test_written_file_has_the_states_and_the_values_of_the_other_problem(
     problem = load_problem("mine.toml")
     model = load_problem("elliptic-guaranteed", ["sensor.position_error_m=2"])
     assert problem.name == "mine"
+    assert problem.description == f"As elliptic-guaranteed, from two states at {EPOCH}"
     np.testing.assert_allclose(problem.initial.position_m, RELATIVE[:3], atol=ROUNDING_M)
     assert (problem.sensor, problem.goal, problem.cone) == (model.sensor, model.goal, model.cone)
 
