@@ -301,11 +301,6 @@ class Rendezvous:
             raise ValueError("goal: is missing; [sensor] and [initial_error] need it")
         if self.navigation is not None:
             raise ValueError("navigation: must be omitted with [sensor] or [initial_error]")
-        if self.thrust is ThrustShape.BALL:
-            raise ValueError(
-                'thrust: must be "box" with [sensor] or [initial_error]; a box with 0.577 of the '
-                "bound is inside the ball"
-            )
         if self.periods > MAX_GUARANTEED_PERIODS:
             raise ValueError(
                 f"periods: must be at most {MAX_GUARANTEED_PERIODS} with [sensor] or "

@@ -20,11 +20,14 @@ from infoset.rendezvous.reachability import (
     AffinePlan,
     DriftCertificate,
     LateConstraintError,
+    NormFaces,
     NoRobustPlanError,
     OutputProblem,
     PassiveSafety,
     PlanFlights,
+    ThrustShape,
     UnboundedCoastError,
+    acting_controls,
     affine_plan,
     answers_within,
     drift_certificate,
@@ -33,6 +36,7 @@ from infoset.rendezvous.reachability import (
     information_radius,
     lower_bound,
     nonlinear_plan,
+    norm_faces,
     plan_of_parts,
     plan_within,
     safe_plan,
@@ -86,6 +90,13 @@ class GuaranteeReport:
             except NoRobustPlanError:
                 guarantees.append(np.nan)
         return np.array([*guarantees, self.plan.guarantee])
+
+    @property
+    def thrust_faces(self) -> NormFaces | None:
+        """The faces that replace a limit of thrust in norm; None for a limit of each axis."""
+        if self.rendezvous.thrust is ThrustShape.BOX:
+            return None
+        return norm_faces(len(acting_controls(self.rendezvous.output_problem)))
 
     def tube(self, time: int, states: list[int]) -> Floats:
         """Return points in a plane whose hull are two states at a time for all errors, (k, 2).
@@ -281,6 +292,9 @@ def _answered(rendezvous: Rendezvous, plan: AffinePlan) -> tuple[float | None, s
     refusal = ""
     problem = replace(rendezvous.output_problem, caps=plan.problem.caps)
     own = problem.limits.copy()
+    if rendezvous.thrust is ThrustShape.BALL:
+        # The limits of an answer are those of a box.
+        own[-1] *= norm_faces(len(acting_controls(problem))).box
     smaller = own.copy()
     smaller[-1] = np.minimum(own[-1], _LAST_LIMIT * plan.control_ranges.largest[-1])
     for limits in (own, smaller):
@@ -373,6 +387,12 @@ def constraint_times(rendezvous: Rendezvous) -> str:
 def _further_lines(report: GuaranteeReport) -> Iterator[str]:
     """Yield what else is certain: for which motion, and what happens if the engines fail."""
     rendezvous = report.rendezvous
+    faces = report.thrust_faces
+    if faces is not None:
+        yield (
+            f"thrust in norm: {len(faces.normals)} faces inside the ball lose at most "
+            f"{100.0 * faces.loss:.2g} % of the limit"
+        )
     yield f"constraints hold for all errors {constraint_times(rendezvous)}"
     if rendezvous.nonlinear:
         yield "affine feedback and its ranges hold for the motion about a central body"

@@ -51,6 +51,7 @@ def report_json(report: GuaranteeReport) -> dict[str, object]:
         "radius": in_unit(report.radius),
         "window": WINDOW,
         "nonlinear": report.rendezvous.nonlinear,
+        "thrust_loss": report.thrust_faces and report.thrust_faces.loss,
         "constraints_hold": constraint_times(report.rendezvous),
         "drifts": _drifts_json(report),
         "box": {"min": ranges.lower[-1], "max": ranges.upper[-1]},

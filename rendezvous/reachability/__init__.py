@@ -57,6 +57,7 @@ from infoset.rendezvous.reachability.nonlinear import (
     nonlinear_plan,
     with_acceleration,
 )
+from infoset.rendezvous.reachability.norm_limit import NormFaces, acting_controls, norm_faces
 from infoset.rendezvous.reachability.optimum import EmptyTubeError
 from infoset.rendezvous.reachability.outputs import (
     AffinePlan,
@@ -137,6 +138,7 @@ __all__ = [
     "NoRobustPlanError",
     "NonlinearMotion",
     "NonlinearPlan",
+    "NormFaces",
     "OptimalControls",
     "OutputProblem",
     "PassiveSafety",
@@ -156,6 +158,7 @@ __all__ = [
     "TrueMotion",
     "UnboundedCoastError",
     "VertexCounts",
+    "acting_controls",
     "affine_plan",
     "analytic_centre",
     "answered_plan",
@@ -184,6 +187,7 @@ __all__ = [
     "multipliers",
     "nearest",
     "nonlinear_plan",
+    "norm_faces",
     "optimal_controls",
     "plan_of_parts",
     "plan_within",

@@ -215,12 +215,11 @@ def answered_plan(problem: OutputProblem, window: int | None = None) -> Answered
         If the program was not solved.
     """
     rows = problem.rows
-    on_path = np.asarray(rows.states.any(axis=1))
     acting = (rows.times == problem.periods - 1) & rows.controls.any(axis=1)
     late = acting | (rows.times == problem.periods)
     early = rows.chosen(~late)
     for spare in _SPARES:
-        entered = ~on_path[~late]
+        entered = ~problem.is_on_path[~late]
         while True:
             found = _solved(problem, window, early.chosen(entered), spare)
             broken = is_broken(found.plan.ranges_of(early), early)

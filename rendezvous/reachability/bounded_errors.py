@@ -9,6 +9,7 @@ import numpy as np
 
 from infoset.geometry.zonotope import Zonotope
 from infoset.rendezvous._arrays import Flags, Floats
+from infoset.rendezvous.reachability.norm_limit import with_norm_limit
 from infoset.rendezvous.reachability.outputs import AffinePlan, OutputProblem, PathRows
 from infoset.rendezvous.reachability.problem import ReachabilityProblem, ThrustShape
 
@@ -41,25 +42,19 @@ class ErrorBounds:
 def with_errors(
     problem: ReachabilityProblem, errors: ErrorBounds, target: Floats, box: Floats
 ) -> OutputProblem:
-    """Return a rendezvous with bounded errors; its thrust has a bound for each component.
+    """Return a rendezvous with bounded errors.
 
     The norm of the goal is that of a `box` of half-widths, shape (n,), about the state `target`; a
     component whose half-width is infinite does not count. All constraints hold for all errors.
-
-    Raises
-    ------
-    ValueError
-        If the thrust is in a ball.
+    Thrust in a ball is limited by the faces of a polytope inside it (`norm_faces`).
     """
-    if problem.thrust is not ThrustShape.BOX:
-        raise ValueError("a rendezvous with bounded errors needs a bound for each control")
     periods = problem.periods
     measured = len(errors.measured)
     has_noise = errors.measured > 0.0
     is_goal = np.isfinite(box)
     largest = errors.execution + errors.relative * problem.control_bounds
     start = np.diag(errors.start)
-    return OutputProblem(
+    whole = OutputProblem(
         problem.transition,
         problem.control,
         np.repeat(np.eye(measured, problem.states)[None], periods, axis=0),
@@ -73,6 +68,9 @@ def with_errors(
         np.tile(problem.control_bounds, (periods, 1)),
         constraint_rows(problem, largest),
     )
+    if problem.thrust is ThrustShape.BALL:
+        return with_norm_limit(whole, float(problem.control_bounds[0]))
+    return whole
 
 
 def constraint_rows(problem: ReachabilityProblem, execution: Floats) -> PathRows:
@@ -193,6 +191,9 @@ def _breaks(
     slack = _ROUNDING * (np.abs(normals) @ problem.control_bounds)
     broken = (np.abs(control) > problem.control_bounds * (1.0 + _ROUNDING)).any(axis=1)
     broken |= (control @ normals.T > offsets[time] + slack).any(axis=1)
+    if problem.thrust is ThrustShape.BALL:
+        norms = np.linalg.norm(control, axis=1)
+        broken |= norms > problem.control_bounds[0] * (1.0 + _ROUNDING)
     broken |= _exceeds(problem, time, states)
     if problem.jump is not None:
         broken |= _exceeds(problem, time, states + acting @ problem.jump.T)

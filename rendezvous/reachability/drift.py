@@ -398,7 +398,7 @@ def _plan_of_least_violation(
     """
     kept = problem.rows
     limits = len(kept.times) - len(known)
-    entered = ~np.asarray(kept.states.any(axis=1))
+    entered = ~problem.is_on_path
     entered[limits:] |= known
     while True:
         program = SparseProgram()

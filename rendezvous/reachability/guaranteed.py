@@ -210,7 +210,7 @@ def plan_with_rows(problem: OutputProblem, window: int | None, known: Flags) -> 
     """Return the affine plan with the smallest guarantee at the caps of the problem.
 
     The limits and the constraints of the path that are `known`, shape (k,), are in the program at
-    first; the others enter when they are broken, those of the controls alone at once.
+    first; the others enter when they are broken.
 
     Raises
     ------
@@ -221,7 +221,7 @@ def plan_with_rows(problem: OutputProblem, window: int | None, known: Flags) -> 
     """
     rows = problem.rows
     limits = len(rows.times) - len(known)
-    entered = ~np.asarray(rows.states.any(axis=1))
+    entered = ~problem.is_on_path
     entered[limits:] |= known
     for spare in _SPARES:
         while True:

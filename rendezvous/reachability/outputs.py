@@ -286,6 +286,13 @@ class OutputProblem:
         )
         return limits if self.path is None else joined(limits, self.path)
 
+    @property
+    def is_on_path(self) -> Flags:
+        """Which of the rows are constraints of the path, and not limits of single controls."""
+        count = 0 if self.path is None else len(self.path.times)
+        total = len(self.rows.times)
+        return np.arange(total) >= total - count
+
     def effects_on(self, time: int, row: Floats) -> Floats:
         """Return the effects of u(0), ..., u(time - 1) on row . x(time), shape (time, m)."""
         effects = np.zeros((time, self.controls))

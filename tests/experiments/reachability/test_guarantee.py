@@ -182,6 +182,20 @@ def test_held_thrust_has_its_own_unit(infoset: Command) -> None:
     assert "constraints hold for all errors at t = 0..10\n" in out
 
 
+def test_thrust_in_norm_keeps_its_limit_and_tells_its_loss(infoset: Command) -> None:
+    options = ("--set", 'thrust="ball"', "--set", "periods=4", "--set", "max_impulse_m_s=0.5")
+    found = infoset.json("reach", ARCH, *options)
+    out = infoset("reach", ARCH, *options)[1]
+
+    # The limit is not active, and the last impulse is within a box inside the polygon.
+    assert found["affine"] == pytest.approx(8.5434, abs=PRINTED)
+    assert found["answered"] == pytest.approx(8.2343, abs=PRINTED)
+    assert found["thrust_loss"] == pytest.approx(1.0 - np.cos(np.pi / 16.0))
+    assert found["flights"]["outside"] == 0
+    told = "thrust in norm: 16 faces inside the ball lose at most 1.9 % of the limit\n"
+    assert told in out
+
+
 def test_errors_proportional_to_impulses_cost_guarantee(infoset: Command) -> None:
     more = ("--set", "execution_error.relative=0.03")
     exact, relative = (infoset.json("reach", ARCH, *each) for each in ((), more))
@@ -265,7 +279,12 @@ def test_options_that_do_not_fit_are_refused(
             "[sensor]\nposition_error_m = 1.0\n[orbit]",
             "goal: is missing; [sensor] and [initial_error] need it",
         ),
-        (ARCH, "periods = 10", 'periods = 10\nthrust = "ball"', 'thrust: must be "box"'),
+        (
+            ARCH,
+            "max_impulse_m_s = 0.1 ",
+            'thrust = "ball"\nmax_impulse_m_s = [0.1, 0.2, 0.1] ',
+            "for thrust in a ball the bounds on controls must be equal",
+        ),
         (ARCH, "periods = 10\nperiod_min = 10.0", "periods = 61\nperiod_min = 1.0", "at most 60"),
         (
             ARCH,

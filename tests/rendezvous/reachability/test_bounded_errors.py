@@ -13,7 +13,6 @@ from infoset.rendezvous.reachability import (
     ErrorBounds,
     OutputProblem,
     ReachabilityProblem,
-    ThrustShape,
     affine_plan,
     between_impulses,
     fly_plan,
@@ -59,13 +58,6 @@ def test_goal_is_the_box_and_free_components_do_not_count() -> None:
     free = with_errors(approach(), errors(), np.zeros(6), np.repeat([2.0, np.inf], 3))
 
     np.testing.assert_array_equal(free.goal, 0.5 * np.eye(3, 6))
-
-
-def test_thrust_in_a_ball_is_refused() -> None:
-    ball = replace(approach(), thrust=ThrustShape.BALL)
-
-    with pytest.raises(ValueError, match="needs a bound for each control"):
-        with_errors(ball, errors(), np.zeros(6), BOX)
 
 
 def test_constraints_hold_before_and_after_impulses_and_between_them_for_all_errors() -> None:
