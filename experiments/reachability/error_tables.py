@@ -6,6 +6,7 @@ A file with `[sensor]` or `[initial_error]` asks for a guarantee: see
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -14,7 +15,7 @@ import numpy as np
 from infoset.arrays import Floats
 from infoset.experiments.reachability.vectors import Bound, HalfWidth, Vector
 from infoset.limits import Limits, Positive
-from infoset.rendezvous.reachability import ReachabilityProblem
+from infoset.rendezvous.reachability import ReachabilityProblem, SightSensor
 
 MAX_GUARANTEED_PERIODS = 60
 """Maximum number of periods with bounded errors; chosen: the programs of 60 take a minute."""
@@ -42,14 +43,42 @@ class ExecutionError:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PositionSensor:
-    """Position, and velocity if it has an error, measured at t = 0..T - 1 before the control.
+class Sensor:
+    """What is measured at t = 0..T - 1 before the control, with the largest errors.
 
-    The numbers are the largest errors along each axis.
+    Either the position, and the velocity if it has an error, along each axis; or the line of sight
+    from the target, and the range if it has an error. The error of the line of sight is its angle
+    from the true one.
     """
 
-    position_error_m: HalfWidth
+    position_error_m: HalfWidth | None = None
     velocity_error_m_s: HalfWidth | None = None
+    range_error_m: Annotated[float, Limits(minimum=0.0)] | None = None
+    angle_error_rad: Annotated[float, Limits(above=0.0, below=0.5 * math.pi)] | None = None
+
+    def __post_init__(self) -> None:
+        if self.position_error_m is None and self.angle_error_rad is None:
+            raise ValueError(
+                "position_error_m: is missing; without it the sensor needs angle_error_deg"
+            )
+        if self.position_error_m is None and self.velocity_error_m_s is not None:
+            raise ValueError("velocity_error_m_s: needs position_error_m")
+        if self.position_error_m is not None and self.angle_error_rad is not None:
+            raise ValueError("angle_error_deg: must be omitted with position_error_m")
+        if self.angle_error_rad is None and self.range_error_m is not None:
+            raise ValueError("range_error_m: needs angle_error_deg")
+
+    @property
+    def sight(self) -> SightSensor | None:
+        """The sensor of lines of sight; None if the position is measured."""
+        if self.angle_error_rad is None:
+            return None
+        return SightSensor(self.angle_error_rad, self.range_error_m)
+
+    @property
+    def acts_before_flight(self) -> bool:
+        """Whether a plan before the flight can react to it: lines of sight alone are only cuts."""
+        return self.position_error_m is not None or self.range_error_m is not None
 
 
 @dataclass(frozen=True, kw_only=True)

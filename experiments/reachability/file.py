@@ -20,7 +20,7 @@ from infoset.experiments.reachability.error_tables import (
     Goal,
     InitialError,
     KeepOut,
-    PositionSensor,
+    Sensor,
     check_starts,
 )
 from infoset.experiments.reachability.vectors import Bound, Vector
@@ -35,6 +35,7 @@ from infoset.rendezvous.reachability import (
     OutputProblem,
     PathLimits,
     ReachabilityProblem,
+    SightSensor,
     ThrustShape,
     between_impulses,
     between_periods,
@@ -260,7 +261,7 @@ class Rendezvous:
     navigation: Navigation | None = None
     initial_error: InitialError | None = None
     execution_error: ExecutionError | None = None
-    sensor: PositionSensor | None = None
+    sensor: Sensor | None = None
     goal: Goal | None = None
     passive_safety: KeepOut | None = None
     nonlinear: bool = False
@@ -325,6 +326,8 @@ class Rendezvous:
             return
         if not self.has_impulses:
             raise ValueError(f'{key}: needs engine = "impulses"')
+        if self.passive_safety is not None and self.sight is not None:
+            raise ValueError("passive_safety: needs sensor.position_error_m, not angle_error_deg")
         if self.model is MotionModel.FROZEN and self.orbit.eccentricity > 0.0:
             raise ValueError(f'{key}: needs model = "time-varying" on an ellipse')
         last = None if self.passive_safety is None else self.passive_safety.until_period
@@ -436,7 +439,7 @@ class Rendezvous:
         if not self.has_impulses:
             absolute = np.array(execution.absolute_m_s2 or NO_ERROR) / self.unit_m_s2
         measured: tuple[float, ...] = ()
-        if self.sensor is not None:
+        if self.sensor is not None and self.sensor.position_error_m is not None:
             measured = self.sensor.position_error_m + (self.sensor.velocity_error_m_s or ())
         return ErrorBounds(
             np.array(start.position_m + start.velocity_m_s),
@@ -444,7 +447,18 @@ class Rendezvous:
             np.full(3, execution.relative),
             np.array(measured),
             self.disturbance_effect,
+            self.sight,
         )
+
+    @property
+    def sight(self) -> SightSensor | None:
+        """The sensor of lines of sight, if there is one."""
+        return None if self.sensor is None else self.sensor.sight
+
+    @property
+    def has_feedback(self) -> bool:
+        """Whether a plan before the flight reacts to measurements."""
+        return self.sensor is not None and self.sensor.acts_before_flight
 
     @cached_property
     def output_problem(self) -> OutputProblem:

@@ -40,6 +40,7 @@ from infoset.rendezvous.reachability import (
     plan_of_parts,
     plan_within,
     safe_plan,
+    sighted_plan,
 )
 
 WINDOW = 4
@@ -60,9 +61,9 @@ class GuaranteeReport:
     """Results of one command; guarantees are in units of the goal's box.
 
     `open_loop` is the best plan without measurements, None if no such plan keeps the constraints.
-    `answered`, `bound` and `radius` are None without a sensor and for nonlinear motion; `answered`
-    is also None if `refusal` says why there is none. `drifts` are the certain distances if the
-    engines fail, None if the problem does not ask for them.
+    `answered`, `bound` and `radius` are None without measured positions and for nonlinear motion;
+    `answered` is also None if `refusal` says why there is none. `drifts` are the certain distances
+    if the engines fail, None if the problem does not ask for them.
     """
 
     rendezvous: Rendezvous
@@ -163,22 +164,22 @@ def solve_guarantee(
     try:
         open_loop = best_plan(rendezvous, first_measurements(problem, 0))
     except NoRobustPlanError:
-        if rendezvous.sensor is None:
+        if not rendezvous.has_feedback:
             raise _conflict(rendezvous, progress) from None
     progress(0.1)
     answered, refusal, bound, radius = None, None, None, None
-    if rendezvous.sensor is None:
+    if not rendezvous.has_feedback:
         assert open_loop is not None
         plan = open_loop
     else:
         try:
-            plan = best_plan(rendezvous, problem)
+            plan = _feedback(rendezvous, problem)
         except NoRobustPlanError:
             raise _conflict(rendezvous, progress) from None
         progress(0.3)
         answered, refusal = _answered(rendezvous, plan)
         progress(0.5)
-        if not rendezvous.nonlinear:
+        if not rendezvous.nonlinear and rendezvous.sight is None:
             parts = [part.problem for part in independent_parts(problem)]
             bound = max((lower_bound(part).value for part in parts), default=0.0)
             radius = max((information_radius(part).value for part in parts), default=0.0)
@@ -216,7 +217,7 @@ def _checked_plan(
 
     def solve(problem: OutputProblem) -> AffinePlan:
         if safety is None:
-            found = best_plan(rendezvous, problem)
+            found = _feedback(rendezvous, problem)
             on_program()
             return found
         keep_out = PassiveSafety(drifts, safety.keep_out_m)
@@ -226,8 +227,10 @@ def _checked_plan(
 
         return _within(rendezvous, problem, safe)
 
-    # With the constraints that the plan needed already.
-    problem = replace(plan.problem, caps=None)
+    problem = rendezvous.output_problem
+    if rendezvous.sight is None:
+        # With the constraints that the plan needed already.
+        problem = replace(plan.problem, caps=None)
     try:
         if rendezvous.nonlinear:
             checked = nonlinear_plan(problem, drifts, solve).plan
@@ -270,6 +273,14 @@ def best_plan(rendezvous: Rendezvous, problem: OutputProblem) -> AffinePlan:
     return _within(rendezvous, problem, solve)
 
 
+def _feedback(rendezvous: Rendezvous, problem: OutputProblem) -> AffinePlan:
+    """Return the best affine plan of a problem with the sensor of a rendezvous."""
+    sight = rendezvous.sight
+    if sight is None or not rendezvous.has_feedback:
+        return best_plan(rendezvous, problem)
+    return sighted_plan(problem, sight, 3, lambda each: best_plan(rendezvous, each))
+
+
 def _within(
     rendezvous: Rendezvous, problem: OutputProblem, solve: Callable[[OutputProblem], AffinePlan]
 ) -> AffinePlan:
@@ -286,6 +297,8 @@ def _answered(rendezvous: Rendezvous, plan: AffinePlan) -> tuple[float | None, s
     """
     if rendezvous.nonlinear:
         return None, "only for linear motion"
+    if rendezvous.sight is not None:
+        return None, "only for measured positions"
     if rendezvous.passive_safety is not None:
         # The last control, and so the drift after it, is not known before the flight.
         return None, "not with [passive_safety]"
@@ -315,7 +328,7 @@ def _conflict(rendezvous: Rendezvous, progress: Callable[[float], None]) -> Inpu
     found = []
     for done, (name, relaxed) in enumerate(_relaxations(rendezvous)):
         try:
-            best_plan(relaxed, relaxed.output_problem)
+            _feedback(relaxed, relaxed.output_problem)
         except NoRobustPlanError:
             continue
         finally:
@@ -357,7 +370,10 @@ def guarantee_lines(report: GuaranteeReport) -> Iterator[str]:
     open_loop = None if report.open_loop is None else report.open_loop.guarantee
     note = "certified" if report.open_loop else "no plan keeps the constraints for all errors"
     yield line("without measurements", open_loop, note)
-    if report.rendezvous.sensor is None:
+    rendezvous = report.rendezvous
+    if not rendezvous.has_feedback:
+        if rendezvous.sensor is not None:
+            yield line("affine feedback", None, "known only in flight: directions without ranges")
         yield from _further_lines(report)
         return
     yield line(
@@ -365,9 +381,13 @@ def guarantee_lines(report: GuaranteeReport) -> Iterator[str]:
         report.plan.guarantee,
         f"certified; a control reacts to the last {WINDOW} measurements",
     )
-    noun = "impulse" if report.rendezvous.has_impulses else "control"
+    noun = "impulse" if rendezvous.has_impulses else "control"
     yield line(f"last {noun} re-planned", report.answered, report.refusal or "certified")
-    note = "only for linear motion" if report.rendezvous.nonlinear else ""
+    note = ""
+    if rendezvous.nonlinear:
+        note = "only for linear motion"
+    elif rendezvous.sight is not None:
+        note = "only for measured positions"
     yield line("no strategy guarantees less", report.bound, note)
     yield from _further_lines(report)
 

@@ -42,6 +42,7 @@ def report_json(report: GuaranteeReport) -> dict[str, object]:
             "states": "x, y, z in m and their rates in m/s, before the control of their time",
             "controls": f"{control}, along x, y, z",
             "gains": f"{control} per m, and per m/s of a measured velocity",
+            "lines_of_sight": "axes of measured positions at each t, in place of x, y, z",
         },
         "without_measurements": report.open_loop and in_unit(report.open_loop.guarantee),
         "affine": in_unit(plan.guarantee),
@@ -57,6 +58,7 @@ def report_json(report: GuaranteeReport) -> dict[str, object]:
         "box": {"min": ranges.lower[-1], "max": ranges.upper[-1]},
         "states": _ranges_json(plan.nominal_states, ranges, 1.0),
         "controls": _ranges_json(plan.nominal, plan.control_ranges, per_control),
+        "lines_of_sight": _lines_of_sight(report),
         "gains": [
             {"period": int(t), "measurement": int(s), "matrix": per_control * plan.gains[t, s]}
             for t, s in np.argwhere(plan.gains.any(axis=(2, 3)))
@@ -67,6 +69,13 @@ def report_json(report: GuaranteeReport) -> dict[str, object]:
             "largest": in_unit(float(report.flights.distances.max(initial=0.0))),
         },
     }
+
+
+def _lines_of_sight(report: GuaranteeReport) -> Floats | None:
+    """Return the axes along and across the line of sight, whose coordinates the gains are for."""
+    if report.rendezvous.sight is None:
+        return None
+    return report.plan.problem.output[:, :, :3]
 
 
 def _drifts_json(report: GuaranteeReport) -> dict[str, object] | None:

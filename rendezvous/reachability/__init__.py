@@ -31,6 +31,7 @@ from infoset.rendezvous.reachability.drift import (
 )
 from infoset.rendezvous.reachability.guaranteed import affine_plan
 from infoset.rendezvous.reachability.guided import (
+    Cuts,
     GuidedCraft,
     GuidedFlight,
     LinearTruth,
@@ -41,6 +42,11 @@ from infoset.rendezvous.reachability.independent_parts import (
     ProblemPart,
     independent_parts,
     plan_of_parts,
+)
+from infoset.rendezvous.reachability.line_of_sight import (
+    SightSensor,
+    SightTruth,
+    sighted_plan,
 )
 from infoset.rendezvous.reachability.motion import (
     IMPULSE,
@@ -122,6 +128,7 @@ __all__ = [
     "CoastTube",
     "Coasting",
     "ControlEffort",
+    "Cuts",
     "DriftCertificate",
     "EmptyTubeError",
     "ErrorBounds",
@@ -151,6 +158,8 @@ __all__ = [
     "ReachableSets",
     "Route",
     "SetKind",
+    "SightSensor",
+    "SightTruth",
     "Solution",
     "ThinSetError",
     "ThrustShape",
@@ -194,6 +203,7 @@ __all__ = [
     "replan",
     "safe_plan",
     "samples",
+    "sighted_plan",
     "solve",
     "tightened",
     "vertices",

@@ -9,6 +9,7 @@ import numpy as np
 
 from infoset.geometry.zonotope import Zonotope
 from infoset.rendezvous._arrays import Flags, Floats
+from infoset.rendezvous.reachability.line_of_sight import SightSensor
 from infoset.rendezvous.reachability.norm_limit import with_norm_limit
 from infoset.rendezvous.reachability.outputs import AffinePlan, OutputProblem, PathRows
 from infoset.rendezvous.reachability.problem import ReachabilityProblem, ThrustShape
@@ -30,6 +31,8 @@ class ErrorBounds:
         Of the first q components of the state, which are measured at t = 0, ..., T - 1.
     disturbance : ndarray, shape (T, n, p), or None
         Effects of unit components of an unknown acceleration in a period.
+    sight : SightSensor or None
+        The sensor of directions and ranges, in place of `measured`.
     """
 
     start: Floats
@@ -37,6 +40,7 @@ class ErrorBounds:
     relative: Floats
     measured: Floats
     disturbance: Floats | None = None
+    sight: SightSensor | None = None
 
 
 def with_errors(
@@ -144,24 +148,33 @@ def fly_plan(
 ) -> PlanFlights:
     """Simulate flights: in one half errors are uniform, in the other half at their bounds.
 
-    The loop uses the matrices of the motion and the measurements only. Errors proportional to a
+    The loop uses the matrices of the motion and the measurements only; directions and ranges are
+    those of the true positions, without linearisation. Errors proportional to a
     control are those of the control that is commanded.
     """
     generator = np.random.default_rng(seed)
+    extreme = np.arange(flights) % 2 == 1
 
     def drawn(bounds: Floats) -> Floats:
         values = generator.uniform(-1.0, 1.0, (flights, len(bounds)))
-        extreme = np.arange(flights) % 2 == 1
         values[extreme] = np.sign(values[extreme])
         return np.asarray(values * bounds)
 
+    def measured(output: Floats, states: Floats) -> Floats:
+        """Return the outputs with errors, shape (N, q), for the matrix of the outputs."""
+        if errors.sight is None or not len(output):
+            return np.asarray(states @ output.T + drawn(errors.measured))
+        size = len(output)
+        directions, ranges = errors.sight.simulated(states[:, :size], generator, extreme)
+        return np.asarray((ranges[:, None] * directions) @ output[:, :size].T)
+
     states = problem.initial + drawn(errors.start)
     predicted = np.tile(problem.initial, (flights, 1))
-    shown = np.zeros((problem.periods, flights, len(errors.measured)))
+    shown = np.zeros((problem.periods, flights, plan.problem.output.shape[1]))
     broken = np.zeros(flights, dtype=bool)
     for t in range(problem.periods):
-        outputs = states[:, : len(errors.measured)] + drawn(errors.measured)
-        shown[t] = outputs - predicted[:, : len(errors.measured)]
+        output = plan.problem.output[t]
+        shown[t] = measured(output, states) - predicted @ output.T
         control = plan.nominal[t] + np.einsum("sjq,sfq->fj", plan.gains[t], shown)
         acting = control + drawn(np.ones(problem.controls)) * (
             errors.execution + errors.relative * np.abs(control)

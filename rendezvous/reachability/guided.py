@@ -5,8 +5,9 @@ Theorem 6 of `docs/guaranteed-rendezvous.md`: the promised guarantee never incre
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -29,6 +30,17 @@ _ANSWER_RESERVE = 1e-6
 the exact ones by 1e-7 of their widths, or less."""
 _ROUNDING = 1e-12
 """Relative increase of caps above the certified controls: more than a certificate is rounded."""
+
+
+class Cuts(NamedTuple):
+    """Strips lower <= normals . x <= upper that contain the state, known only in flight.
+
+    The shapes are (k, n), (k,) and (k,); ends may be infinite.
+    """
+
+    normals: Floats
+    lower: Floats
+    upper: Floats
 
 
 class TrueMotion(Protocol):
@@ -195,8 +207,8 @@ class GuidedCraft:
     A program of up to four states begins in the polytope of the observer. Observers of five and
     more states have no polytope; programs begin in up to three parallelotopes around the set.
 
-    Half-spaces that are known only in flight, such as the wedge of a measured angle, cut `observer`
-    before `measure`.
+    Half-spaces that are known only in flight, such as the wedge of a measured angle, are the `cuts`
+    of `measure`.
 
     Raises
     ------
@@ -232,9 +244,11 @@ class GuidedCraft:
         """The present period."""
         return len(self._applied)
 
-    def measure(self, output: Floats) -> None:
+    def measure(self, output: Floats, cuts: Cuts | None = None) -> None:
         """Cut the set by the output y(t), shape (q,), and adopt the plan of the rest if better."""
         self._outputs.append(output)
+        if cuts is not None:
+            self.observer.cut(*cuts)
         self.observer.update(output)
         if self.observer.estimate().is_empty:
             return
@@ -288,11 +302,13 @@ def guided_flight(
     *,
     window: int | None = None,
     max_facets: int | None = MAX_FACETS,
+    cuts: Callable[[], Cuts] | None = None,
 ) -> GuidedFlight:
     """Simulate a flight that is planned again after each output.
 
     The plan and the options are those of `GuidedCraft`. The true motion is moved; its errors must
-    be within the bounds of the problem, or the promises do not hold.
+    be within the bounds of the problem, or the promises do not hold. `cuts` returns half-spaces of
+    the present states, such as `SightTruth.cuts`; they are called after each output.
     """
     craft = GuidedCraft(plan, window=window, max_facets=max_facets)
     guarantees = [craft.guarantee]
@@ -302,7 +318,7 @@ def guided_flight(
     planned_at = []
     is_reduced = False
     for _ in range(craft.problem.periods):
-        craft.measure(truth.measured())
+        craft.measure(truth.measured(), None if cuts is None else cuts())
         estimate = craft.observer.estimate()
         is_reduced = is_reduced or bool(estimate.reduced)
         lower.append(estimate.lower)

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from infoset.arrays import Floats
 from infoset.experiments.common.errors import InputError
 from infoset.experiments.common.input_file import read_text
 from infoset.experiments.reachability.command import Reach
@@ -18,6 +19,7 @@ from infoset.experiments.reachability.guarantee import guarantee_lines
 from infoset.experiments.reachability.guarantee_figures import draw_guarantee
 from infoset.experiments.reachability.guarantee_page import guarantee_page
 from infoset.experiments.reachability.guarantee_report import COMMAND
+from infoset.rendezvous.reachability import IMPULSE
 from tests.built_in import problem_text
 from tests.experiments.command_line import Command
 
@@ -196,6 +198,59 @@ def test_thrust_in_norm_keeps_its_limit_and_tells_its_loss(infoset: Command) -> 
     assert told in out
 
 
+SENSOR = "position_error_m = 3.0"
+
+
+def test_directions_and_ranges_guarantee_less_than_fixed_lines_of_sight(infoset: Command) -> None:
+    text = problem_text(ARCH).replace(SENSOR, "range_error_m = 3.0\nangle_error_deg = 0.5")
+    Path("sight.toml").write_text(text)
+
+    found = infoset.json("reach", "sight.toml", "--flights", "400")
+
+    # 8.89 m with the lines of sight of the plan without measurements, by an independent program.
+    assert found["affine"] < 8.89
+    assert found["flights"]["outside"] == 0
+    assert found["flights"]["largest"] > 0.6 * found["affine"]
+    assert found["answered"] is found["bound"] is found["radius"] is None
+    assert found["answered_refusal"] == "only for measured positions"
+    axes = np.array(found["lines_of_sight"])
+    np.testing.assert_allclose(axes @ axes.mT, np.tile(np.eye(3), (10, 1, 1)), atol=1e-12)
+    # The first one points from the target to the start.
+    assert axes[0, 0] == pytest.approx(np.array([-9.0, -4.0, 0.0]) / np.hypot(9.0, 4.0))
+
+
+def test_directions_alone_are_known_only_in_flight(infoset: Command) -> None:
+    Path("angles.toml").write_text(problem_text(ARCH).replace(SENSOR, "angle_error_deg = 0.5"))
+
+    found = infoset.json("reach", "angles.toml")
+    out = infoset("reach", "angles.toml")[1]
+
+    assert found["affine"] == pytest.approx(116.2046, abs=PRINTED)
+    assert re.search(r"affine feedback +none +known only in flight: directions without ranges", out)
+    assert "no strategy" not in out
+
+
+@pytest.mark.parametrize(
+    ("sensor", "line"),
+    [
+        ("velocity_error_m_s = 0.01", "sensor: position_error_m: is missing"),
+        ("range_error_m = 3.0", "sensor: position_error_m: is missing"),
+        ("angle_error_deg = 90.0", "angle_error_deg: must be less than"),
+        (
+            "angle_error_deg = 0.5\nvelocity_error_m_s = 0.01",
+            "velocity_error_m_s: needs position_error_m",
+        ),
+        (
+            "angle_error_deg = 0.5\n[passive_safety]\nkeep_out_m = 1.0\ndrift_periods = 1",
+            "passive_safety: needs sensor.position_error_m, not angle_error_deg",
+        ),
+    ],
+)
+def test_sensor_that_contradicts_itself_is_refused(sensor: str, line: str) -> None:
+    with pytest.raises(InputError, match=re.escape(line)):
+        read_text(Rendezvous, problem_text(ARCH).replace(SENSOR, sensor), "mine.toml")
+
+
 def test_errors_proportional_to_impulses_cost_guarantee(infoset: Command) -> None:
     more = ("--set", "execution_error.relative=0.03")
     exact, relative = (infoset.json("reach", ARCH, *each) for each in ((), more))
@@ -248,7 +303,11 @@ def test_conflict_names_what_to_relax(infoset: Command) -> None:
         ((ARCH, "--flights", "-1"), "--flights"),
         (("rendezvous-2021", "--flights", "5"), "--flights: is for problems with [sensor]"),
         (("double-integrator", "--flights", "5"), "--flights: is for problems with [sensor]"),
-        ((ARCH, "--set", "sensor.range_error_m=1"), 'has no key "sensor.range_error_m"'),
+        ((ARCH, "--set", "sensor.range_error_m=1"), "sensor: range_error_m: needs angle_error_deg"),
+        (
+            (ARCH, "--set", "sensor.angle_error_deg=1"),
+            "sensor: angle_error_deg: must be omitted with position_error_m",
+        ),
     ],
 )
 def test_options_that_do_not_fit_are_refused(
@@ -362,3 +421,49 @@ def test_keep_out_that_no_plan_has_is_one_message(infoset: Command) -> None:
     )
     assert code == 2
     assert "reduce the keep-out distance" in err
+
+
+@pytest.mark.thorough
+def test_drifts_near_the_perigee_of_an_ellipse_stay_clear() -> None:
+    """Flights in the cone with failures after each impulse, by the motion between any two times."""
+    report = COMMAND.report(Reach(problem="elliptic-safe", flights=0))
+    assert report.drifts is not None
+    assert report.drifts.least_distance >= 50.0
+    # The bound of all strategies knows neither cone nor drifts.
+    assert report.bound is not None
+    assert report.plan.guarantee == pytest.approx(report.bound, rel=1e-4)
+    rendezvous = report.rendezvous
+    problem = rendezvous.problem
+    generator = np.random.default_rng(1)
+    flights = 400
+    at_bounds = np.arange(flights) % 2 == 1
+
+    def drawn(bounds: Floats) -> Floats:
+        values = generator.uniform(-1.0, 1.0, (flights, len(bounds)))
+        values[at_bounds] = np.sign(values[at_bounds])
+        return np.asarray(values * bounds)
+
+    errors = rendezvous.errors
+    states = problem.initial + drawn(errors.start)
+    measured = np.zeros((flights, 12, 3))
+    applied = np.zeros((flights, 12, 3))
+    nearest = np.inf
+    for t in range(12):
+        measured[:, t] = states[:, :3] + drawn(errors.measured)
+        for each in range(flights):
+            applied[each, t] = report.plan.control(measured[each, : t + 1], applied[each, :t])
+        after = states + (applied[:, t] + drawn(errors.execution)) @ IMPULSE.T
+        start_s = rendezvous.period_s * t
+        for share in np.linspace(0.0, 12.0, 361):
+            now_s = start_s + share * rendezvous.period_s
+            drift = after @ rendezvous.motion.transition(start_s, now_s).T
+            nearest = min(nearest, float(np.linalg.norm(drift[:, :3], axis=1).min()))
+            if share <= 1.0:
+                excess = drift @ problem.further[0].T - problem.further[1][t]
+                assert excess.max() <= 1e-6
+            if share == 1.0:
+                states = drift
+
+    assert report.drifts.least_distance <= nearest
+    distances = np.abs((states - report.plan.problem.aim) @ report.plan.problem.goal.T).max(axis=1)
+    assert 0.8 * report.plan.guarantee < distances.max() <= report.plan.guarantee * (1.0 + 1e-9)
