@@ -169,6 +169,11 @@ def best_with_rows(problem: OutputProblem, window: int | None, known: Flags) -> 
     """Return the plan of `affine_plan`; `known` constraints are in its program at first.
 
     The flags, shape (k,), are those of `plan_with_rows`.
+
+    Raises
+    ------
+    ValueError, NoRobustPlanError, NoSolutionError
+        As `affine_plan`.
     """
     if problem.relative_error is None:
         return plan_with_rows(problem, window, known)
