@@ -152,7 +152,7 @@ class Engagements:
                     time_s=self._time_s,
                     tracking=tracking,
                     flying=self._flight.flying.copy(),
-                    sight=sight,
+                    sight=seen,
                     measured=measured,
                     predicted_miss=miss,
                     impulse_m_s=impulse,

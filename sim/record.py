@@ -53,7 +53,7 @@ class Record:
     time_s, true_range_m : ndarray, shape (N,)
         Time and true range.
     true_angle_rad, true_rate_rad_s : ndarray, shape (N, C)
-        True line of sight in the plane of x and each axis.
+        True line of sight in the plane of x and each axis; of a misaligned camera in its axes.
     measured : mapping of str to ndarray
         Measured values by sensor: "angle" (rad) and "rate" (rad/s), shape (N, C), "range" (m),
         shape (N,). NaN where the sensor did not measure.

@@ -350,6 +350,11 @@ class Camera(BearingSensor):
         offset and `centroid_error_m` along each axis.
     **others
         Fields of `BearingSensor`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a value is not within its limits, or two of them contradict each other.
     """
 
     table: ClassVar[str] = "camera"

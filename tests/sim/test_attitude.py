@@ -45,7 +45,7 @@ class Unmodelled(Scenario):
     """A scenario whose set takes the camera for an aligned one."""
 
     @property
-    def set_model(self) -> SetModel:  # type: ignore[override]
+    def set_model(self) -> SetModel:
         values = {field.name: getattr(self, field.name) for field in fields(Scenario)}
         assert self.camera is not None
         aligned = replace(self.camera, misalignment_rad=0.0)

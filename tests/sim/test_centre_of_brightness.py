@@ -128,7 +128,7 @@ class Unmodelled(Scenario):
     """A scenario whose set takes the images for those of the centre."""
 
     @property
-    def set_model(self) -> SetModel:  # type: ignore[override]
+    def set_model(self) -> SetModel:
         values = {field.name: getattr(self, field.name) for field in fields(Scenario)}
         return unlit(Scenario(**values)).set_model
 
