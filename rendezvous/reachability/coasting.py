@@ -272,7 +272,10 @@ class CoastTube:
         )
 
     def uncontrolled(self, normals: Floats) -> Floats:
-        """Return the parts of `maxima` of execution errors and accelerations, (K, N + 1, k)."""
+        """Return the parts of `maxima` of execution errors and accelerations, (K, N + 1, k).
+
+        `normals` are those of `maxima`.
+        """
         execution = self.columns[..., self.errors.size - 3 :]
         along = np.einsum("rn,kine->kire", normals, execution)
         return np.asarray(np.abs(along).sum(axis=-1) + self._pushes(normals))

@@ -75,7 +75,8 @@ class SightSensor:
     def cuts(self, direction: Floats, distance: float | None, states: int) -> Cuts:
         """Return half-spaces of the states that agree with a measured direction and range.
 
-        `direction` is a unit vector of two or three components.
+        `direction` is a unit vector of two or three components, and `distance` the measured range,
+        in units of the position; None if there is none.
         """
         tangents = _tangents(direction)
         rows = tangents - np.tan(self.angle_error_rad) * direction
