@@ -57,6 +57,30 @@ def random_scenario(number: int, *, rate_sensor: bool) -> Scenario:
             continue  # an invalid scenario is drawn again
 
 
+def with_burns(scenario: Scenario, number: int) -> Scenario:
+    """Return the scenario with an engine whose maximum impulse lasts a part of a step, or all of
+    it, and with a cut-off before the earliest arrival.
+
+    Raises
+    ------
+    ValueError
+        If the flight has no impulse before this cut-off.
+    """
+    engine = scenario.thruster
+    share = (0.3, 1.0, 0.7)[number % 3]
+    longest_m_s = engine.max_impulse_m_s * (1.0 + engine.execution_error_relative)
+    earliest_s = scenario.set_model.label_limits_m[0] / scenario.closing_speed_m_s
+    # A hundredth of a step is more than the rounding of the times.
+    last_s = scenario.nominal_arrival_s - earliest_s + (share + 1.01) * scenario.step_s
+    burning = replace(
+        engine,
+        thrust_N=longest_m_s / (share * scenario.step_s),
+        mass_kg=1.0,
+        last_impulse_s=max(last_s, engine.last_impulse_s or 0.0),
+    )
+    return replace(scenario, thruster=burning)
+
+
 def gravity_scenario(number: int) -> Scenario:
     """Return the random scenario with a number, in strong gravity of a planet or a star.
 

@@ -9,7 +9,8 @@ violations.
     plane, Sun anywhere python -m benchmarks.soundness --engagements 40000 --camera        # random
     scenarios with a camera python -m benchmarks.soundness --engagements 40000 --camera scheduled  #
     with a cut-off or times of impulses python -m benchmarks.soundness --engagements 20000 --gravity
-    # random scenarios in strong gravity
+    # random scenarios in strong gravity python -m benchmarks.soundness --engagements 20000 --random
+    --burns       # burns of up to a step, also with --random rate and --camera
 
 Counted are engagements whose true state left its section (by any amount), whose set was lost, whose
 true miss exceeded Phi, and those without a Phi. All counts must be zero; a warning ends the run.
@@ -34,6 +35,7 @@ from benchmarks.random_scenarios import (
     gravity_scenario,
     random_scenario,
     scheduled,
+    with_burns,
 )
 from infoset import AngleSensor, InformationSetView, InitialSet, Model, RateSensor
 from infoset.experiments.interception.scenario_file import load_scenario
@@ -196,8 +198,15 @@ class Count:
         )
 
 
-def fly(scenario: Scenario, first: int, batch: int, seed: int) -> Count:
-    """Simulate a batch of engagements with all kinds of noise."""
+def fly(scenario: Scenario, first: int, batch: int, seed: int, *, burns: bool = False) -> Count:
+    """Simulate a batch of engagements with all kinds of noise, and with burns in place of impulses
+    if the scenario allows them.
+    """
+    if burns:
+        try:
+            scenario = with_burns(scenario, first // batch)
+        except ValueError:
+            return Count(refused=batch)
     draws = draw(scenario, range(first, first + batch), seed)
     if draws.execution is not None and first // batch % 2:
         draws = replace(draws, execution=np.where(draws.execution >= 0.0, 1.0, -1.0))
@@ -257,24 +266,27 @@ def fly_space_batch(number: int, hostile: bool, seed: int) -> Count:
     )
 
 
-def fly_random_batch(number: int, rate_sensor: bool, seed: int) -> Count:
+def fly_random_batch(number: int, rate_sensor: bool, seed: int, *, burns: bool = False) -> Count:
     """Simulate batch `number`, which has a random scenario."""
     return fly(
         random_scenario(seed * 1_000_000 + number, rate_sensor=rate_sensor),
         number * BATCH,
         BATCH,
         seed,
+        burns=burns,
     )
 
 
-def fly_camera_batch(number: int, seed: int, *, has_schedule: bool = False) -> Count:
+def fly_camera_batch(
+    number: int, seed: int, *, has_schedule: bool = False, burns: bool = False
+) -> Count:
     """Simulate batch `number`, which has a random scenario with a camera, and a random schedule of
     impulses.
     """
     scenario = camera_scenario(seed * 1_000_000 + number)
-    return fly(
-        scheduled(scenario, number) if has_schedule else scenario, number * BATCH, BATCH, seed
-    )
+    if has_schedule:
+        scenario = scheduled(scenario, number)
+    return fly(scenario, number * BATCH, BATCH, seed, burns=burns)
 
 
 def fly_gravity_batch(number: int, seed: int) -> Count:
@@ -308,6 +320,9 @@ def main() -> None:
     )
     parser.add_argument("--gravity", action="store_true", help="random scenarios in strong gravity")
     parser.add_argument(
+        "--burns", action="store_true", help="burns that take time, for --random and --camera"
+    )
+    parser.add_argument(
         "--first", type=int, default=0, metavar="BATCH", help="number of the first batch"
     )
     parser.add_argument("--workers", type=int, default=1)
@@ -321,7 +336,13 @@ def main() -> None:
         if options.camera:
             has_schedule = options.camera == "scheduled"
             jobs = [
-                pool.submit(fly_camera_batch, number, options.seed, has_schedule=has_schedule)
+                pool.submit(
+                    fly_camera_batch,
+                    number,
+                    options.seed,
+                    has_schedule=has_schedule,
+                    burns=options.burns,
+                )
                 for number in numbers
             ]
         elif options.gravity:
@@ -334,7 +355,10 @@ def main() -> None:
             ]
         else:
             rate = options.random == "rate"
-            jobs = [pool.submit(fly_random_batch, number, rate, options.seed) for number in numbers]
+            jobs = [
+                pool.submit(fly_random_batch, number, rate, options.seed, burns=options.burns)
+                for number in numbers
+            ]
         for number, job in enumerate(jobs):
             count = job.result()
             if count != Count(count.engagements, refused=count.refused):

@@ -32,6 +32,8 @@ def correctable_later_m(situation: Situation, range_m: Floats) -> Floats:
     to_go_s = range_at_impulse(range_m, e, situation.lead_s) / e
     steps = np.ceil(to_go_s / step_s) - 1.0
     full = np.clip(np.floor(budget / thruster.max_impulse_m_s), 0.0, np.maximum(steps, 0.0))
+    # A burn acts at its middle.
+    to_go_s = to_go_s - 0.5 * thruster.burn_s(thruster.max_impulse_m_s)
     return np.asarray(
         thruster.max_impulse_m_s * (full * to_go_s - step_s * 0.5 * full * (full + 1.0))
     )
@@ -44,7 +46,7 @@ def correctable_m(
 
     Impulses have their maximum, the earliest first, until the budget is spent or x = 0 (the range
     is zero). One more has the rest of the budget, none if the rest is below the minimum impulse.
-    The result has the broadcast shape.
+    Burns end before x = 0. The result has the broadcast shape.
 
     Parameters
     ----------
@@ -66,9 +68,12 @@ def correctable_m(
     sums_s = np.append(0.0, np.cumsum(times_s))
     # After the last time the rest is zero: any number will do.
     next_s = np.append(times_s, 0.0)[end]
+    # A burn acts at its middle.
+    of_full_s = to_go_s - 0.5 * thruster.burn_s(thruster.max_impulse_m_s)
+    of_rest_s = to_go_s - 0.5 * thruster.burn_s(rest)
     return np.asarray(
-        thruster.max_impulse_m_s * (full * to_go_s - (sums_s[end] - sums_s[first]))
-        + rest * (to_go_s - next_s)
+        thruster.max_impulse_m_s * (full * of_full_s - (sums_s[end] - sums_s[first]))
+        + rest * (of_rest_s - next_s)
     )
 
 

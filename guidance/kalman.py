@@ -10,6 +10,7 @@ import numpy as np
 from infoset.arrays import Flags, Floats
 from infoset.guidance.estimate import MissEstimate
 from infoset.guidance.situation import Situation
+from infoset.guidance.thruster import modulus
 from infoset.limits import Checked, NotNegative, Positive
 from infoset.model import SetModel
 from infoset.sensors import RangeSensor
@@ -160,7 +161,8 @@ class KalmanBank:
         miss, variance = self._misses(to_go)
         miss = miss + situation.information.model.lateral_aim_m[:, None, None]
         for time_s, impulse in situation.pending:
-            miss = miss - impulse[..., None] * np.maximum(to_go - time_s, 0.0)
+            middle_s = time_s + 0.5 * situation.thruster.burn_s(modulus(impulse))[:, None]
+            miss = miss - impulse[..., None] * np.maximum(to_go - middle_s, 0.0)
 
         mean = (weight * miss).sum(axis=-1)
         # Rounding may leave a small variance just below zero.
@@ -242,7 +244,12 @@ class KalmanBank:
     def _predict(self, situation: Situation) -> None:
         step_s = situation.step_s
         model = situation.information.model
-        self.mean[..., VZ] -= situation.last_impulse_m_s[..., None]
+        impulse = situation.last_impulse_m_s
+        self.mean[..., VZ] -= impulse[..., None]
+        if situation.thruster.acceleration_m_s2 is not None:
+            # A burn acts at its middle.
+            late_m = 0.5 * situation.thruster.burn_s(modulus(impulse)) * impulse
+            self.mean[..., Z] += late_m[..., None]
         motion = np.eye(self.mean.shape[-1])
         motion[Z, VZ] = step_s
         motion[X, SPEED] = -step_s

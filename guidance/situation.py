@@ -10,7 +10,7 @@ import numpy as np
 
 from infoset.arrays import Flags, Floats
 from infoset.engine.predicted_miss import PredictedMiss
-from infoset.guidance.thruster import Thruster
+from infoset.guidance.thruster import Thruster, modulus
 from infoset.information_set import InformationSetView
 from infoset.sensors import Measurements, Sensor
 
@@ -115,5 +115,6 @@ class Situation:
         """
         change = np.zeros((len(self.last_impulse_m_s), *time_to_go_s.shape[-2:]))
         for time_s, impulse in self.pending:
-            change += impulse[..., None] * np.maximum(time_to_go_s - time_s, 0.0)
+            middle_s = time_s + 0.5 * self.thruster.burn_s(modulus(impulse))[:, None]
+            change += impulse[..., None] * np.maximum(time_to_go_s - middle_s, 0.0)
         return change

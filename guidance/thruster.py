@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import numpy as np
 
 from infoset.arrays import Floats, some
 from infoset.clock import STEP_ROUNDING, steps_between
-from infoset.limits import POSITIVE, Limits, NotNegative, Part, Positive, check_fields
+from infoset.limits import MAXIMUM, POSITIVE, Limits, NotNegative, Part, Positive, check_fields
+from infoset.model import LONGEST_BURN
+
+FloatOrFloats = TypeVar("FloatOrFloats", float, Floats)
 
 MAX_IMPULSES = 100_000
 """Maximum number of impulses that a period gives: a flight has no more steps."""
@@ -31,7 +34,8 @@ class Thruster:
     budget_m_s : float
         Budget mu: maximum sum of the moduli of all impulses, m/s.
     min_impulse_m_s, max_impulse_m_s : float
-        Bounds mu1 and mu2 of the modulus of an impulse that is not zero, m/s.
+        Bounds mu1 and mu2 of the modulus of an impulse that is not zero, m/s. With a thrust, the
+        default mu2 is the impulse of a burn that lasts one step at most (`limited_to`).
     execution_error_relative : float
         Bound delta of |given / commanded - 1|: a commanded impulse k is executed as k (1 + error).
     pointing_error_rad : float
@@ -51,12 +55,17 @@ class Thruster:
         impulse nearest to it is the first one. None is the first possible step.
     delay_steps : int
         Number of steps from the decision to the impulse. The budget is reserved at the decision.
+    thrust_N, mass_kg : float or None
+        Thrust F and mass m of the spacecraft, both or neither. With them an impulse is a burn of
+        constant acceleration F / m that starts at its step. Its error of size is one of duration.
+        The decrease of the mass is neglected. None: impulses are instantaneous.
 
     Raises
     ------
     TypeError, ValueError
-        If a value is not a number within its limits, mu1 exceeds mu2, the times do not decrease, or
-        two of the keys of times contradict each other.
+        If a value is not a number within its limits, mu1 exceeds mu2, the times do not decrease,
+        two of the keys of times contradict each other, only one of thrust and mass is given, or
+        there is neither a thrust nor a maximum impulse.
 
     Notes
     -----
@@ -69,7 +78,7 @@ class Thruster:
 
     budget_m_s: NotNegative
     min_impulse_m_s: NotNegative
-    max_impulse_m_s: Positive
+    max_impulse_m_s: Positive = MAXIMUM
     execution_error_relative: Part = 0.0
     pointing_error_rad: Part = 0.0
     last_impulse_s: NotNegative | None = None
@@ -77,9 +86,12 @@ class Thruster:
     impulse_period_s: Positive | None = None
     first_impulse_s: Positive | None = None
     delay_steps: Annotated[int, _DELAY] = 0
+    thrust_N: Positive | None = None  # noqa: N815 - a key ends with its unit
+    mass_kg: Positive | None = None
 
     def __post_init__(self) -> None:
         check_fields(self)
+        self._check_burns()
         if self.min_impulse_m_s > self.max_impulse_m_s:
             raise ValueError(
                 "Thruster: min_impulse_m_s must not exceed max_impulse_m_s, "
@@ -92,6 +104,19 @@ class Thruster:
                     f"{next_s!r} after {time_s!r}"
                 )
         self._check_period()
+
+    def _check_burns(self) -> None:
+        """Refuse a thrust without a mass, and an engine without a maximum impulse."""
+        if (self.thrust_N is None) != (self.mass_kg is None):
+            missing = "thrust_N" if self.thrust_N is None else "mass_kg"
+            raise ValueError(
+                f"Thruster: thrust_N and mass_kg must both be set, or neither: {missing} is missing"
+            )
+        if self.thrust_N is None and self.max_impulse_m_s == MAXIMUM:
+            raise ValueError(
+                "Thruster: max_impulse_m_s is missing: set it, or set thrust_N and mass_kg, from "
+                "which it follows"
+            )
 
     def _check_period(self) -> None:
         """Refuse a period or a first impulse that other times contradict."""
@@ -113,6 +138,66 @@ class Thruster:
                 f"times before the arrival: got {self.first_impulse_s!r} and "
                 f"{self.last_impulse_s!r}"
             )
+
+    @property
+    def acceleration_m_s2(self) -> float | None:
+        """Acceleration F / m of a burn, m/s^2; None for instantaneous impulses."""
+        if self.thrust_N is None or self.mass_kg is None:
+            return None
+        return self.thrust_N / self.mass_kg
+
+    @property
+    def longest_burn_s(self) -> float:
+        """Duration of the maximum impulse, with its error of size, s."""
+        return self.burn_s(self.max_impulse_m_s * (1.0 + self.execution_error_relative))
+
+    def burn_s(self, size_m_s: FloatOrFloats) -> FloatOrFloats:
+        """Return the durations of burns with impulses of a modulus, s; zero without a thrust."""
+        if self.acceleration_m_s2 is None:
+            return 0.0 * size_m_s
+        return size_m_s / self.acceleration_m_s2
+
+    def as_burns(self, impulse_m_s: Floats, to_go_s: float) -> Floats:
+        """Return the burns that change the miss as much as instantaneous impulses, m/s.
+
+        A burn u with the acceleration a changes the miss by u (tau - u / (2 a)), at the time to go
+        tau of its start, which grows with u until the burn lasts until the arrival: an impulse that
+        no burn replaces becomes this one.
+
+        Parameters
+        ----------
+        impulse_m_s : ndarray, shape (C, B)
+            Instantaneous impulses.
+        to_go_s : float
+            Time from the impulse to the nominal arrival, s.
+        """
+        if self.acceleration_m_s2 is None or to_go_s <= 0.0:
+            return impulse_m_s
+        share = 2.0 * self.burn_s(modulus(impulse_m_s)) / to_go_s
+        return np.asarray(impulse_m_s * (2.0 / (1.0 + np.sqrt(np.maximum(1.0 - share, 0.0)))))
+
+    def limited_to(self, step_s: float) -> Thruster:
+        """Return the engine with a maximum impulse whose burn ends within a step.
+
+        Raises
+        ------
+        ValueError
+            If the maximum impulse is given, and its burn may be longer than a step.
+        """
+        acceleration_m_s2 = self.acceleration_m_s2
+        if acceleration_m_s2 is None:
+            return self
+        most_m_s = acceleration_m_s2 * step_s / (1.0 + self.execution_error_relative)
+        if self.max_impulse_m_s == MAXIMUM:
+            return replace(self, max_impulse_m_s=most_m_s)
+        if self.longest_burn_s <= LONGEST_BURN * step_s:
+            return self
+        raise ValueError(
+            "thruster.max_impulse_m_s: a burn must end before the next step: a burn "
+            f"of {self.max_impulse_m_s:g} m/s lasts up to {self.longest_burn_s:.4g} s, a step "
+            f"{step_s:g} s; write a step_s of at least {self.longest_burn_s:.4g}, or a "
+            f"max_impulse_m_s of at most {most_m_s:.4g}: got {self.max_impulse_m_s!r}"
+        )
 
     @property
     def is_scheduled(self) -> bool:

@@ -33,6 +33,9 @@ MIN_RANGE = 1e-9
 
 It is far above the rounding of a range, 1e-16 of the label, and far below a range that matters.
 """
+LONGEST_BURN = 1.0 + 1e-9
+"""Maximum duration of a burn in units of the time that it has: one, and the rounding of a quotient.
+"""
 
 _APPROACH = Limits(below=0.0)
 _SECTIONS = Limits(minimum=1, maximum=MAX_SECTIONS, whole=True)
@@ -295,6 +298,9 @@ class SetModel(SetSettings):
     aim_m : tuple of float, or None
         Point at which guidance aims, relative to the centre that the sensors measure, along the
         lateral axes, m; None is the centre. Misses are those of this point.
+    burn_acceleration_m_s2 : float or None
+        Acceleration of a burn, which starts at its step: an impulse k lasts |k| over it. None:
+        impulses are instantaneous.
     **settings
         Fields of `SetSettings`.
 
@@ -318,6 +324,7 @@ class SetModel(SetSettings):
     execution_error_relative: Part = 0.0
     pointing_error_rad: Part = 0.0
     aim_m: Annotated[tuple[float, ...], NUMBER] | None = None
+    burn_acceleration_m_s2: Positive | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -479,6 +486,12 @@ class SetModel(SetSettings):
         It is the threshold, and more than the rounding error of zero.
         """
         return max(self.range_threshold_m, MIN_RANGE * self.label_limits_m[1])
+
+    def burn_s(self, size_m_s: float) -> float:
+        """Return the maximum duration of a burn with an impulse of a modulus, s."""
+        if self.burn_acceleration_m_s2 is None:
+            return 0.0
+        return size_m_s * (1.0 + self.execution_error_relative) / self.burn_acceleration_m_s2
 
     @property
     def label_limits_m(self) -> Interval:

@@ -264,7 +264,8 @@ class Engagements:
         if opportunity.may_fire:
             budget_left_m_s = self._impulses.budget_left_m_s
             self._decisions.decide(self.step, tracking, budget_left_m_s, miss)
-        self._impulses.decide(wanted)
+        fired_s = self._time_s + self._impulses.lead_s
+        self._impulses.decide(wanted, self.scenario.nominal_arrival_s - fired_s)
 
     def _situation(
         self,

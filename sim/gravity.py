@@ -25,6 +25,7 @@ def on_board_model(scenario: Scenario) -> SetModel:
         scenario.set_model,
         execution_error_relative=thruster.execution_error_relative,
         pointing_error_rad=thruster.pointing_error_rad,
+        burn_acceleration_m_s2=thruster.acceleration_m_s2,
     )
     return with_gravity(model, scenario.sun, max_impulses_m_s(model, thruster))
 

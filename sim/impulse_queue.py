@@ -91,10 +91,14 @@ class ImpulseQueue:
         first, after = np.searchsorted(self._times_s, ends_s).tolist()
         return Opportunity(after > first, self._times_s[after:])
 
-    def decide(self, wanted_m_s: Floats) -> None:
+    def decide(self, wanted_m_s: Floats, to_go_s: float) -> None:
         """Add the impulses that the engine gives for the commanded ones, and reserve their
-        budget.
+        budget. `to_go_s` is the time from the impulse to the nominal arrival, s.
+
+        The command is an instantaneous impulse: an engine that burns gives the impulse that changes
+        the miss as much.
         """
+        wanted_m_s = self._thruster.as_burns(wanted_m_s, to_go_s)
         min_impulse_m_s = self._thruster.min_impulse_m_s
         is_short = self.budget_left_m_s < min_impulse_m_s
         if some(is_short):

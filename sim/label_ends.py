@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from infoset.arrays import Flags, Floats, some
-from infoset.engine.section_law import impulse_doubts, section_laws
+from infoset.engine.section_law import change_of_miss, section_laws
 from infoset.model import SetModel
 from infoset.sim.results import Results
 
@@ -61,12 +61,12 @@ class LabelEnds:
             return
 
         # The executed impulse is not known exactly: the misses move by its two ends.
-        doubt = np.stack([impulse_doubts(impulse, law) for law in self._laws])
-        greatest = (impulse + doubt)[:, self._engagements]
-        least = (impulse - doubt)[:, self._engagements]
+        of_labels = impulse[:, self._engagements]
         to_go_s = np.maximum(self._labels_m / self._model.closing_speed_m_s - time_s, 0.0)
-        self._misses_m[0] -= greatest * to_go_s
-        self._misses_m[1] -= least * to_go_s
+        for channel, law in enumerate(self._laws):
+            change = change_of_miss(of_labels, to_go_s, law)
+            self._misses_m[0, channel] -= change.greatest
+            self._misses_m[1, channel] -= change.least
 
     def end(
         self,

@@ -96,8 +96,8 @@ class DecisionLog:
     -----
     With the lateral miss m of the true motion, its arrival T and the executed impulses u_j at the
     times t_j, the miss without the impulses from decision i on is M_i = m + sum over j >= i of u_j
-    (T - t_j): no motion is simulated again. Cost: O(B) in a step, O(K B) after a flight with K
-    decisions.
+    (T - t_j): no motion is simulated again. A burn acts at its middle. Cost: O(B) in a step, O(K B)
+    after a flight with K decisions.
     """
 
     def __init__(self, scenario: Scenario, lateral: tuple[int, int], steps: int) -> None:
@@ -164,7 +164,9 @@ class DecisionLog:
         """Return the misses M_i without the impulses from each decision on, shape (K + 1, C, B)."""
         effects_m = np.zeros((len(steps) + 1, *lateral_miss_m.shape))
         effects_m[:-1] = self._executed_m_s[np.minimum(steps, len(self._executed_m_s) - 1)]
-        effects_m[:-1] *= np.maximum(arrival_s - times_s[:, None], 0.0)[:, None]
+        sizes = modulus(effects_m[:-1].swapaxes(0, 1))
+        middles_s = times_s[:, None] + 0.5 * self._scenario.thruster.burn_s(sizes)
+        effects_m[:-1] *= np.maximum(arrival_s - middles_s, 0.0)[:, None]
         return np.asarray(np.cumsum(effects_m[::-1], axis=0)[::-1] + lateral_miss_m)
 
     def _causes(self, flights: _AtDecisions, times_s: Floats, arrival_s: Floats) -> list[MissCause]:

@@ -240,6 +240,7 @@ class Scenario:
     def __post_init__(self) -> None:
         check_fields(self)
         self._check_body()
+        object.__setattr__(self, "thruster", self.thruster.limited_to(self.fitted_step_s))
         for sensor in self.sensors.values():
             check_period(sensor, self.step_s)
         self._check_axes()
@@ -251,6 +252,7 @@ class Scenario:
         if self.information_set.is_guaranteed:
             _ = self.set_model.label_limits_m
         self._check_lengths()
+        self._check_last_burn()
         self._check_wrong_ranges()
         if self.information_set.wrong_images and self.rate_sensor is not None:
             raise ValueError(
@@ -268,6 +270,25 @@ class Scenario:
                     f"body.{key} is a value of an engagement in space, and uncertainty has no y_m "
                     "and vy_m_s: set them, or leave the value out"
                 )
+
+    def _check_last_burn(self) -> None:
+        """Check that the last burn ends before the earliest possible arrival."""
+        longest_s = self.thruster.longest_burn_s
+        if longest_s == 0.0:
+            return
+        step_s = self.fitted_step_s
+        steps = self.impulse_steps
+        first_arrival_s = self.set_model.label_limits_m[0] / self.closing_speed_m_s
+        last_step = math.floor((first_arrival_s - longest_s) / step_s)
+        if steps is not None and steps[-1] <= last_step:
+            return
+        earliest_s = self.nominal_arrival_s - first_arrival_s
+        raise ValueError(
+            f"thruster.last_impulse_s: the last burn must end before the arrival, which may be "
+            f"{earliest_s:.4g} s earlier than the nominal one, and may last {longest_s:.4g} s: "
+            f"write at least {self.nominal_arrival_s - last_step * step_s:.6g}: got "
+            f"{self.thruster.last_impulse_s!r}"
+        )
 
     def _check_wrong_ranges(self) -> None:
         """Check that wrong ranges fit the model and the sensors."""

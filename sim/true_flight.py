@@ -44,7 +44,12 @@ class TrueFlight:
         target_m_s2: Floats | None = None,
     ) -> None:
         batch, components = draws.position_m.shape
-        self._motion = motion or KeplerMotion(draws.position_m, draws.velocity_m_s, scenario.sun)
+        self._motion = motion or KeplerMotion(
+            draws.position_m,
+            draws.velocity_m_s,
+            scenario.sun,
+            scenario.thruster.acceleration_m_s2,
+        )
         self._step_s = scenario.set_model.step_s
         self._aim_m = scenario.set_model.lateral_aim_m[:, None]
         self._target = scenario.target

@@ -133,6 +133,10 @@ class History:
         self.values[: self.events, :, row] = self.values[: self.events, :, source]
         self.applies[: self.events, row] = applies
 
+    def ends_with(self, kind: int) -> bool:
+        """Whether the latest event is of a kind."""
+        return self.events > 0 and bool(self.kinds[self.events - 1] == kind)
+
     def total_impulse(self) -> Floats:
         """Return the sum of the impulses' magnitudes in each engagement, m/s, shape (B,)."""
         new = self._summed + np.flatnonzero(self.kinds[self._summed : self.events] == IMPULSE)

@@ -32,6 +32,7 @@ from infoset.engine.section_law import SectionLaw, law_of
 from infoset.engine.section_life import (
     NEVER_EMPTIED,
     across_of,
+    burn_of,
     impulse_doubt,
     range_of,
     time_to_go,
@@ -188,7 +189,12 @@ def later_impulses(
             if x_far <= 0.0:
                 break
             impulse = values[law.channel, event]
-            minimum = side * impulse - impulse_doubt(impulse, across_of(values, event, law), law)
+            across = across_of(values, event, law)
+            minimum = side * impulse - impulse_doubt(impulse, across, law)
+            if law.burn_time > 0.0:
+                # A burn acts later than at its step. It ends before each label arrives.
+                burn = burn_of(impulse, across, law)
+                middle += (burn.late - 0.5 * side * impulse) * burn.duration
             if x_near >= 0.0:
                 middle += minimum * (0.5 * (x_near + x_far) / e)
                 slope += minimum / e

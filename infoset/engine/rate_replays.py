@@ -39,15 +39,21 @@ from infoset.engine.section_window import (
 )
 from infoset.engine.workspace import LAST_REPLAY, Past, Replayed, replayed_section
 
+IN_BURN = -1
+"""Step at which a stretch began: none, after a burn."""
+
 
 class Stretch(NamedTuple):
     """Events without a cut, from step `began` on, which are applied at once; times are measured
     from that step.
 
+    A burn and the prediction after it are in no stretch, because the level of the section is
+    between those of two steps then.
+
     Parameters
     ----------
     began : int
-        Step of the last cut.
+        Step of the last cut, or `IN_BURN` between a burn and the prediction after it.
     bounds, moments : float
         Sum of the bounds of changes of V, m/s, and of bound times time, m.
     turned, impulses : float
@@ -84,6 +90,31 @@ def stretch_after(
     return Stretch(began, bounds + bound, moments + bound * time, turned, impulses)
 
 
+@inlined
+def next_stretch(
+    stretch: Stretch,
+    event: AxisEvent,
+    is_left_out: bool,
+    fastest: float,
+    elapsed: int,
+    law: SectionLaw,
+) -> Stretch:
+    """Return the stretch that goes on with an event that is left out, or begins after another one;
+    the arguments are those of `stretch_after`.
+    """
+    if is_left_out:
+        return stretch_after(stretch, event, fastest, elapsed, law)
+    if starts_burn(event.kind, law):
+        return new_stretch(IN_BURN)
+    return new_stretch(elapsed)
+
+
+@inlined
+def starts_burn(kind: int, law: SectionLaw) -> bool:
+    """Whether an event is a burn."""
+    return kind == IMPULSE and law.burn_time > 0.0
+
+
 @allocation_free
 def apply_stretch(
     section: SectionView, stretch: Stretch, elapsed: int, law: SectionLaw, points: Floats
@@ -94,6 +125,8 @@ def apply_stretch(
     By Lemma 9a, two segments along the levels of both ends contain the segments of all changes of V
     between them. `points` is a working array.
     """
+    if stretch.began == IN_BURN:
+        return
     before = time_to_go(section.label, stretch.began, law)
     now = time_to_go(section.label, elapsed, law)
     late = stretch.moments / (before - now) if elapsed > stretch.began else stretch.bounds
@@ -158,7 +191,8 @@ def replay_rates(
         kind = past.log.kinds[i]
         event = AxisEvent(kind, values[law.channel, i], across_of(values, i, law), errors[i])
         is_measurement = kind in (ANGLE, RATE)
-        is_left_out = past.thinned and not cuts[i]
+        is_single = cuts[i] or starts_burn(kind, law) or stretch.began == IN_BURN
+        is_left_out = past.thinned and not is_single
         # A rate does not change the last angle, so that this may be before its cut.
         sight = sight_after(sight, kind, event.value, event.across, True, law)
         if is_left_out and is_measurement:
@@ -166,7 +200,6 @@ def replay_rates(
 
         if past.thinned and not is_left_out:
             apply_stretch(section, stretch, elapsed, law, points)
-            stretch = new_stretch(elapsed)
         if is_measurement:
             nonempty, overlaps[i], is_cut = measure_event(
                 section, label, event, elapsed, sight, window, law, points
@@ -177,8 +210,7 @@ def replay_rates(
         elif not is_left_out:
             move_section(section, kind, event.value, event.across, elapsed, law, points)
         elapsed += kind == PREDICTION
-        if is_left_out:
-            stretch = stretch_after(stretch, event, window.fastest, elapsed, law)
+        stretch = next_stretch(stretch, event, is_left_out, window.fastest, elapsed, law)
         # Of the window of a single label only the limits are used.
         if past.thinned or window.near < window.far:
             window = window_after(window, event, elapsed, law)

@@ -107,6 +107,11 @@ class SectionLaw(NamedTuple):
     other_error_slope: float
     pointing_along: float
     pointing_across: float
+    burn_time: float
+    early_along: float
+    early_across: float
+    late_along: float
+    late_across: float
     channel: int
     other: int
     centroid_error: float
@@ -127,10 +132,13 @@ Laws = NDArray[np.record]
 def section_laws(model: SetModel) -> tuple[SectionLaw, ...]:
     """Return the constants of a model for the kernels, for each of its lateral axes."""
     laws = [_law(model.axis(name)) for name in model.axes]
+    psi = model.pointing_error_rad if model.is_guaranteed else 0.0
+    if model.burn_acceleration_m_s2 is not None:
+        burn_time = 1.0 / model.burn_acceleration_m_s2
+        laws = [_with_burns(law._replace(burn_time=burn_time), model, psi) for law in laws]
     if len(laws) == 1:
         return tuple(laws)
 
-    psi = model.pointing_error_rad if model.is_guaranteed else 0.0
     return tuple(
         law._replace(
             other_error_at_zero_range=laws[1 - channel].error_at_zero_range,
@@ -158,15 +166,65 @@ def law_of(laws: Laws, channel: int) -> SectionLaw:
     return law
 
 
-def impulse_doubts(impulse: Floats, law: SectionLaw) -> Floats:
-    """Return the bounds of `impulse_doubt` for impulses of shape (C, B), m/s, shape (B,)."""
-    along = np.abs(impulse[law.channel])
-    if law.pointing_across == 0.0:
-        return np.asarray(law.impulse_error * along)
+def _with_burns(law: SectionLaw, model: SetModel, psi: float) -> SectionLaw:
+    """Return the constants with the bounds (15a) of burns, for a pointing error psi, rad."""
+    if not model.is_guaranteed:
+        return law
 
-    size = np.hypot.reduce(impulse, axis=0)
-    pointing = law.pointing_along * along + law.pointing_across * size
-    return np.asarray(law.impulse_error * along + pointing)
+    delta = model.execution_error_relative
+    most = 1.0 / (1.0 - model.speed_error)
+    least = 1.0 / (1.0 + model.speed_error)
+    early = 0.5 * max(most - 1.0, 1.0 - least + delta**2 * most)
+    late = 0.5 * ((1.0 + delta) ** 2 * most - 1.0)
+    early_pointing = 0.5 * (1.0 + delta**2) * most
+    late_pointing = 0.5 * (1.0 + delta) ** 2 * most
+    along = 1.0 - math.cos(psi)
+    across = math.sin(psi)
+    return law._replace(
+        early_along=early + early_pointing * along,
+        early_across=early_pointing * across,
+        late_along=late + late_pointing * along,
+        late_across=late_pointing * across,
+    )
+
+
+class MissChange(NamedTuple):
+    """Changes of predicted misses by an impulse, m, to be subtracted: the least and the greatest
+    one for all errors of the engine, of the shape of the times to go.
+    """
+
+    least: Floats
+    greatest: Floats
+
+
+def change_of_miss(impulse: Floats, to_go_s: Floats, law: SectionLaw) -> MissChange:
+    """Return the changes of predicted misses by impulses of shape (C, B).
+
+    `to_go_s`, shape (B,) or (B, S), is the time from the impulse to x = 0, s. It is not negative.
+    """
+    own = impulse[law.channel]
+    along = np.abs(own)
+    size = along
+    if law.pointing_across > 0.0 or law.burn_time > 0.0:
+        size = np.hypot.reduce(impulse, axis=0)
+    # One more axis for labels.
+    shape = (-1, *[1] * (to_go_s.ndim - 1))
+    own = own.reshape(shape)
+    along = along.reshape(shape)
+    size = size.reshape(shape)
+    if law.burn_time == 0.0:
+        doubt = law.impulse_error * along
+        if law.pointing_across > 0.0:
+            doubt = doubt + (law.pointing_along * along + law.pointing_across * size)
+        return MissChange((own - doubt) * to_go_s, (own + doubt) * to_go_s)
+
+    duration = law.burn_time * size
+    early = law.early_along * along + law.early_across * size
+    late = law.late_along * along + law.late_across * size
+    # After the arrival there is no burn.
+    change = own * np.maximum(to_go_s - 0.5 * duration, 0.0)
+    doubt = early * to_go_s + late * np.maximum(to_go_s - duration, 0.0)
+    return MissChange(change - doubt, change + doubt)
 
 
 def _law(model: SetModel) -> SectionLaw:
@@ -240,6 +298,11 @@ def _law(model: SetModel) -> SectionLaw:
         other_error_slope=0.0,
         pointing_along=0.0,
         pointing_across=0.0,
+        burn_time=0.0,
+        early_along=0.0,
+        early_across=0.0,
+        late_along=0.0,
+        late_across=0.0,
         channel=0,
         other=-1,
         centroid_error=centroid,

@@ -12,6 +12,7 @@ docs/guarantee-space.md, unless they are of the paper.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -268,10 +269,55 @@ def pointing_doubt(impulse: float, across: float, law: SectionLaw) -> float:
 
 @inlined
 def impulse_doubt(impulse: float, across: float, law: SectionLaw) -> float:
-    """Return the error bound of an impulse, m/s: (2), in space (15); `across` is along the other
-    axis.
+    """Return the error bound of an impulse, m/s: (2), in space (15), of a burn the sum of both
+    bounds (15a); `across` is along the other axis.
     """
+    if law.burn_time > 0.0:
+        burn = burn_of(impulse, across, law)
+        return burn.early + burn.late
     return abs(impulse) * law.impulse_error + pointing_doubt(impulse, across, law)
+
+
+class Burn(NamedTuple):
+    """A burn along one axis.
+
+    Parameters
+    ----------
+    duration : float
+        Duration as commanded, s.
+    early, late : float
+        Error bounds (15a) at the levels of its start and of its end, m/s.
+    """
+
+    duration: float
+    early: float
+    late: float
+
+
+@inlined
+def burn_of(impulse: float, across: float, law: SectionLaw) -> Burn:
+    """Return the burn of an impulse; `across` is the impulse along the other axis."""
+    size = math.hypot(impulse, across)
+    along = abs(impulse)
+    early = law.early_along * along + law.early_across * size
+    late = law.late_along * along + law.late_across * size
+    return Burn(law.burn_time * size, early, late)
+
+
+@inlined
+def change_of_miss_at(
+    impulse: float, across: float, tau: float, law: SectionLaw
+) -> tuple[float, float]:
+    """Return the changes of the predicted miss of a label by an impulse, m, to be subtracted from
+    the upper and from the lower one: the least and the greatest one for all errors of the engine.
+    """
+    if law.burn_time > 0.0:
+        burn = burn_of(impulse, across, law)
+        change = impulse * (tau - 0.5 * burn.duration)
+        doubt = burn.early * tau + burn.late * (tau - burn.duration)
+        return change - doubt, change + doubt
+    error = impulse_doubt(impulse, across, law)
+    return (impulse - error) * tau, (impulse + error) * tau
 
 
 @inlined
@@ -297,14 +343,38 @@ def shift_section(
     """Shift a section by an impulse k, V becomes V - k, and widen it by the error bound of k.
 
     The error bound is (2) of docs/guarantee.md or, in space, (15) of docs/guarantee-space.md.
-    `across` is the impulse along the other axis.
+    `across` is the impulse along the other axis. A burn changes z too: `burn_section`.
     """
     tau = time_to_go(section.label, elapsed, law)
+    if law.burn_time > 0.0:
+        burn_section(section, tau, impulse, across, law)
+        return
     doubt = impulse_doubt(impulse, across, law)
     chains.shift(section, tau, -impulse)
     # Otherwise the bound is zero: `pointing_along` is zero with `pointing_across`.
     if law.impulse_error > 0.0 or law.pointing_across > 0.0:
         chains.spread(section, tau, doubt)
+
+
+@allocation_free
+def burn_section(
+    section: SectionView, tau: float, impulse: float, across: float, law: SectionLaw
+) -> None:
+    """Shift a section by a burn k that starts at the time to go `tau`, and widen it by its errors.
+
+    By Lemma 11a, V becomes V - k, the predicted miss m becomes m - k (tau - t/2) with the duration
+    t, and the errors are in the sum of two segments, along the levels of the start and of the end
+    of the burn. Afterwards the level is that of the end, which is not after the next step. z is
+    that of the motion after the burn, continued to the time of its start.
+    """
+    burn = burn_of(impulse, across, law)
+    end = tau - burn.duration
+    chains.shift(section, tau - 0.5 * burn.duration, -impulse)
+    if law.late_along == 0.0:
+        return
+    chains.spread(section, tau, burn.early)
+    chains.turn(section, end)
+    chains.spread(section, end, burn.late)
 
 
 @inlined

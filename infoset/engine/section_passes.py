@@ -24,7 +24,7 @@ from infoset.engine.section_life import (
     Z_MAX,
     Z_MIN,
     across_of,
-    impulse_doubt,
+    change_of_miss_at,
     measure_section,
     predict_section,
     range_of,
@@ -283,9 +283,9 @@ def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, 
                     continue
                 shift_section(section_of(sections, channel, b, s), elapsed, along, across, law)
                 tau = time_to_go(slot.label, elapsed, law)
-                error = impulse_doubt(along, across, law)
-                summaries[channel, b, s, UPPER_MISS] += (error - along) * tau
-                summaries[channel, b, s, LOWER_MISS] -= (error + along) * tau
+                least, greatest = change_of_miss_at(along, across, tau, law)
+                summaries[channel, b, s, UPPER_MISS] -= least
+                summaries[channel, b, s, LOWER_MISS] -= greatest
 
 
 @entry

@@ -20,14 +20,14 @@ from infoset.engine.rate_passes import measure_rate_all
 from infoset.engine.section_law import (
     BOUND_SLACK,
     SectionLaw,
-    impulse_doubts,
+    change_of_miss,
     law_table,
     section_laws,
 )
 from infoset.engine.section_life import CUT_SLACK, NEVER_EMPTIED
 from infoset.engine.section_passes import MOVED, NO_EVENT, SUMMARISED, WITH_HEIGHTS, Sections
 from infoset.engine.workspace import past_of
-from infoset.model import Recovery, SetModel
+from infoset.model import LONGEST_BURN, Recovery, SetModel
 
 MAX_LEFT_OUT = 3
 """Maximum number of images that a member leaves out because it is not proved that they make it
@@ -195,6 +195,7 @@ class SetState:
 
     def measure_angle(self, alpha: Floats, where: Flags) -> None:
         """Cut every section by measured angles of shape (C, B), rad."""
+        self._check_no_burn()
         active = self.tracking & where
         event = self.history.record(ANGLE, alpha, active)
         before = (self.lower_label.copy(), self.upper_label.copy())
@@ -208,6 +209,7 @@ class SetState:
 
     def measure_rate(self, omega: Floats, error: float, where: Flags) -> None:
         """Cut every section by measured rates of shape (C, B), rad/s, with an error bound."""
+        self._check_no_burn()
         active = self.tracking & where
         error = error * (1.0 + BOUND_SLACK)
         history = self.history
@@ -458,9 +460,32 @@ class SetState:
         if not some(active):
             return
 
+        self._check_burns(impulse[:, active])
         self.history.record(IMPULSE, impulse, active)
         self._catch_up()
+        if self.law.burn_time > 0.0:
+            # A burn turns the level, as a step does.
+            self._make_room(active)
         section_passes.shift_all(active, impulse, self.elapsed, self.sections, self.table)
+
+    def _check_burns(self, impulse: Floats) -> None:
+        """Refuse burns that may not end within the step, or before the nearest label arrives."""
+        size_m_s = float(np.hypot.reduce(impulse, axis=0).max())
+        longest_s = self.model.burn_s(size_m_s)
+        if longest_s == 0.0:
+            return
+        arrival_s = self.law.label_min / self.law.closing_speed - self.law.step * self.elapsed
+        if longest_s > LONGEST_BURN * min(self.model.step_s, arrival_s):
+            raise ValueError(
+                f"a burn must end within the step of {self.model.step_s:g} s, and before the "
+                f"earliest possible arrival in {arrival_s:.6g} s: {size_m_s:g} m/s may last "
+                f"{longest_s:.6g} s"
+            )
+
+    def _check_no_burn(self) -> None:
+        """Refuse a measurement after the burn of a step: the set is that after its end."""
+        if self.law.burn_time > 0.0 and self.history.ends_with(IMPULSE):
+            raise ValueError("a measurement must precede the burn of its step: call predict first")
 
     def drop_below_threshold(self) -> Flags:
         """Remove the sections whose range will be below the threshold after the next step; return a
@@ -584,9 +609,10 @@ class SetState:
         to_go = self.ranges / self.law.closing_speed
         for time_s, impulse in pending:
             lever = np.maximum(to_go - time_s, 0.0)
-            doubt = np.stack([impulse_doubts(impulse, law) for law in self.laws])
-            summaries[..., section_life.UPPER_MISS] += (doubt - impulse)[..., None] * lever
-            summaries[..., section_life.LOWER_MISS] -= (doubt + impulse)[..., None] * lever
+            for channel, law in enumerate(self.laws):
+                change = change_of_miss(impulse, lever, law)
+                summaries[channel, ..., section_life.UPPER_MISS] -= change.least
+                summaries[channel, ..., section_life.LOWER_MISS] -= change.greatest
         return summaries
 
     def polygon(self, channel: int, engagement: int, slot: int) -> Floats:

@@ -1,0 +1,169 @@
+"""Burns: their motion, and the guarantee with them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from infoset.arrays import Floats
+from infoset.experiments import load_scenario
+from infoset.guidance import NoiseKind, Thruster
+from infoset.sim import Results, Scenario, Sun, lower_bound, simulate
+from infoset.sim.bound.game_value import why_no_value
+from infoset.sim.draws import draw
+from infoset.sim.engagement import Engagements
+from infoset.sim.kepler import KeplerMotion
+
+THRUST: dict[str, Any] = {"thrust_N": 10.0, "mass_kg": 500.0}
+AU_M = 1.495978707e11
+SUN = Sun(1.32712440018e20, AU_M, 0.3)
+
+
+@pytest.fixture(scope="module")
+def mission() -> Scenario:
+    """`haiv-2013` with a step that is long enough for its first burn, of up to 1.8 m/s."""
+    scenario = load_scenario("haiv-2013", ["step_s=90", "camera.period_s=90"])
+    return replace(scenario, thruster=replace(scenario.thruster, max_impulse_m_s=1.7))
+
+
+def burning(scenario: Scenario) -> Scenario:
+    return replace(scenario, thruster=replace(scenario.thruster, **THRUST))
+
+
+def sound(results: Results) -> bool:
+    return bool(
+        results.truth_kept.all()
+        and results.phi_held.filled(False).all()
+        and not results.set_emptied.any()
+    )
+
+
+@pytest.mark.parametrize("axes", [1, 2])
+@pytest.mark.parametrize("sun", [None, SUN])
+def test_the_motion_is_that_of_a_constant_acceleration(axes: int, sun: Sun | None) -> None:
+    """Against the same motion with the acceleration, integrated in steps of 5 s."""
+    position = np.array([[3e3, -4e3, 8e7][-axes - 1 :]])
+    velocity = np.array([[1.0, 0.5, -1.15e4][-axes - 1 :]])
+    impulse = np.array([[0.6], [-0.8]][:axes])
+    acceleration = 0.02
+    duration_s = float(np.hypot.reduce(impulse, axis=0).item()) / acceleration
+
+    program = KeplerMotion(position, velocity, sun, acceleration)
+    program.fire(impulse)
+    program.advance(60.0)
+
+    integrated = KeplerMotion(position, velocity, sun)
+    parts = 10
+    for _ in range(parts):
+        # The acceleration of the object relative to the spacecraft.
+        integrated.advance(duration_s / parts, -impulse / duration_s)
+    integrated.advance(60.0 - duration_s, np.zeros_like(impulse))
+
+    # The burn of the object is 1e8 m farther from the Sun than that of the spacecraft: gravity
+    # differs by 1e-13 / s^2 over at most 25 m.
+    np.testing.assert_allclose(program.position_m, integrated.position_m, rtol=0.0, atol=2e-8)
+    np.testing.assert_allclose(program.velocity_m_s, integrated.velocity_m_s, rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("noise", [NoiseKind.RANDOM, NoiseKind.GAME])
+@pytest.mark.parametrize(
+    "runs", [12, pytest.param(1000, marks=pytest.mark.thorough)], ids=["few", "many"]
+)
+def test_modelled_burns_keep_the_guarantee(mission: Scenario, noise: NoiseKind, runs: int) -> None:
+    assert sound(simulate(replace(burning(mission), noise=noise), runs))
+
+
+@pytest.mark.parametrize("noise", [NoiseKind.RANDOM, NoiseKind.GAME])
+def test_burns_that_are_flown_and_not_modelled_break_it(
+    mission: Scenario, noise: NoiseKind
+) -> None:
+    scenario = replace(mission, noise=noise)
+    draws = draw(scenario, range(12), 0)
+    truth = KeplerMotion(draws.position_m, draws.velocity_m_s, None, 0.02)
+    flight = Engagements(scenario, draws, truth=truth)
+    while flight.flying:
+        flight.advance()
+    assert not flight.results(np.arange(12)).truth_kept.all()
+
+
+@pytest.mark.parametrize("delay_steps", [0, 1])
+def test_all_strategies_hit_with_burns(mission: Scenario, delay_steps: int) -> None:
+    engine = replace(burning(mission).thruster, delay_steps=delay_steps)
+    for strategy in ("symmetric-miss", "patient", "least-effort", "zero-effort-miss", "kalman"):
+        results = simulate(replace(mission, thruster=engine, strategy=strategy), 6)
+        assert results.hit.all(), strategy
+        assert sound(results)
+
+
+def in_plane(**sensors: Any) -> Scenario:
+    """A planar scenario with wide ranges, speeds and times of arrival, and burns of a step."""
+    scenario = load_scenario("own-scenario")
+    engine = Thruster(
+        200.0,
+        0.1,
+        7.0,
+        execution_error_relative=0.02,
+        last_impulse_s=15.0,
+        thrust_N=15.0,
+        mass_kg=1.0,
+    )
+    return replace(scenario, thruster=engine, **sensors)
+
+
+@pytest.mark.parametrize("noise", [NoiseKind.RANDOM, NoiseKind.GAME])
+@pytest.mark.parametrize("sensors", [{}, {"range_sensor": None}])
+def test_burns_in_a_plane_keep_the_guarantee(noise: NoiseKind, sensors: dict[str, Any]) -> None:
+    assert sound(simulate(replace(in_plane(**sensors), noise=noise), 6))
+
+
+def test_mirrored_flights_have_mirrored_burns(mission: Scenario) -> None:
+    scenario = replace(burning(mission), noise=NoiseKind.RANDOM)
+    draws = draw(scenario, range(4), 1)
+    mirrored = replace(
+        draws,
+        position_m=draws.position_m * [-1.0, -1.0, 1.0],
+        velocity_m_s=draws.velocity_m_s * [-1.0, -1.0, 1.0],
+        errors={"angle": -draws.errors["angle"]},
+        bias=None if draws.bias is None else -draws.bias,
+    )
+    misses: list[Floats] = []
+    for each in (draws, mirrored):
+        flight = Engagements(scenario, each)
+        while flight.flying:
+            flight.advance()
+        misses.append(flight.results(np.arange(4)).lateral_miss_m)
+    np.testing.assert_allclose(misses[0], -misses[1], rtol=0.0, atol=1e-6)
+
+
+def test_the_last_burn_ends_before_the_earliest_arrival(mission: Scenario) -> None:
+    engine = burning(mission).thruster
+    late = replace(engine, impulses_s=(), last_impulse_s=30.0)
+    with pytest.raises(ValueError, match=r"last_impulse_s: the last burn must end.*least 180: got"):
+        replace(mission, thruster=late)
+    with pytest.raises(ValueError, match=r"may last 86\.7 s: write at least 180: got None"):
+        replace(mission, thruster=replace(late, last_impulse_s=None))
+
+
+def test_the_causes_of_misses_know_that_a_burn_acts_later(mission: Scenario) -> None:
+    """Without noise and errors the miss without impulses is that of the coasting motion."""
+    scenario = burning(mission)
+    results = simulate(scenario, 6)
+    coasting = results.position_m[:, :2] + results.velocity_m_s[:, :2] * (
+        results.position_m[:, 2:] / -results.velocity_m_s[:, 2:]
+    )
+    # The executed impulse and its duration are known to the log: only the closing speed is not
+    # exactly constant across the lateral motion.
+    np.testing.assert_allclose(results.unguided_miss_m, np.hypot(*coasting.T), rtol=1e-6)
+
+
+def test_the_lower_bound_stays_below_the_misses_and_has_no_value_of_the_game(
+    mission: Scenario,
+) -> None:
+    scenario = burning(mission)
+    assert "burns, which are no instantaneous impulses" in why_no_value(scenario)
+    # A burn corrects less than the impulse: the bound of impulses is a bound of burns.
+    found = lower_bound(scenario)
+    assert found.bound_m == pytest.approx(lower_bound(mission).bound_m, rel=1e-9)
