@@ -97,6 +97,7 @@ class Constructions:
 
     def noise(self, shift_m: Floats | None, target_side: Floats | None) -> GameNoise:
         """Return the noise of a batch; `GameNoise` describes the arguments."""
+        # At a tie the rule RANDOM takes the extreme from the draws, which are the choices here.
         return _ConstructedNoise(
             TieRule.RANDOM,
             by_axis(self.choices),

@@ -13,8 +13,9 @@ from infoset.arrays import Flags, Floats
 from infoset.limits import NUMBER, POSITIVE, Checked, Limits, Positive
 
 HALVINGS = 200
-"""Number of halvings of an interval that leave no number between its ends: a double has 53 digits
-and exponents down to 2^-1074, and the search ends earlier if the middle is an end.
+"""Maximum number of halvings of an interval. They end earlier if no number is between its ends:
+after at most 110 in 20 000 random cases. Near a root of zero, a point on the edge, they would go on
+to 2^-1074; after 200 the distance, which is proportional to the root, does not change.
 """
 TURN = 2.0 * math.pi
 

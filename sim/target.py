@@ -10,8 +10,8 @@ from infoset.arrays import Floats
 from infoset.sim.scenario import Manoeuvre, Target
 
 PERIOD_ROUNDING = 1e-12
-"""Relative rounding error of a time in switching periods: at most 1e5 steps, each with an error of
-a few 1e-16, are far below it.
+"""Relative margin for the rounding of a time in switching periods. The time is one product and one
+quotient: its error is a few 1e-16 for every step. A switch is early by at most 1e-12 of the time.
 """
 
 

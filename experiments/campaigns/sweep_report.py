@@ -107,7 +107,8 @@ class SweepReport:
         from infoset.experiments.campaigns.sweep_figures import draw_sweep
 
         required = self.table.required
-        # A sheet has room for four maps, of which the decisions are the first.
+        # For maps of two keys: the decisions come first, then each quantile but the required one.
+        # With a required share the median impulse is left out, so that there are four maps.
         shown = [*SHOWN[:2], SHOWN[3]]
         if isinstance(required, Requirement):
             shown = [*dict.fromkeys((required.quantile, *SHOWN))]

@@ -148,10 +148,10 @@ def narrow_ends(lower: float, upper: float, resolution: float, past: Past) -> Fe
 def search_bracket(past: Past) -> bool:
     """Search for a feasible label in the bracket of the workspace, whose labels are infeasible.
 
-    Return whether the middle label is feasible now; if not, the bracket has no feasible label. The
-    larger half of the bracket is evaluated at its middle. The search ends if the bracket is as
-    narrow as `NARROWEST`, or if no label in it can be feasible. The latter is a proof, and so is a
-    bracket of one label.
+    Return whether the middle label is feasible now. If not, no feasible label was found, and
+    `room.unproved` is set unless it is proved that there is none. The larger half of the bracket is
+    evaluated at its middle. The search ends if the bracket is as narrow as `NARROWEST`, or if no
+    label in it can be feasible. The latter is a proof, and so is a bracket of one label.
     """
     bracket = past.room.bracket
     four = past.room.four

@@ -277,11 +277,12 @@ def tip_move(
 
 @inlined
 def move_along_axis(a: float, b: float, c: float, d: float) -> tuple[float, float]:
-    """Move of a vertex that is extreme along an axis u, along u and along v; zero if it is sharp.
+    """Move of a vertex that is extreme along an axis u, along u and along v.
 
     The edge to the vertex has the normal a u - b v, the edge from it the normal c u + d v. A move
     by f u + s v must be at least a + b along the first normal and c + d along the second one, the
-    supports of the box: s = -1 makes the second one an equality with f = 1 + 2 d / c.
+    supports of the box: s = -1 makes the second one an equality with f = 1 + 2 d / c. The move is
+    zero if the vertex is sharp, or if one of a to d is negative, which is rounding.
     """
     if min(a, b) < 0.0 or min(c, d) < 0.0:
         return 0.0, 0.0

@@ -153,7 +153,8 @@ def bound_visits(
     Raises
     ------
     BoundTooSmallError
-        If the visits are not possible with the bound at these times.
+        If the visits are not possible with the bound at these times or, with `limits`, at any times
+        from which the search starts.
     """
     path = best.path
     if max_control(path.control, path.breaks()) <= max_m_s2:

@@ -186,8 +186,9 @@ def history(solution: CaptureSolution, count: int = 400) -> CaptureHistory:
 
 
 def orbital_axes(position_m: Floats, velocity_m_s: Floats) -> Floats:
-    """Return the axes radial, along the motion and normal at states, shape (n, 3, 3).
+    """Return the radial, transverse and normal axes at states, shape (n, 3, 3).
 
+    The transverse axis is in the plane of the motion; on a circle it is along the motion.
     `position_m` and `velocity_m_s` have shape (n, 3). Rows are the axes: the components of a vector
     are axes @ vector.
     """

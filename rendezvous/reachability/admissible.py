@@ -436,7 +436,11 @@ def min_peak(lifted: Lifted, scale: Floats, group: int) -> tuple[float, Floats]:
 
 
 def min_l1(lifted: Lifted, scale: Floats) -> Floats:
-    """Minimise the sum of the absolute values of all controls, whose units are `scale`."""
+    """Return the point of a set that minimises the sum of the absolute values of all controls.
+
+    The set has no equations: `lifted.equal` is not used. `scale`, shape (T m,), contains the units
+    of the controls.
+    """
     rows, limits = _absolute(lifted, scale, np.eye(len(scale)))
     cost = np.concatenate([np.zeros(lifted.size), np.ones(len(scale))])
 

@@ -68,8 +68,9 @@ def _facets_of(face: int, others: list[int], size: int) -> list[int]:
 def largest_ball(rows: Floats, limits: Floats) -> tuple[Floats, float]:
     """Return the centre, shape (d,), and radius of a largest ball in {z: rows z <= limits}.
 
-    The distance from a facet is limit - row . z, as for rows of unit length. The radius is negative
-    if the set is empty; its absolute value is the minimum relaxation of the rows that has a point.
+    No row is zero. The distance from a facet is limit - row . z, as for rows of unit length. The
+    radius is negative if the set is empty; its absolute value is the minimum relaxation of the rows
+    that has a point.
 
     Raises
     ------
@@ -77,8 +78,8 @@ def largest_ball(rows: Floats, limits: Floats) -> tuple[Floats, float]:
         If the linear program (HiGHS) was not solved, for example because the set has balls of any
         size.
     """
-    # The program has rows of size one; the radius is in units of the shortest row. A row of zeros
-    # must not be divided by zero: hence 1e-300.
+    # The program has rows of size one; the radius is in units of the smallest row, at most 1. The
+    # value 1e-300 only avoids a division by zero: with a row of zeros the program is not solved.
     units = np.abs(rows).max(axis=1, initial=1e-300)
     minimum = float(units.min(initial=1.0))
     matrix = np.column_stack([rows / units[:, None], minimum / units])

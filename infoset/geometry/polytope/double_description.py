@@ -116,7 +116,7 @@ def pivots(rows: Floats, tolerance: float, first: Any) -> tuple[Integers, Intege
         chosen[step] = row
         columns[step] = column
         table -= np.outer(table[:, column] / table[row, column], table[row])
-        # Rounding leaves entries that are zero.
+        # These entries are zero but for rounding.
         table[row] = 0.0
         table[:, column] = 0.0
     return chosen, columns
