@@ -85,9 +85,11 @@ def sweep_cells(scenario: Scenario, axes: Sequence[Axis]) -> tuple[Scenario, ...
             for key in tied_keys(axis.key):
                 if bounds.get(key):
                     for name, bound in bounds[key].items():
+                        # 12 digits as values of an axis, without the rounding of the product.
                         changes[name] = float(f"{value * bound:.12g}")
                 else:
                     changes[key] = value
+        # Values of keys for whole numbers are whole already; the file needs them as integers.
         for key, value in changes.items():
             if numeric_key(Scenario, key) is int:
                 changes[key] = round(value)

@@ -224,10 +224,10 @@ def measure_section(
     """Cut a section by an angle measurement.
 
     Return whether it is not empty, and the overlap of section and band, m, see `chains.cut`.
-    `across` is the angle of the other axis. By (8), z lies between x tan(alpha - b) and x tan(alpha
-    + b), with the error bound b of the angle at range x. The band is widened by 16 ulp, so that
-    rounding does not exclude true states on the border, which extremal noise produces. The ulp is
-    relative to the terms of a height and does not decrease with the range.
+    `across` is the angle of the other axis. The band of z is x times that of `slope_band`. It is
+    widened by 16 ulp, so that rounding does not exclude true states on the border, which extremal
+    noise produces. The ulp is relative to the terms of a height, with the range at t = 0: it does
+    not decrease with the range.
     """
     label = section.label
     x = range_of(label, elapsed, law)

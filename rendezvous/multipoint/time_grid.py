@@ -280,6 +280,7 @@ class _TimeGrid:
         if not flyby or final:
             return visits
 
+        # Only now is it known which of the ways are kept (`visits.back`).
         for target, earlier in before.items():
             write_quadratics(earlier, legs, states[last] - states[target], target, visits)
         return visits

@@ -212,9 +212,12 @@ def _state_constraints(
         end = _Rows(normals @ response[t + 1], limits, np.full(len(held), t + 1), held)
         result.append(_PeriodConstraints(end, []))
 
+        # States within period t obey the limits of time t, but depend on u(t). Their rows belong to
+        # time t + 1, as `Lifted.until` expects.
         thrust = np.eye(m, response.shape[2], t * m)
         if block.jump is not None:
-            # Constraints that an impulse does not change hold already at the end of a period.
+            # A constraint that impulses do not change has the same row at x(t) before the impulse,
+            # which is the end of the period before.
             changed = (block.normals @ block.jump).any(axis=1)
             held = np.flatnonzero(np.isfinite(block.offsets[t]) & changed)
             normals = block.normals[held]
