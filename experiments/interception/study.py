@@ -444,8 +444,10 @@ def redrawn_text(share: float | None) -> str:
 
 
 def wrong_images_text(results: Results, scenario: Scenario) -> str:
-    """Return in how many runs a wrong image is proved, and in how many it is named; an empty text
-    if the set allows for no wrong image.
+    """Return in how many runs a wrong image is proved; an empty text if the set allows for none.
+
+    If the set allows for one, the text also says in how many runs that image is named. If it allows
+    for more, a single suspected image need not be the only wrong one, and none is named.
     """
     if results.wrong_image_proved_s is None or results.wrong_image_s is None:
         return ""

@@ -147,7 +147,7 @@ def draw_control(report: MultipointReport) -> Figure:
 def _over_time(report: MultipointReport) -> tuple[Figure, list[Axes]]:
     """Return a figure of two panels over time, with visits and stays marked.
 
-    The visits are named above the first panel.
+    Up to `_MAX_NAMED` visits are named above the first panel.
     """
     unit, per_s = report.time_unit
     figure, grid = subplots(115.0, 2, 1, sharex=True)

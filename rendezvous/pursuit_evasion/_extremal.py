@@ -347,7 +347,9 @@ def end_of(state: Floats, nu: Floats) -> Floats:
 def rate(y: Floats, mu: float, oblateness: float, push: float) -> Floats:
     """Return the time derivative of position and velocity, shape (6,).
 
-    `y`, shape (12,), is a state and its costate, and `push` is the acceleration of the thrust.
+    `y`, shape (12,), is a state and, in its last three rows, the direction of the thrust, of any
+    length: p_v of an extremal, or the direction of a steered craft. Zero means no thrust. Rows 6 to
+    8 are not used. `push` is the acceleration of the thrust.
     """
     out = np.empty(6)
     gradient = np.empty((3, 3))

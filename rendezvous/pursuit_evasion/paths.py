@@ -65,6 +65,9 @@ class ExtremalPath:
     def state_at(self, time: float) -> tuple[Floats, Floats]:
         """Return state, shape (6,), and acceleration, shape (3,), at a time."""
         y = self.at(time)
+        if not y[9:].any():
+            # At the very end p_v is zero, and the thrust is along nu.
+            y[9:] = self.nu
         mass = self.craft.mass - self.craft.flow * time
         return y[:6], rate(y, self.craft.mu, self.craft.oblateness, self.craft.thrust / mass)[3:]
 

@@ -105,7 +105,8 @@ def block_optimum(block: StateBlock, *, relative: bool = False) -> BlockOptimum:
     """Return the minimum terminal norm of a block, and all controls that reach it.
 
     If `relative`, the norm is of states divided by their bounds; otherwise in the units of the
-    problem. `EmptyTubeError` is raised if no control satisfies the constraints.
+    problem. Constraints that no control satisfies are relaxed by at most 1e-9 of their size;
+    `EmptyTubeError` is raised if that is not enough (`admissible`).
 
     A cone program gives the terminal state, which is unique, and multipliers (see `min_norm`). A
     row with a positive multiplier is tight for every optimal control: with the terminal equations
@@ -127,7 +128,8 @@ def block_optimum(block: StateBlock, *, relative: bool = False) -> BlockOptimum:
 
     if lifted.ball:
         optimal = face.within(minimum.point, null_space_basis(face.equal))
-        # Rows that do not depend on z have no direction.
+        # Rows that depend on z only by rounding have no direction: for z of size 1, as controls are
+        # in units of their bounds, they change by at most `_KEPT`.
         optimal = optimal.only(np.flatnonzero(np.linalg.norm(optimal.rows, axis=1) > _KEPT))
         centre, _ = deep_point(optimal)
         return BlockOptimum(block, terminal, minimum.reached, optimal, centre)

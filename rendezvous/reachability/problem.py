@@ -292,6 +292,7 @@ class ReachabilityProblem:
         return self._part(start, self.periods, np.asarray(state, dtype=float))
 
     def _part(self, start: int, end: int, state: Floats) -> ReachabilityProblem:
+        """Return the problem from time `start` to time `end`, with a state at `start`."""
         return replace(
             self,
             transition=self.transition[start:end],

@@ -36,10 +36,11 @@ def animate(
     max_frames: int = 40,
     progress: Callable[[float], None] = lambda _done: None,
 ) -> bytes:
-    """Return a GIF animation of engagements, side by side, of eight seconds and 16 colours.
+    """Return a GIF animation of engagements, side by side, of about eight seconds and 16 colours.
 
-    Frames are evenly distributed over the steps, and take about 0.2 s of computing each. A frame is
-    425 pixels wide, or 320 for each of several planes: the file stays small enough for a web page.
+    Frames are evenly distributed over the time axis of the lower panels, which is logarithmic for
+    long flights, and take about 0.2 s of computing each. A frame is 425 pixels wide, or 320 for
+    each of several planes: the file stays small enough for a web page.
     """
     clock = Clock.of(records)
     chosen = _frame_times(records, clock, max_frames)
@@ -86,7 +87,8 @@ def animate(
         progress((index + 1) / len(chosen))
 
     content = BytesIO()
-    frame_ms = round(1000 * DURATION_S / len(frames))  # the unit of GIF
+    # A whole number of 10 ms, the unit of GIF.
+    frame_ms = 10 * round(100 * DURATION_S / len(frames))
     frames[0].save(
         content,
         "gif",

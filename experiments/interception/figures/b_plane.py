@@ -211,7 +211,10 @@ def _half_width(clouds: Sequence[Cloud], size_m: float | None, aim_m: float) -> 
 
 
 def _draw_cloud(axes: Axes, each: Cloud, half: float, body: Body | None) -> list[str]:
-    """Draw the points and lines of a panel, and return the lines of its title."""
+    """Draw the points and lines of a panel, and return the lines of its title.
+
+    The first one has the quantiles that the sample shows, and may be empty.
+    """
     count = len(each.miss_m)
     known = _draw_points(axes, each, aim_in_plane(body, each.t_rad))
     draw_body(axes, half, each.guaranteed_m, body, each.t_rad)

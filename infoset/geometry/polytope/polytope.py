@@ -264,8 +264,8 @@ class Polytope(PolytopeArrays, ConvexSet):
         """Return {matrix x + offset}.
 
         The matrix, singular or not, has the shape (m, n), and the offset (m,), or it is 0. Vertices
-        are rounded once. Under a regular matrix facets and incidence are mapped; otherwise it is a
-        hull, which may take long.
+        are rounded once. If the matrix is regular and the set is not flat, its facets and incidence
+        are mapped; otherwise the result is a hull, which may take long.
         """
         # Copies have the order of entries for which kernels are compiled.
         rows = finite_values("matrix", matrix, "m", self.space).copy()
