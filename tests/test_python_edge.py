@@ -145,6 +145,8 @@ def test_field_with_an_invalid_value_is_refused(sound: Any) -> None:
         elif isinstance(value, tuple):
             bad = [1.0, "ab", value[::-1]]
             bad += [ends for each in NO_NUMBERS for ends in ((each, value[1]), (value[0], each))]
+        elif isinstance(value, bool):
+            bad = [None, 0, 1.0, "true"]
         elif isinstance(value, int):
             bad = [None, *NO_COUNTS]
         elif isinstance(value, float):

@@ -82,9 +82,8 @@ def test_corrections_of_engine_and_budget_are_sums_of_their_impulses(brief: Scen
     box = replace(brief.dispersion, x_m=(595e3, 595e3), vx_m_s=(-58e3, -58e3))
     results = simulate(replace(brief, sun=None, thruster=thruster, dispersion=box), 1)
     arrival_s = 595.0 / 58.0
-    # The last impulse is at step 17, 1.76 s before the arrival, which is nearer to 2 s than step
-    # 16.
-    arms_s = [arrival_s - 0.5 * step for step in range(3, 18)]
+    # Flights have 21 steps of 0.4885 s. The last impulse is at step 17, 1.95 s before the arrival.
+    arms_s = [arrival_s * (1.0 - step / 21) for step in range(3, 18)]
     assert results.engine_corrects_m[0] == pytest.approx(1.1 * 7.5 * sum(arms_s))
     assert results.budget_corrects_m[0] == pytest.approx(
         1.1 * (7.5 * arms_s[0] + 7.5 * arms_s[1] + 5.0 * arms_s[2])

@@ -58,18 +58,19 @@ def offset(z_m: tuple[float, float], **engine: Any) -> Scenario:
 def test_bound_of_a_far_start_is_its_miss_less_all_impulses(
     engine: dict[str, Any], given: list[float]
 ) -> None:
-    """From z = 10 km the target ends at 10 km + nu T^2/2, and an impulse at 0.5 k s moves that by T
-    - 0.5 k times it.
+    """From z = 10 km the target ends at 10 km + nu T^2/2, and an impulse at the step k of D seconds
+    moves that by T - k D times it.
 
     The cosine is that of the velocity nu T and all impulses. Every strategy misses by that; two
     motions with the same measurements prove 90 m.
     """
     scenario = offset((8e3, 10e3), **engine)
     arrival_s = 5801.3 / 58.0
+    step_s = scenario.set_model.step_s
     impulses = np.array(given)
-    by_impulses = float(impulses @ (arrival_s - 0.5 * np.arange(len(impulses))))
+    by_impulses = float(impulses @ (arrival_s - step_s * np.arange(len(impulses))))
     # The bound counts the step of the arrival too.
-    across_m_s = 0.005 * 0.5 * 201 + min(scenario.thruster.budget_m_s, 0.5 * 201)
+    across_m_s = 0.005 * step_s * 201 + min(scenario.thruster.budget_m_s, 0.5 * 201)
     left_m = (10e3 + 0.5 * 0.005 * arrival_s**2 - by_impulses) * cosine(across_m_s)
     found = lower_bound(scenario)
     assert found.pair.is_single
