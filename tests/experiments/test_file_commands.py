@@ -140,6 +140,23 @@ def test_check_lists_few_of_many_differences(infoset: Command) -> None:
     assert "possible impulses: 6, from 440 s to 120 s before the nominal arrival" in out
 
 
+def test_check_says_how_wrong_impulses_would_be_in_place_of_burns(infoset: Command) -> None:
+    """1.7 m/s take 85 s, and 2 % more: 0.5 * 85 s * 1.7 m/s is 72.25 m. 180 s before the arrival
+    the error of an image is 5e-6 * 11.5 km/s * 180 s + 5 m = 15.35 m.
+    """
+    settings = (
+        *("step_s=90", "camera.period_s=90"),
+        *("thruster.max_impulse_m_s=1.7", "thruster.thrust_N=10", "thruster.mass_kg=500"),
+    )
+    options = [option for setting in settings for option in ("--set", setting)]
+    _, out, _ = infoset("scenarios", "check", "haiv-2013", *options)
+    (line,) = [line for line in out.splitlines() if line.startswith("burns: ")]
+    assert line == (
+        "burns: up to 86.7 s; as impulses they would be wrong by up to 72.25 m, 470.7 % of the "
+        "error of an image at the last one (below 2 %, thrust_N and mass_kg may be left out)"
+    )
+
+
 def test_check_of_a_nominal_arrival_that_is_far_too_late(infoset: Command) -> None:
     setting = "nominal_range_m=1e50"
     code, out, err = infoset("scenarios", "check", "dart-2022", "--set", setting)

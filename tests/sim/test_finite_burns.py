@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from dataclasses import replace
 from typing import Any
 
@@ -17,6 +18,7 @@ from infoset.sim.draws import draw
 from infoset.sim.engagement import Engagements
 from infoset.sim.kepler import KeplerMotion
 
+HAS_BENCHMARKS = importlib.util.find_spec("benchmarks") is not None
 THRUST: dict[str, Any] = {"thrust_N": 10.0, "mass_kg": 500.0}
 AU_M = 1.495978707e11
 SUN = Sun(1.32712440018e20, AU_M, 0.3)
@@ -117,6 +119,28 @@ def in_plane(**sensors: Any) -> Scenario:
 @pytest.mark.parametrize("sensors", [{}, {"range_sensor": None}])
 def test_burns_in_a_plane_keep_the_guarantee(noise: NoiseKind, sensors: dict[str, Any]) -> None:
     assert sound(simulate(replace(in_plane(**sensors), noise=noise), 6))
+
+
+@pytest.mark.skipif(not HAS_BENCHMARKS, reason="benchmarks are in a checkout only")
+@pytest.mark.parametrize(
+    ("first", "scenarios", "batch"),
+    [(0, 6, 16), pytest.param(10_000, 100, 80, marks=pytest.mark.thorough)],
+)
+@pytest.mark.parametrize(
+    "rate_sensor", [False, pytest.param(True, marks=pytest.mark.thorough)], ids=["angles", "rates"]
+)
+def test_random_scenarios_with_burns_keep_the_guarantee(
+    rate_sensor: bool, first: int, scenarios: int, batch: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every sensor, noise and tie rule; errors of the engine at their bounds in half of them."""
+    from benchmarks import soundness
+
+    monkeypatch.setattr(soundness, "BATCH", batch)
+    total = soundness.Count()
+    for number in range(first, first + scenarios):
+        total += soundness.fly_random_batch(number, rate_sensor, seed=3, burns=True)
+    assert total == soundness.Count(total.engagements, refused=total.refused)
+    assert total.engagements > total.refused
 
 
 def test_mirrored_flights_have_mirrored_burns(mission: Scenario) -> None:
