@@ -21,6 +21,6 @@ def test_acceleration_of_an_extremal_at_its_end_is_its_limit(solved: CaptureSolu
         _, limit = path.state_at(before)
 
         # The acceleration changes by about its size times the angle of the orbit in between.
-        np.testing.assert_allclose(at_end, limit, atol=1e-4 * np.linalg.norm(limit))
+        np.testing.assert_allclose(at_end, limit, atol=1e-4 * float(np.linalg.norm(limit)))
         thrust = path.craft.thrust / (path.craft.mass - path.craft.flow * path.duration)
         assert thrust > 1e-3 * np.linalg.norm(limit)
