@@ -49,7 +49,9 @@ class Reach(FileOptions):
             "--replan",
             help=(
                 "Also simulate in closed loop on the nonlinear model, with a new plan every "
-                "period; if the problem has navigation errors, also 10 times with them."
+                "period; if the problem has navigation errors, also 10 times with them. With "
+                "bounded errors: also simulate flights that are planned again after each "
+                "measurement, whose guarantee never increases."
             ),
         ),
     ] = False
@@ -70,8 +72,8 @@ class Reach(FileOptions):
             min=0,
             max=100_000,
             help=(
-                "Number of simulated flights of affine feedback, half of them with errors at their "
-                "bounds, for a problem with bounded errors. Default: 100."
+                "Number of simulated flights for a problem with bounded errors, half of them with "
+                "errors at their bounds. Default: 100 of affine feedback, and 10 of --replan."
             ),
         ),
     ] = None

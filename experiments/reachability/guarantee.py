@@ -6,6 +6,7 @@ import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,39 +16,48 @@ from infoset.experiments.common.screen import BeginProgress
 from infoset.experiments.common.units import Unit
 from infoset.experiments.reachability.command import Reach
 from infoset.experiments.reachability.file import Rendezvous
+from infoset.experiments.reachability.guarantee_flights import affine_flights, replanned_flights
 from infoset.rendezvous.reachability import (
     IMPULSE,
+    Acceptance,
     AffinePlan,
     DriftCertificate,
     LateConstraintError,
+    NonlinearPlan,
     NormFaces,
     NoRobustPlanError,
     OutputProblem,
     PassiveSafety,
     PlanFlights,
+    ProblemPart,
+    ReplannedFlights,
+    ReplannedPart,
+    ReplannedPlan,
     ThrustShape,
     UnboundedCoastError,
     acting_controls,
     affine_plan,
     answers_within,
     drift_certificate,
-    fly_plan,
     independent_parts,
     information_radius,
+    keeps_distances,
+    keeps_drifts,
+    keeps_limits,
     lower_bound,
     nonlinear_plan,
     norm_faces,
+    part_of_plan,
     plan_of_parts,
     plan_within,
     safe_plan,
     sighted_plan,
+    whole_problem,
 )
 
 WINDOW = 4
 """Number of the last measurements that a control reacts to. In the table of
 `docs/guaranteed-rendezvous.md` more give no smaller guarantee."""
-FLIGHTS = 100
-"""Number of simulated flights without the option --flights."""
 _LAST_LIMIT = 2.0
 """Limit of the last control, as a multiple of its largest value in the affine plan, if constraints
 after it do not follow from its own limit. Chosen: an answer is about as large as the affine
@@ -63,7 +73,8 @@ class GuaranteeReport:
     `open_loop` is the best plan without measurements, None if no such plan keeps the constraints.
     `answered`, `bound` and `radius` are None without measured positions and for nonlinear motion;
     `answered` is also None if `refusal` says why there is none. `drifts` are the certain distances
-    if the engines fail, None if the problem does not ask for them.
+    if the engines fail, None if the problem does not ask for them, and `replanned` are flights that
+    are planned again, None without --replan.
     """
 
     rendezvous: Rendezvous
@@ -75,6 +86,7 @@ class GuaranteeReport:
     radius: float | None
     flights: PlanFlights
     drifts: DriftCertificate | None = None
+    replanned: ReplannedFlights | None = None
 
     @cached_property
     def by_measurements(self) -> Floats:
@@ -157,7 +169,7 @@ def solve_guarantee(
     rendezvous: Rendezvous, options: Reach, begin: BeginProgress
 ) -> GuaranteeReport:
     """Return the certified plans, the bounds of all strategies, and the simulated flights."""
-    _check_options(options)
+    _check_options(rendezvous, options)
     progress = begin(rendezvous.name)
     problem = rendezvous.output_problem
     open_loop = None
@@ -184,30 +196,47 @@ def solve_guarantee(
             bound = max((lower_bound(part).value for part in parts), default=0.0)
             radius = max((information_radius(part).value for part in parts), default=0.0)
     progress(0.6)
-    plan, drifts = _checked_plan(rendezvous, plan, progress)
+    checked = _checked_plan(rendezvous, plan, progress)
     progress(0.9)
-    count = FLIGHTS if options.flights is None else options.flights
-    flown = rendezvous.problem
-    if rendezvous.path_limits is not None:
-        flown = replace(flown, between=rendezvous.instants)
-    flights = fly_plan(flown, plan, rendezvous.errors, count, options.seed)
+    flights = affine_flights(rendezvous, checked.plan, options)
     progress(1.0)
+    replanned = None
+    if options.replan:
+        before = _plan_in_flight(rendezvous, checked)
+        replanned = replanned_flights(rendezvous, before, options, begin("flights"))
     return GuaranteeReport(
-        rendezvous, plan, open_loop, answered, refusal, bound, radius, flights, drifts
+        rendezvous,
+        checked.plan,
+        open_loop,
+        answered,
+        refusal,
+        bound,
+        radius,
+        flights,
+        checked.drifts,
+        replanned,
     )
+
+
+class CheckedPlan(NamedTuple):
+    """A plan, with what it proves beyond its problem: drifts, and distances of nonlinear motion."""
+
+    plan: AffinePlan
+    drifts: DriftCertificate | None = None
+    nonlinear: NonlinearPlan | None = None
 
 
 def _checked_plan(
     rendezvous: Rendezvous, plan: AffinePlan, progress: Callable[[float], None]
-) -> tuple[AffinePlan, DriftCertificate | None]:
+) -> CheckedPlan:
     """Return a plan whose drifts are safe and whose guarantee holds for nonlinear motion, as the
-    problem asks, and the distances of its drifts; `plan` if it asks for neither.
+    problem asks; `plan` if it asks for neither.
 
     Raise `InputError` if none was found.
     """
     safety = rendezvous.passive_safety
     if safety is None and not rendezvous.nonlinear:
-        return plan, None
+        return CheckedPlan(plan)
     drifts = rendezvous.drifts
     programs = itertools.count(1)
 
@@ -231,27 +260,75 @@ def _checked_plan(
     if rendezvous.sight is None:
         # With the constraints that the plan needed already.
         problem = replace(plan.problem, caps=None)
+    found = None
     try:
         if rendezvous.nonlinear:
-            checked = nonlinear_plan(problem, drifts, solve).plan
+            found = nonlinear_plan(problem, drifts, solve)
+            checked = found.plan
         else:
             checked = solve(problem)
     except (NoRobustPlanError, UnboundedCoastError) as error:
         raise InputError(f"{rendezvous.name}: {error}") from None
     if safety is None:
-        return checked, None
-    return checked, drift_certificate(checked, drifts)
+        return CheckedPlan(checked, None, found)
+    return CheckedPlan(checked, drift_certificate(checked, drifts), found)
 
 
-def _check_options(options: Reach) -> None:
-    given = {
-        "--select": options.select is not None,
-        "--replan": options.replan,
-        "--backward": options.backward,
-    }
-    for option, is_given in given.items():
-        if is_given:
+def _plan_in_flight(rendezvous: Rendezvous, checked: CheckedPlan) -> ReplannedPlan:
+    """Return the plan before flights that are planned again, and what each new plan must prove."""
+    plan = checked.plan
+    parts = [
+        ReplannedPart(part, part_of_plan(part, plan), _acceptance(rendezvous, checked, part))
+        for part in _parts_in_flight(rendezvous, plan.problem)
+    ]
+    return ReplannedPlan(plan, parts, WINDOW)
+
+
+def _parts_in_flight(rendezvous: Rendezvous, problem: OutputProblem) -> tuple[ProblemPart, ...]:
+    """Return the parts of a problem that can be planned again apart.
+
+    Drifts, distances of nonlinear motion and lines of sight depend on all states, as constraints
+    between impulses may: the problem is then one part.
+    """
+    whole = (whole_problem(problem),)
+    if rendezvous.nonlinear or rendezvous.sight or rendezvous.passive_safety:
+        return whole
+    parts = independent_parts(problem)
+    limits = rendezvous.path_limits
+    if limits is None:
+        return parts
+    acting = [limits.normals[:, part.states].any(axis=1) for part in parts]
+    are_apart = (np.sum(acting, axis=0) <= 1).all()
+    return parts if are_apart else whole
+
+
+def _acceptance(
+    rendezvous: Rendezvous, checked: CheckedPlan, part: ProblemPart
+) -> Acceptance | None:
+    """Return what each new plan of a part must prove beyond the constraints of its program."""
+    safety = rendezvous.passive_safety
+    conditions = list[Acceptance]()
+    if rendezvous.path_limits is not None:
+        conditions.append(keeps_limits(rendezvous.path_limits, part))
+    if checked.drifts is not None and safety is not None:
+        conditions.append(keeps_drifts(checked.drifts, safety.keep_out_m))
+    if checked.nonlinear is not None:
+        conditions.append(keeps_distances(checked.nonlinear, rendezvous.drifts))
+    if not conditions:
+        return None
+
+    def accepts(plan: AffinePlan, time: int) -> bool:
+        return all(condition(plan, time) for condition in conditions)
+
+    return accepts
+
+
+def _check_options(rendezvous: Rendezvous, options: Reach) -> None:
+    for option, given in (("--select", options.select), ("--backward", options.backward)):
+        if given:
             raise InputError(f"{option}: is for problems without [sensor] and [initial_error]")
+    if options.replan and rendezvous.sensor is None:
+        raise InputError("--replan: needs [sensor]; without measurements the plan stays the same")
 
 
 def first_measurements(problem: OutputProblem, count: int) -> OutputProblem:
@@ -424,3 +501,26 @@ def _further_lines(report: GuaranteeReport) -> Iterator[str]:
         f"{report.drifts.least_distance:.4g} m from the target for {safety.drift_periods} periods "
         f"(keep-out {safety.keep_out_m:g} m)"
     )
+
+
+def flight_lines(report: GuaranteeReport) -> Iterator[str]:
+    """Yield the numbers of flights outside their guarantee, and how near it they came."""
+    motion = " about a central body" if report.rendezvous.nonlinear else ""
+    bounds = "half of them with errors at their bounds"
+    flights = report.flights
+    if len(flights.distances):
+        share = flights.distances.max() / report.plan.guarantee if report.plan.guarantee else 0.0
+        yield (
+            f"{len(flights.distances)} flights of affine feedback{motion}, {bounds}: "
+            f"{flights.outside} outside, worst {100.0 * share:.0f} % of the guarantee"
+        )
+    replanned = report.replanned
+    if replanned is not None and len(replanned.distances):
+        unit, factor = report.unit
+        last = factor * replanned.guarantees[:, -1]
+        noun = "impulse" if report.rendezvous.has_impulses else "control"
+        yield (
+            f"{len(last)} flights re-planned in flight{motion}, {bounds}: {replanned.outside} "
+            f"outside, guarantee at the last {noun}: median {np.median(last):.4g}, most "
+            f"{last.max():.4g} {unit}"
+        )

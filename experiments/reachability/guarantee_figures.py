@@ -54,14 +54,17 @@ def draw_all(report: GuaranteeReport) -> Iterator[Figure]:
 def draw_guarantee(report: GuaranteeReport) -> Figure:
     """Draw the guarantee by the number of measurements, and the tube of the position by time.
 
-    Without a sensor there is only the tube.
+    Without a sensor there is only the tube. Flights that are planned again have a panel.
     """
-    has_sensor = report.bound is not None
-    figure, (row,) = subplots(80.0, 1, 2 if has_sensor else 1)
+    drawn = [_draw_widths]
+    if report.bound is not None:
+        drawn.insert(0, _draw_by_measurements)
+    if report.replanned is not None and len(report.replanned.distances):
+        drawn.append(_draw_in_flight)
+    figure, (row,) = subplots(80.0, 1, len(drawn))
     panels = [*row]
-    if has_sensor:
-        _draw_by_measurements(panels[0], report)
-    _draw_widths(panels[-1], report)
+    for draw, axes in zip(drawn, panels, strict=True):
+        draw(axes, report)
     letters(panels)
     legend_below(figure, 3)
     return figure
@@ -69,13 +72,7 @@ def draw_guarantee(report: GuaranteeReport) -> Figure:
 
 def _draw_by_measurements(axes: Axes, report: GuaranteeReport) -> None:
     unit, factor = report.unit
-    looks: list[tuple[str, float | None, dict[str, Any]]] = [
-        ("last control re-planned", report.answered, {"color": GAME, "linewidth": 1.2}),
-        ("no strategy guarantees less", report.bound, {**BOUND, "color": INK}),
-    ]
-    for name, value, look in looks:
-        if value is not None:
-            axes.axhline(factor * value, label=name, **look)
+    _draw_before_flight(axes, report)
     line: dict[str, Any] = {"color": TRUTH, "marker": "o", "markersize": 3.5, "linewidth": 1.2}
     axes.plot(factor * report.by_measurements, label="affine feedback", **line)
     axes.set_yscale("log")
@@ -83,6 +80,36 @@ def _draw_by_measurements(axes: Axes, report: GuaranteeReport) -> None:
     axes.xaxis.set_major_locator(MaxNLocator(8, integer=True))
     axes.set_xlabel("measurements before the sensor fails")
     axes.set_ylabel(f"certified distance at the end, {unit}")
+
+
+def _draw_before_flight(axes: Axes, report: GuaranteeReport) -> None:
+    """Draw the guarantee with an answer, and the bound of all strategies, as horizontal lines."""
+    factor = report.unit[1]
+    looks: list[tuple[str, float | None, dict[str, Any]]] = [
+        ("last control re-planned", report.answered, {"color": GAME, "linewidth": 1.2}),
+        ("no strategy guarantees less", report.bound, {**BOUND, "color": INK}),
+    ]
+    for name, value, look in looks:
+        if value is not None:
+            axes.axhline(factor * value, label=name, **look)
+
+
+def _draw_in_flight(axes: Axes, report: GuaranteeReport) -> None:
+    """Draw the guarantees in flight, after each measurement: the median and all flights."""
+    assert report.replanned is not None
+    unit, factor = report.unit
+    guarantees = factor * report.replanned.guarantees
+    measurements = np.arange(guarantees.shape[1])
+    _draw_before_flight(axes, report)
+    lowest = guarantees.min(axis=0)
+    highest = guarantees.max(axis=0)
+    axes.fill_between(measurements, lowest, highest, label="all flights", **SET)
+    line: dict[str, Any] = {"color": TRUTH, "marker": "o", "markersize": 3.5, "linewidth": 1.2}
+    median = np.median(guarantees, axis=0)
+    axes.plot(measurements, median, label="median of the flights", **line)
+    axes.xaxis.set_major_locator(MaxNLocator(8, integer=True))
+    axes.set_xlabel("measurements in flight")
+    axes.set_ylabel(f"guarantee in flight, {unit}")
 
 
 def _draw_widths(axes: Axes, report: GuaranteeReport) -> None:

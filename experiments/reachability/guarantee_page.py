@@ -16,7 +16,11 @@ from infoset.experiments.common.page_motion import (
     outline,
 )
 from infoset.experiments.common.units import Unit, length_unit
-from infoset.experiments.reachability.guarantee import GuaranteeReport, guarantee_lines
+from infoset.experiments.reachability.guarantee import (
+    GuaranteeReport,
+    flight_lines,
+    guarantee_lines,
+)
 
 _PLANES = {"radial": (1, 0), "normal": (1, 2)}
 """Axes of the two views, along the motion and across it."""
@@ -28,7 +32,7 @@ def guarantee_page(report: GuaranteeReport) -> str:
     """Return the page of a rendezvous with bounded errors as HTML."""
     rendezvous = report.rendezvous
     about = [rendezvous.description] if rendezvous.description else []
-    about += [f"axes: {AXES}", *guarantee_lines(report)]
+    about += [f"axes: {AXES}", *guarantee_lines(report), *flight_lines(report)]
     return motion_page(
         f"Guaranteed rendezvous {rendezvous.name}",
         about,

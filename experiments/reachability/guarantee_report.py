@@ -16,6 +16,7 @@ from infoset.experiments.reachability.guarantee import (
     WINDOW,
     GuaranteeReport,
     constraint_times,
+    flight_lines,
     guarantee_lines,
     solve_guarantee,
 )
@@ -68,6 +69,20 @@ def report_json(report: GuaranteeReport) -> dict[str, object]:
             "outside": report.flights.outside,
             "largest": in_unit(float(report.flights.distances.max(initial=0.0))),
         },
+        "replanned": _replanned_json(report),
+    }
+
+
+def _replanned_json(report: GuaranteeReport) -> dict[str, object] | None:
+    flights = report.replanned
+    if flights is None:
+        return None
+    factor = report.unit[1]
+    return {
+        "number": len(flights.distances),
+        "outside": flights.outside,
+        "guarantees": factor * flights.guarantees,
+        "distances": factor * flights.distances,
     }
 
 
@@ -137,13 +152,8 @@ def report_lines(report: GuaranteeReport) -> Iterator[Part]:
     yield f"{rendezvous.name}: guaranteed rendezvous, {rendezvous.periods} {noun}, errors bounded"
     yield from ("", *guarantee_lines(report))
     yield from ("", _component_table(report))
-    flights = report.flights
-    if len(flights.distances):
-        share = flights.distances.max() / report.plan.guarantee if report.plan.guarantee else 0.0
-        yield (
-            f"\n{len(flights.distances)} flights of affine feedback, half of them with errors at "
-            f"their bounds: {flights.outside} outside, worst {100.0 * share:.0f} % of the guarantee"
-        )
+    yield ""
+    yield from flight_lines(report)
     yield f"axes: {AXES}"
 
 

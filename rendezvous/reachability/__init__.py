@@ -4,6 +4,11 @@ A problem is built from a motion. Its solution contains the sets of states and t
 controls. Controls are selected from this set and simulated.
 """
 
+from infoset.rendezvous.reachability.acceptance import (
+    keeps_distances,
+    keeps_drifts,
+    keeps_limits,
+)
 from infoset.rendezvous.reachability.answer import (
     AnsweredPlan,
     LateConstraintError,
@@ -15,12 +20,7 @@ from infoset.rendezvous.reachability.answer import (
     multipliers,
 )
 from infoset.rendezvous.reachability.backward import backward_bounds
-from infoset.rendezvous.reachability.bounded_errors import (
-    ErrorBounds,
-    PlanFlights,
-    fly_plan,
-    with_errors,
-)
+from infoset.rendezvous.reachability.bounded_errors import ErrorBounds, with_errors
 from infoset.rendezvous.reachability.closed_loop import ClosedLoopFlight, replan
 from infoset.rendezvous.reachability.coasting import Coasting, CoastTube, UnboundedCoastError
 from infoset.rendezvous.reachability.drift import (
@@ -31,6 +31,7 @@ from infoset.rendezvous.reachability.drift import (
 )
 from infoset.rendezvous.reachability.guaranteed import affine_plan
 from infoset.rendezvous.reachability.guided import (
+    Acceptance,
     Cuts,
     GuidedCraft,
     GuidedFlight,
@@ -41,7 +42,9 @@ from infoset.rendezvous.reachability.guided import (
 from infoset.rendezvous.reachability.independent_parts import (
     ProblemPart,
     independent_parts,
+    part_of_plan,
     plan_of_parts,
+    whole_problem,
 )
 from infoset.rendezvous.reachability.line_of_sight import (
     SightSensor,
@@ -71,6 +74,16 @@ from infoset.rendezvous.reachability.outputs import (
     OutputProblem,
     PathRows,
     Ranges,
+)
+from infoset.rendezvous.reachability.plan_flights import (
+    Move,
+    PlanFlights,
+    ReplannedFlights,
+    ReplannedPart,
+    ReplannedPlan,
+    fly_plan,
+    fly_replanned,
+    linear_motion,
 )
 from infoset.rendezvous.reachability.problem import (
     MAX_PERIODS,
@@ -122,6 +135,7 @@ from infoset.rendezvous.reachability.within_periods import (
 __all__ = [
     "IMPULSE",
     "MAX_PERIODS",
+    "Acceptance",
     "AffinePlan",
     "AnsweredPlan",
     "ClosedLoopFlight",
@@ -141,6 +155,7 @@ __all__ = [
     "LinearTruth",
     "MirrorBound",
     "MotionModel",
+    "Move",
     "Multipliers",
     "NoRobustPlanError",
     "NonlinearMotion",
@@ -156,6 +171,9 @@ __all__ = [
     "Ranges",
     "ReachabilityProblem",
     "ReachableSets",
+    "ReplannedFlights",
+    "ReplannedPart",
+    "ReplannedPlan",
     "Route",
     "SetKind",
     "SightSensor",
@@ -181,10 +199,15 @@ __all__ = [
     "effort",
     "feedback_plan",
     "fly_plan",
+    "fly_replanned",
     "guided_flight",
     "impulsive",
     "independent_parts",
     "information_radius",
+    "keeps_distances",
+    "keeps_drifts",
+    "keeps_limits",
+    "linear_motion",
     "lower_bound",
     "min_periods",
     "minimum_delta_v",
@@ -198,6 +221,7 @@ __all__ = [
     "nonlinear_plan",
     "norm_faces",
     "optimal_controls",
+    "part_of_plan",
     "plan_of_parts",
     "plan_within",
     "replan",
@@ -207,6 +231,7 @@ __all__ = [
     "solve",
     "tightened",
     "vertices",
+    "whole_problem",
     "with_acceleration",
     "with_errors",
 ]

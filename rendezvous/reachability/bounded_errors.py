@@ -1,17 +1,16 @@
-"""A rendezvous with bounded errors: its problem of `docs/guaranteed-rendezvous.md`, and flights."""
+"""A rendezvous with bounded errors: its problem of `docs/guaranteed-rendezvous.md`."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from infoset.geometry.zonotope import Zonotope
-from infoset.rendezvous._arrays import Flags, Floats
+from infoset.rendezvous._arrays import Floats
 from infoset.rendezvous.reachability.line_of_sight import SightSensor
 from infoset.rendezvous.reachability.norm_limit import with_norm_limit
-from infoset.rendezvous.reachability.outputs import AffinePlan, OutputProblem, PathRows
+from infoset.rendezvous.reachability.outputs import OutputProblem, PathRows
 from infoset.rendezvous.reachability.problem import ReachabilityProblem, ThrustShape
 
 
@@ -53,16 +52,20 @@ def with_errors(
     Thrust in a ball is limited by the faces of a polytope inside it (`norm_faces`).
     """
     periods = problem.periods
-    measured = len(errors.measured)
-    has_noise = errors.measured > 0.0
+    output = np.eye(len(errors.measured), problem.states)
+    noise = np.diag(errors.measured)[:, errors.measured > 0.0]
+    if errors.sight is not None:
+        # An affine plan has outputs along its own lines of sight, or one that is zero.
+        output = np.zeros((1, problem.states))
+        noise = np.zeros((1, 0))
     is_goal = np.isfinite(box)
     largest = errors.execution + errors.relative * problem.control_bounds
     start = np.diag(errors.start)
     whole = OutputProblem(
         problem.transition,
         problem.control,
-        np.repeat(np.eye(measured, problem.states)[None], periods, axis=0),
-        np.repeat(np.diag(errors.measured)[:, has_noise][None], periods, axis=0),
+        np.repeat(output[None], periods, axis=0),
+        np.repeat(noise[None], periods, axis=0),
         Zonotope(problem.initial, start[errors.start > 0.0]),
         np.diag(1.0 / box)[is_goal],
         target,
@@ -125,101 +128,3 @@ def _control_rows(problem: ReachabilityProblem, time: int) -> PathRows:
         np.full(count, -np.inf),
         offsets[time],
     )
-
-
-class PlanFlights(NamedTuple):
-    """Simulated flights of an affine plan.
-
-    `distances`, shape (N,), are |x(T) - target| in the norm of the goal. `outside` is the number of
-    flights that exceed the guarantee or break a constraint by more than rounding.
-    """
-
-    distances: Floats
-    outside: int
-
-
-_ROUNDING = 1e-9
-"""Part of a guarantee and of the end of a constraint up to which flights may exceed them: states of
-a flight are sums of terms that are up to 1e5 times their result, each rounded to 1e-16."""
-
-
-def fly_plan(
-    problem: ReachabilityProblem, plan: AffinePlan, errors: ErrorBounds, flights: int, seed: int
-) -> PlanFlights:
-    """Simulate flights: in one half errors are uniform, in the other half at their bounds.
-
-    The loop uses the matrices of the motion and the measurements only; directions and ranges are
-    those of the true positions, without linearisation. Errors proportional to a
-    control are those of the control that is commanded.
-    """
-    generator = np.random.default_rng(seed)
-    extreme = np.arange(flights) % 2 == 1
-
-    def drawn(bounds: Floats) -> Floats:
-        values = generator.uniform(-1.0, 1.0, (flights, len(bounds)))
-        values[extreme] = np.sign(values[extreme])
-        return np.asarray(values * bounds)
-
-    def measured(output: Floats, states: Floats) -> Floats:
-        """Return the outputs with errors, shape (N, q), for the matrix of the outputs."""
-        if errors.sight is None or not len(output):
-            return np.asarray(states @ output.T + drawn(errors.measured))
-        size = len(output)
-        directions, ranges = errors.sight.simulated(states[:, :size], generator, extreme)
-        return np.asarray((ranges[:, None] * directions) @ output[:, :size].T)
-
-    states = problem.initial + drawn(errors.start)
-    predicted = np.tile(problem.initial, (flights, 1))
-    shown = np.zeros((problem.periods, flights, plan.problem.output.shape[1]))
-    broken = np.zeros(flights, dtype=bool)
-    for t in range(problem.periods):
-        output = plan.problem.output[t]
-        shown[t] = measured(output, states) - predicted @ output.T
-        control = plan.nominal[t] + np.einsum("sjq,sfq->fj", plan.gains[t], shown)
-        acting = control + drawn(np.ones(problem.controls)) * (
-            errors.execution + errors.relative * np.abs(control)
-        )
-        broken |= _breaks(problem, t, states, control, acting)
-        predicted = predicted @ problem.transition[t].T + control @ problem.control[t].T
-        states = states @ problem.transition[t].T + acting @ problem.control[t].T
-        if errors.disturbance is not None:
-            pushes = drawn(np.ones(errors.disturbance.shape[2]))
-            states = states + pushes @ errors.disturbance[t].T
-    broken |= _exceeds(problem, problem.periods, states)
-
-    goal = plan.problem.goal
-    distances = np.abs((states - plan.problem.aim) @ goal.T).max(axis=1)
-    broken |= distances > plan.guarantee * (1.0 + _ROUNDING)
-    return PlanFlights(distances, int(broken.sum()))
-
-
-def _breaks(
-    problem: ReachabilityProblem, time: int, states: Floats, control: Floats, acting: Floats
-) -> Flags:
-    """Return which flights, (N,), break a constraint before, at or after a control.
-
-    `acting`, shape (N, m), is the `control` with its error.
-    """
-    normals, offsets = problem.limits
-    slack = _ROUNDING * (np.abs(normals) @ problem.control_bounds)
-    broken = (np.abs(control) > problem.control_bounds * (1.0 + _ROUNDING)).any(axis=1)
-    broken |= (control @ normals.T > offsets[time] + slack).any(axis=1)
-    if problem.thrust is ThrustShape.BALL:
-        norms = np.linalg.norm(control, axis=1)
-        broken |= norms > problem.control_bounds[0] * (1.0 + _ROUNDING)
-    broken |= _exceeds(problem, time, states)
-    if problem.jump is not None:
-        broken |= _exceeds(problem, time, states + acting @ problem.jump.T)
-    if problem.between is not None:
-        both = np.hstack([states, acting])
-        for matrix in problem.between[time]:
-            broken |= _exceeds(problem, time, both @ matrix.T)
-    return np.asarray(broken)
-
-
-def _exceeds(problem: ReachabilityProblem, time: int, states: Floats) -> Flags:
-    """Return which states, (N,), break a constraint of a time."""
-    normals, offsets = problem.further
-    slack = _ROUNDING * (np.abs(normals) @ problem.state_bounds)
-    beyond = (np.abs(states) > problem.state_bounds * (1.0 + _ROUNDING)).any(axis=1)
-    return np.asarray(beyond | (states @ normals.T > offsets[time] + slack).any(axis=1))

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous.reachability.independent_parts import ProblemPart
 from infoset.rendezvous.reachability.motion import IMPULSE
 from infoset.rendezvous.reachability.outputs import AffinePlan, ErrorSet
 from infoset.rendezvous.relative_motion import EllipticOrbit, TschaunerHempel
@@ -129,8 +130,11 @@ class Coasting:
         np.divide(3.0 * gravity * radii**2, depth**4, out=bounds, where=depth > 0.0)
         return bounds
 
-    def tube(self, plan: AffinePlan) -> CoastTube:
+    def tube(self, plan: AffinePlan, part: ProblemPart | None = None) -> CoastTube:
         """Return the certain bounds of all coasts under a `plan`, with its errors.
+
+        The plan may be that of an independent `part`; the other states are then zero. The
+        equations of the plane of the orbit and of its normal are apart, also in all bounds.
 
         Raises
         ------
@@ -140,7 +144,7 @@ class Coasting:
             If nonlinear motion is not proved to stay within any distance.
         """
         known = np.full(self.starts_s.shape, self.acceleration_m_s2)
-        tube = self.tube_under(plan, known)
+        tube = self.tube_under(plan, known, part)
         if self.semi_major_axis_m is None:
             return tube
 
@@ -149,7 +153,7 @@ class Coasting:
             accelerations = known + self.remainder(assumed)
             if not np.isfinite(accelerations).all():
                 break
-            tube = self.tube_under(plan, accelerations)
+            tube = self.tube_under(plan, accelerations, part)
             # A bound that is smaller than the assumed one excludes a first exit.
             if (tube.radii < assumed).all():
                 return tube
@@ -159,13 +163,21 @@ class Coasting:
             "errors or the number of periods without control"
         )
 
-    def tube_under(self, plan: AffinePlan, accelerations: Floats) -> CoastTube:
-        """Return the bounds of all coasts with accelerations of at most these, shape (K, N)."""
+    def tube_under(
+        self, plan: AffinePlan, accelerations: Floats, part: ProblemPart | None = None
+    ) -> CoastTube:
+        """Return the bounds of all coasts with accelerations of at most these, shape (K, N).
+
+        The `part` is that of `tube`.
+        """
         problem = plan.problem
         count = self.impulses
-        middles = plan.nominal_states[:count] + plan.nominal[:count] @ IMPULSE.T
-        known = plan.state_columns[:count] + IMPULSE @ plan.control_columns[:count]
-        execution = IMPULSE * problem.execution[:count, None, :]
+        to_states = np.eye(6) if part is None else np.eye(6)[:, part.states]
+        to_controls = np.eye(3) if part is None else np.eye(3)[:, part.controls]
+        impulse = IMPULSE @ to_controls
+        middles = plan.nominal_states[:count] @ to_states.T + plan.nominal[:count] @ impulse.T
+        known = to_states @ plan.state_columns[:count] + impulse @ plan.control_columns[:count]
+        execution = IMPULSE * (problem.execution[:count] @ to_controls.T)[:, None, :]
         columns = np.concatenate([known, execution], axis=2)
 
         integrals = np.zeros((count, 1))
@@ -179,7 +191,7 @@ class Coasting:
             integrals = np.concatenate([integrals, total[:, None]], axis=1)
         return CoastTube(
             self,
-            problem.errors._replace(size=problem.errors.size + problem.controls),
+            problem.errors._replace(size=problem.errors.size + 3),
             np.einsum("kinm,km->kin", self.transitions, middles),
             self.transitions @ columns[:, None],
             integrals[..., None, None] * shapes,

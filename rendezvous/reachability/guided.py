@@ -31,6 +31,9 @@ the exact ones by 1e-7 of their widths, or less."""
 _ROUNDING = 1e-12
 """Relative increase of caps above the certified controls: more than a certificate is rounded."""
 
+Acceptance = Callable[[AffinePlan, int], bool]
+"""Whether a plan of the rest, from a period on, keeps what is not a constraint of its problem."""
+
 
 class Cuts(NamedTuple):
     """Strips lower <= normals . x <= upper that contain the state, known only in flight.
@@ -201,6 +204,10 @@ class GuidedCraft:
     max_facets : int or None, optional
         Maximum number of facets of the set of up to four states, as in `LinearObserver`. None is
         no maximum; it is not used with an answered plan.
+    accepts : callable or None, optional
+        A plan of the rest is adopted only if this returns true for it and its first period:
+        `keeps_drifts`, `keeps_distances` and `keeps_limits`. The plan before the flight must
+        have been accepted.
 
     Notes
     -----
@@ -212,6 +219,8 @@ class GuidedCraft:
 
     Raises
     ------
+    ValueError
+        If `accepts` is given with an answered plan, whose last control must be adopted.
     ArithmeticError
         In `control`, if a set that is not reduced has more than 5000 vertices.
     """
@@ -222,8 +231,12 @@ class GuidedCraft:
         *,
         window: int | None = None,
         max_facets: int | None = MAX_FACETS,
+        accepts: Acceptance | None = None,
     ) -> None:
         self._needs_answer = isinstance(plan, AnsweredPlan)
+        self._accepts = accepts
+        if self._needs_answer and accepts is not None:
+            raise ValueError("accepts: an answered plan adopts its last control in any case")
         if isinstance(plan, AnsweredPlan):
             self.guarantee = (1.0 + _ANSWER_RESERVE) * plan.guarantee
             self._plan = plan.plan
@@ -265,12 +278,17 @@ class GuidedCraft:
         except (NoRobustPlanError, NoSolutionError):
             return
         # Without an answer, the last control of an answered plan does not exist.
-        if plan.guarantee < self.guarantee or (is_answer and self._needs_answer):
-            self._plan = _with_smaller_caps(plan)
-            self._first = self.time
-            self.planned_at = self.time
-            self.guarantee = self._plan.guarantee
-            self._needs_answer = False
+        is_better = plan.guarantee < self.guarantee or (is_answer and self._needs_answer)
+        if not is_better:
+            return
+        better = _with_smaller_caps(plan)
+        if self._accepts is not None and not self._accepts(better, self.time):
+            return
+        self._plan = better
+        self._first = self.time
+        self.planned_at = self.time
+        self.guarantee = better.guarantee
+        self._needs_answer = False
 
     def control(self) -> Floats:
         """Return the control u(t), shape (m,), after the output; the next period begins."""

@@ -37,9 +37,7 @@ def independent_parts(problem: OutputProblem) -> tuple[ProblemPart, ...]:
     whose start is a polytope is one part.
     """
     if not isinstance(problem.start, Zonotope):
-        outputs = np.arange(problem.output.shape[1])
-        states = np.arange(problem.states)
-        return (ProblemPart(problem, states, np.arange(problem.controls), outputs),)
+        return (whole_problem(problem),)
 
     # A graph of states, controls and outputs: those that act together in a row or in an error.
     n = problem.states
@@ -60,6 +58,13 @@ def independent_parts(problem: OutputProblem) -> tuple[ProblemPart, ...]:
         if not _rests(part):
             parts.append(ProblemPart(part, states, controls, outputs))
     return tuple(parts)
+
+
+def whole_problem(problem: OutputProblem) -> ProblemPart:
+    """Return a problem as its only part."""
+    outputs = np.arange(problem.output.shape[1])
+    states = np.arange(problem.states)
+    return ProblemPart(problem, states, np.arange(problem.controls), outputs)
 
 
 def _groups(problem: OutputProblem) -> Flags:
@@ -153,3 +158,9 @@ def plan_of_parts(
         if caps is not None and plan.problem.caps is not None:
             caps[:, part.controls] = plan.problem.caps
     return AffinePlan(replace(problem, caps=caps), nominal, gains)
+
+
+def part_of_plan(part: ProblemPart, plan: AffinePlan) -> AffinePlan:
+    """Return the plan of an independent part of the problem of a plan by `plan_of_parts`."""
+    gains = plan.gains[:, :, part.controls[:, None], part.outputs]
+    return AffinePlan(part.problem, plan.nominal[:, part.controls], gains)

@@ -72,17 +72,17 @@ class SightSensor:
         bounds[:, 1:] = (self.range_error * sine + by_angle)[:, None]
         return bounds
 
-    def cuts(self, direction: Floats, distance: float | None, states: int) -> Cuts:
+    def cuts(self, direction: Floats, distance: float, states: int) -> Cuts:
         """Return half-spaces of the states that agree with a measured direction and range.
 
         `direction` is a unit vector of two or three components, and `distance` the measured range,
-        in units of the position; None if there is none.
+        in units of the position, which is not used without a range sensor.
         """
         tangents = _tangents(direction)
         rows = tangents - np.tan(self.angle_error_rad) * direction
         lower = np.full(len(rows), -np.inf)
         upper = np.zeros(len(rows))
-        if distance is not None and self.range_error is not None:
+        if self.range_error is not None:
             rows = np.vstack([rows, direction])
             nearest = (distance - self.range_error) * np.cos(self.angle_error_rad)
             lower = np.append(lower, max(0.0, nearest))
@@ -289,8 +289,7 @@ class SightTruth:
     def cuts(self) -> Cuts:
         """Return half-spaces of the states that agree with the measurement."""
         direction, distance = self._measurement()
-        known = None if self._sensor.range_error is None else distance
-        return self._sensor.cuts(direction, known, self.motion.problem.states)
+        return self._sensor.cuts(direction, distance, self.motion.problem.states)
 
     def move(self, control: Floats) -> None:
         """Apply the control u(t), shape (m,), with its errors."""

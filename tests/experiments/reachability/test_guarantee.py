@@ -17,11 +17,13 @@ from infoset.experiments.reachability.command import Reach
 from infoset.experiments.reachability.file import Rendezvous
 from infoset.experiments.reachability.guarantee import guarantee_lines
 from infoset.experiments.reachability.guarantee_figures import draw_guarantee
+from infoset.experiments.reachability.guarantee_flights import flown_problem, motion_of_flights
 from infoset.experiments.reachability.guarantee_page import guarantee_page
 from infoset.experiments.reachability.guarantee_report import COMMAND
-from infoset.rendezvous.reachability import IMPULSE
+from infoset.rendezvous.reachability import IMPULSE, linear_motion
 from tests.built_in import problem_text
 from tests.experiments.command_line import Command
+from tests.rendezvous.reachability.leo_rendezvous import orbit_of, two_body
 
 ROOT = Path(__file__).resolve().parents[3]
 ARCH = "approach-guaranteed"
@@ -155,6 +157,49 @@ def test_start_alone_gives_the_guarantee_of_dead_reckoning(infoset: Command) -> 
     assert "no strategy" not in out
 
 
+def test_flights_without_measurements_are_not_planned_again(infoset: Command) -> None:
+    text = problem_text(ARCH)
+    sensor = text[text.index("[sensor]") : text.index("[goal]")]
+    Path("blind.toml").write_text(text.replace(sensor, ""))
+
+    assert "--replan: needs [sensor]" in infoset.refused("reach", "blind.toml", "--replan")
+
+
+def test_replanned_flights_keep_their_promises(infoset: Command) -> None:
+    options = (ARCH, *SHORT, "--replan", "--flights", "4")
+    found = infoset.json("reach", *options)
+    code, out, _ = infoset("reach", *options)
+
+    replanned = found["replanned"]
+    guarantees = np.array(replanned["guarantees"])
+    assert (replanned["number"], replanned["outside"]) == (4, 0)
+    assert guarantees.shape == (4, 5)
+    assert (guarantees[:, 0] == found["affine"]).all()
+    assert (np.diff(guarantees) <= 0.0).all()
+    # A flight rounds its states by less than 1e-9.
+    assert (np.array(replanned["distances"]) <= guarantees[:, -1] + 1e-9).all()
+    assert code == 0
+    median, most = np.median(guarantees[:, -1]), guarantees[:, -1].max()
+    assert (
+        "4 flights re-planned in flight, half of them with errors at their bounds: 0 outside, "
+        f"guarantee at the last impulse: median {median:.4g}, most {most:.4g} m"
+    ) in out
+
+
+def test_figure_and_page_show_the_replanned_flights() -> None:
+    options = Reach(problem=ARCH, settings=[SHORT[1], SHORT[3]], flights=2, replan=True)
+    report = COMMAND.report(options)
+
+    panel = draw_guarantee(report).axes[2]
+    assert panel.get_xlabel() == "measurements in flight"
+    # The answer, the bound and the median.
+    assert len(panel.lines) == 3
+    median = np.asarray(panel.lines[2].get_ydata())
+    assert report.replanned is not None
+    np.testing.assert_allclose(median, report.replanned.guarantees.mean(axis=0), rtol=1e-12)
+    assert "2 flights re-planned in flight" in guarantee_page(report)
+
+
 def test_box_that_is_no_cube_gives_numbers_of_boxes(infoset: Command) -> None:
     cube = infoset.json("reach", ARCH, *SHORT, "--set", "goal.position_box_m=2.0")
     other = infoset("reach", ARCH, *SHORT, "--set", "goal.position_box_m=[2.0, 2.0, 1.0]")[1]
@@ -222,10 +267,12 @@ def test_directions_and_ranges_guarantee_less_than_fixed_lines_of_sight(infoset:
 def test_directions_alone_are_known_only_in_flight(infoset: Command) -> None:
     Path("angles.toml").write_text(problem_text(ARCH).replace(SENSOR, "angle_error_deg = 0.5"))
 
-    found = infoset.json("reach", "angles.toml")
-    out = infoset("reach", "angles.toml")[1]
+    found = infoset.json("reach", "angles.toml", "--replan", "--flights", "1")
+    out = infoset("reach", "angles.toml", "--flights", "1")[1]
 
     assert found["affine"] == pytest.approx(116.2046, abs=PRINTED)
+    assert found["replanned"]["outside"] == 0
+    assert found["replanned"]["guarantees"][0][-1] < found["affine"]
     assert re.search(r"affine feedback +none +known only in flight: directions without ranges", out)
     assert "no strategy" not in out
 
@@ -298,7 +345,6 @@ def test_conflict_names_what_to_relax(infoset: Command) -> None:
     ("arguments", "told"),
     [
         ((ARCH, "--select", "energy"), "--select: is for problems without [sensor]"),
-        ((ARCH, "--replan"), "--replan: is for problems without [sensor]"),
         ((ARCH, "--backward"), "--backward: is for problems without [sensor]"),
         ((ARCH, "--flights", "-1"), "--flights"),
         (("rendezvous-2021", "--flights", "5"), "--flights: is for problems with [sensor]"),
@@ -397,6 +443,35 @@ def test_guarantee_for_nonlinear_motion_is_greater(infoset: Command) -> None:
     assert found["bound"] is None
     assert found["answered_refusal"] == "only for linear motion"
     assert linear["affine"] < found["affine"] < 1.01 * linear["affine"]
+
+
+def test_flights_of_nonlinear_motion_are_about_a_central_body(infoset: Command) -> None:
+    options = ("--set", "periods=3", "--set", "max_impulse_m_s=10", "--set", "nonlinear=true")
+    arguments = (ARCH, *options, "--flights", "2", "--replan")
+    found = infoset.json("reach", *arguments)
+    _, out, _ = infoset("reach", *arguments)
+
+    assert found["flights"]["outside"] == found["replanned"]["outside"] == 0
+    assert "2 flights of affine feedback about a central body, half" in out
+    assert "2 flights re-planned in flight about a central body, half" in out
+
+
+def test_motion_about_a_central_body_is_that_in_inertial_axes() -> None:
+    rendezvous = read_text(Rendezvous, problem_text("safe-approach"), "leo", ["nonlinear=true"])
+    states = np.array([[0.0, -1000.0, 50.0, 0.1, 0.0, 0.0], [3e3, 5e3, 0.0, 0.0, 2.0, -1.0]])
+    impulses = np.array([[0.5, -0.5, 0.2], [0.0, 1.0, 0.0]])
+
+    path = motion_of_flights(rendezvous)(2, states, impulses, np.zeros((2, 0)))
+
+    after = states + np.pad(impulses, ((0, 0), (3, 0)))
+    # Constraints are checked at 12 instants of each coast.
+    times_s = 480.0 + 240.0 * np.arange(1, 14) / 13
+    expected = two_body(orbit_of(), 480.0, after, times_s)
+    # Positions of 7e6 m in inertial axes are integrated to 1 mm.
+    np.testing.assert_allclose(path, expected.transpose(1, 0, 2), atol=1e-3)
+    linear = linear_motion(flown_problem(rendezvous), rendezvous.errors)
+    straight = linear(2, states, impulses, np.zeros((2, 0)))
+    assert np.abs(straight - path)[1, :, :3].max() > 0.1
 
 
 @pytest.mark.parametrize(

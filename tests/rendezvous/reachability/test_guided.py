@@ -295,6 +295,35 @@ def test_plan_is_kept_if_no_program_is_solved(
     np.testing.assert_allclose(flight.controls[:-1], controls[:-1], rtol=0.0, atol=ROUNDING)
 
 
+def test_plan_that_is_not_accepted_is_not_adopted(plan: AffinePlan) -> None:
+    asked = []
+
+    def accepts(better: AffinePlan, time: int) -> bool:
+        asked.append((better.guarantee, time))
+        return time == 9
+
+    truth = extreme_truth(plan.problem, np.random.default_rng(7))
+    craft = GuidedCraft(plan, window=3, accepts=accepts)
+    planned_at = []
+    for _ in range(10):
+        craft.measure(truth.measured())
+        planned_at.append(craft.planned_at)
+        truth.move(craft.control())
+
+    assert planned_at == [-1] * 9 + [9]
+    assert len(asked) > 1
+    assert all(guarantee < plan.guarantee for guarantee, _ in asked)
+    assert craft.guarantee == asked[-1][0]
+    assert truth.distance <= craft.guarantee + ROUNDING
+
+
+def test_answered_plan_with_a_condition_is_refused() -> None:
+    answered = answered_plan(arch(2, 10.0, 20.0), 2)
+
+    with pytest.raises(ValueError, match="adopts its last control in any case"):
+        GuidedCraft(answered, accepts=lambda _plan, _time: True)
+
+
 @pytest.mark.parametrize("failing", [3, 8])
 def test_plan_is_kept_after_a_failure_in_one_period(
     plan: AffinePlan, monkeypatch: pytest.MonkeyPatch, failing: int

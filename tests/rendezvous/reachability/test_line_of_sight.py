@@ -125,8 +125,7 @@ def test_cuts_contain_the_true_state_and_little_more(size: int, sensor: SightSen
     directions, ranges = sensor.simulated(positions, generator, np.arange(500) % 2 == 1)
 
     for position, direction, distance in zip(positions, directions, ranges, strict=True):
-        known = None if sensor.range_error is None else float(distance)
-        normals, lower, upper = sensor.cuts(direction, known, 2 * size)
+        normals, lower, upper = sensor.cuts(direction, float(distance), 2 * size)
         state = np.concatenate([position, np.ones(size)])
         along = normals @ state
         assert (along <= upper + ROUNDING).all()
