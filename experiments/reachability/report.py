@@ -16,8 +16,8 @@ from infoset.experiments.common.screen import Part, number, number_table
 from infoset.experiments.common.units import Unit, length_unit
 from infoset.experiments.reachability.file import Rendezvous
 from infoset.rendezvous.reachability import (
+    AffinePlan,
     ClosedLoopFlight,
-    FeedbackPlan,
     NonlinearMotion,
     SetKind,
     Solution,
@@ -67,8 +67,14 @@ class Robustness:
 
     fixed_miss: float | None
     conflict: str | None
-    plan: FeedbackPlan | None
+    plan: AffinePlan | None
     refusal: str | None
+
+    @property
+    def worst_miss(self) -> float:
+        """An upper bound of the terminal norm of the plan over all disturbances."""
+        assert self.plan is not None
+        return float(np.linalg.norm(self.plan.state_ranges.largest[-1]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,7 +263,10 @@ def _flight_json(rendezvous: Rendezvous, flight: ClosedLoopFlight) -> dict[str, 
 def _robust_json(robustness: Robustness) -> dict[str, object]:
     plan = robustness.plan
     shown = plan and {
-        key: getattr(plan, key) for key in ("worst_miss", "nominal", "lower", "upper")
+        "worst_miss": robustness.worst_miss,
+        "nominal": plan.nominal,
+        "lower": plan.state_ranges.lower,
+        "upper": plan.state_ranges.upper,
     }
     return {**vars(robustness), "plan": shown}
 
@@ -317,7 +326,7 @@ def _flight_lines(report: ReachabilityReport) -> Iterator[str]:
         yield f"\nwith disturbances, without feedback: {fixed}"
         bound = robustness.refusal
         if robustness.plan is not None:
-            bound = f"terminal norm at most {number(robustness.plan.worst_miss)} {NORM}"
+            bound = f"terminal norm at most {number(robustness.worst_miss)} {NORM}"
         yield f"with disturbances, with feedback: {bound}"
 
 

@@ -29,7 +29,7 @@ from infoset.rendezvous.reachability.drift import (
     drift_certificate,
     safe_plan,
 )
-from infoset.rendezvous.reachability.guaranteed import affine_plan
+from infoset.rendezvous.reachability.guaranteed import NoRobustPlanError, affine_plan
 from infoset.rendezvous.reachability.guided import (
     Acceptance,
     Cuts,
@@ -91,12 +91,7 @@ from infoset.rendezvous.reachability.problem import (
     ReachabilityProblem,
     ThrustShape,
 )
-from infoset.rendezvous.reachability.robust import (
-    FeedbackPlan,
-    NoRobustPlanError,
-    feedback_plan,
-    tightened,
-)
+from infoset.rendezvous.reachability.robust import feedback_plan, tightened
 from infoset.rendezvous.reachability.selection import (
     ControlEffort,
     analytic_centre,
@@ -147,7 +142,6 @@ __all__ = [
     "EmptyTubeError",
     "ErrorBounds",
     "ErrorSet",
-    "FeedbackPlan",
     "GuidedCraft",
     "GuidedFlight",
     "InadmissibleStartError",

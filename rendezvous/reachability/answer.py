@@ -14,7 +14,12 @@ import numpy as np
 
 from infoset.rendezvous._arrays import Floats, Places
 from infoset.rendezvous.reachability.conic import NoSolutionError
-from infoset.rendezvous.reachability.guaranteed import PlanVariables, is_broken, row_sizes
+from infoset.rendezvous.reachability.guaranteed import (
+    NoRobustPlanError,
+    PlanVariables,
+    is_broken,
+    row_sizes,
+)
 from infoset.rendezvous.reachability.outputs import (
     AffinePlan,
     ErrorSet,
@@ -22,7 +27,6 @@ from infoset.rendezvous.reachability.outputs import (
     PathRows,
     Ranges,
 )
-from infoset.rendezvous.reachability.robust import NoRobustPlanError
 from infoset.rendezvous.reachability.sparse_program import (
     Affine,
     InfeasibleProgramError,

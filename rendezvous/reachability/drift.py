@@ -17,6 +17,7 @@ from infoset.rendezvous._arrays import Flags, Floats
 from infoset.rendezvous.reachability.coasting import Coasting, CoastTube
 from infoset.rendezvous.reachability.conic import NoSolutionError
 from infoset.rendezvous.reachability.guaranteed import (
+    NoRobustPlanError,
     PlanVariables,
     PlanWithRows,
     best_with_rows,
@@ -27,7 +28,6 @@ from infoset.rendezvous.reachability.guaranteed import (
 )
 from infoset.rendezvous.reachability.motion import IMPULSE
 from infoset.rendezvous.reachability.outputs import AffinePlan, OutputProblem, PathRows, joined
-from infoset.rendezvous.reachability.robust import NoRobustPlanError
 from infoset.rendezvous.reachability.sparse_program import (
     Affine,
     InfeasibleProgramError,

@@ -10,7 +10,6 @@ import numpy as np
 from infoset.rendezvous._arrays import Flags, Floats, Places
 from infoset.rendezvous.reachability.conic import NoSolutionError
 from infoset.rendezvous.reachability.outputs import AffinePlan, OutputProblem, PathRows, Ranges
-from infoset.rendezvous.reachability.robust import NoRobustPlanError
 from infoset.rendezvous.reachability.sparse_program import (
     Affine,
     InfeasibleProgramError,
@@ -28,6 +27,10 @@ _MAX_CAP_ROUNDS = 12
 _CAP_GAIN = 1e-3
 """Relative decrease of the guarantee below which no further program is solved: it is less than the
 last printed digit."""
+
+
+class NoRobustPlanError(ValueError):
+    """No plan with affine feedback satisfies the constraints for all errors."""
 
 
 class RowVariables(NamedTuple):
@@ -197,12 +200,14 @@ def best_with_rows(problem: OutputProblem, window: int | None, known: Flags) -> 
     return found
 
 
-def plan_at_caps(problem: OutputProblem, window: int | None) -> AffinePlan:
+def plan_at_caps(
+    problem: OutputProblem, window: int | None, *, sum_of_rows: bool = False
+) -> AffinePlan:
     """Return the affine plan with the smallest guarantee at the caps of the problem.
 
     The arguments and the errors are those of `plan_with_rows`.
     """
-    return plan_with_rows(problem, window, no_rows(problem)).plan
+    return plan_with_rows(problem, window, no_rows(problem), sum_of_rows=sum_of_rows).plan
 
 
 def no_rows(problem: OutputProblem) -> Flags:
@@ -211,11 +216,14 @@ def no_rows(problem: OutputProblem) -> Flags:
     return np.zeros(count, dtype=bool)
 
 
-def plan_with_rows(problem: OutputProblem, window: int | None, known: Flags) -> PlanWithRows:
+def plan_with_rows(
+    problem: OutputProblem, window: int | None, known: Flags, *, sum_of_rows: bool = False
+) -> PlanWithRows:
     """Return the affine plan with the smallest guarantee at the caps of the problem.
 
     The limits and the constraints of the path that are `known`, shape (k,), are in the program at
-    first; the others enter when they are broken.
+    first; the others enter when they are broken. With `sum_of_rows` the plan minimises the sum of
+    the maxima of the rows of the goal in place of the largest one.
 
     Raises
     ------
@@ -230,7 +238,7 @@ def plan_with_rows(problem: OutputProblem, window: int | None, known: Flags) -> 
     entered[limits:] |= known
     for spare in _SPARES:
         while True:
-            plan = _plan_with(problem, window, entered, spare)
+            plan = _plan_with(problem, window, entered, spare, sum_of_rows)
             broken = is_broken(plan.row_ranges, rows)
             if not broken.any():
                 return PlanWithRows(plan, entered[limits:])
@@ -246,17 +254,17 @@ def is_broken(ranges: Ranges, rows: PathRows) -> Flags:
 
 
 def _plan_with(
-    problem: OutputProblem, window: int | None, entered: Flags, spare: float
+    problem: OutputProblem, window: int | None, entered: Flags, spare: float, sum_of_rows: bool
 ) -> AffinePlan:
     """Return the plan with the smallest guarantee that keeps some of the rows."""
     program = SparseProgram()
     plan = PlanVariables(program, problem, window, problem.periods)
-    guarantee = program.variables(1)
-    keep_goal(program, plan, problem, guarantee)
+    maxima = program.variables(len(problem.goal) if sum_of_rows else 1)
+    keep_goal(program, plan, problem, maxima)
     rows = problem.rows.chosen(entered)
     plan.keep_rows(rows, spare * row_sizes(problem, rows))
     try:
-        return plan.plan(program.minimise(variable_sum(guarantee, np.ones((1, 1)))))
+        return plan.plan(program.minimise(variable_sum(maxima, np.ones((1, len(maxima))))))
     except InfeasibleProgramError as error:
         raise NoRobustPlanError(
             "no plan with affine feedback keeps the constraints for all errors; reduce the errors, "
@@ -265,12 +273,13 @@ def _plan_with(
 
 
 def keep_goal(
-    program: SparseProgram, plan: PlanVariables, problem: OutputProblem, guarantee: Places
+    program: SparseProgram, plan: PlanVariables, problem: OutputProblem, guarantees: Places
 ) -> None:
-    """Add |goal_i . (x(T) - target)| <= guarantee for all errors."""
+    """Add |goal_i . (x(T) - target)| <= guarantees for all errors, one for all rows or for each."""
     no_control = np.zeros(problem.controls)
-    less_guarantee = variable_sum(guarantee, -np.ones((1, 1)))
-    for row in problem.goal:
+    columns = np.broadcast_to(guarantees, len(problem.goal))
+    for row, column in zip(problem.goal, columns, strict=True):
+        less_guarantee = variable_sum(np.array([column]), -np.ones((1, 1)))
         middle, errors = plan.row(problem.periods, row, no_control)
         middle = middle.plus(Affine(np.array([-row @ problem.aim])))
         maxima = program.maxima(problem.errors, errors)

@@ -17,9 +17,8 @@ from infoset.observer.linear_observer import LinearObserver
 from infoset.rendezvous._arrays import Floats, Places
 from infoset.rendezvous.reachability.answer import AnsweredPlan, last_answer
 from infoset.rendezvous.reachability.conic import NoSolutionError
-from infoset.rendezvous.reachability.guaranteed import plan_at_caps
+from infoset.rendezvous.reachability.guaranteed import NoRobustPlanError, plan_at_caps
 from infoset.rendezvous.reachability.outputs import AffinePlan, OutputProblem
-from infoset.rendezvous.reachability.robust import NoRobustPlanError
 
 MAX_FACETS = 36
 """Facets of a set on board: that of `LinearObserver`."""

@@ -13,11 +13,10 @@ import numpy as np
 
 from infoset.rendezvous._arrays import Flags, Floats
 from infoset.rendezvous.reachability.conic import NoSolutionError
-from infoset.rendezvous.reachability.guaranteed import affine_plan
+from infoset.rendezvous.reachability.guaranteed import NoRobustPlanError, affine_plan
 from infoset.rendezvous.reachability.guided import Cuts, LinearTruth
 from infoset.rendezvous.reachability.independent_parts import independent_parts, plan_of_parts
 from infoset.rendezvous.reachability.outputs import AffinePlan, OutputProblem, PathRows, joined
-from infoset.rendezvous.reachability.robust import NoRobustPlanError
 
 _CONE_FACES = 8
 """Half-spaces that replace the cone about a measured direction in space: the pyramid is at most 8 %

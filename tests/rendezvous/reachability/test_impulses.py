@@ -182,6 +182,15 @@ def test_tightened_speed_holds_after_an_impulse() -> None:
     np.testing.assert_allclose(np.diff(forward[:, 0, 1]), [1.0, 0.9, 0.85], atol=1e-9)
 
 
-def test_feedback_refuses_impulses() -> None:
-    with pytest.raises(ValueError, match="needs held thrust"):
-        feedback_plan(cart(2, 1.0), np.full((2, 2, 1), 0.01))
+def test_feedback_by_impulses_leaves_what_the_last_impulse_cannot_answer() -> None:
+    # The last disturbance, (0.02, 0.1), has no answer. The one before would be (0.12, 0.1) at the
+    # end: the last impulse removes 0.1 from both, which is best for the sum of x / 10 and v. Two
+    # impulses remove earlier ones.
+    problem = cart(4, 3.0)
+    disturbance = np.array([[[0.02], [0.1]]] * 4)
+
+    plan = feedback_plan(problem, disturbance)
+
+    spread = 0.5 * (plan.state_ranges.upper - plan.state_ranges.lower)[-1]
+    assert spread == pytest.approx([0.04, 0.1], abs=1e-5)
+    assert plan.excess <= 0.0
