@@ -137,7 +137,8 @@ def fly_replanned(
     """Simulate flights that are planned again after each output (Theorem 6).
 
     The errors and `move` are as in `fly_plan`; each flight has its own random numbers, so that
-    the first flights do not depend on the number of flights.
+    the first flights do not depend on the number of flights. After each of them `progress` is
+    called with the share of the flights that are done.
     """
     move = move or linear_motion(problem, errors)
     output = before.plan.problem.output

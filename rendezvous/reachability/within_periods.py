@@ -43,7 +43,7 @@ class PathLimits:
     normals : ndarray, shape (k, 6)
         Normals, for states in m and m/s.
     offsets : ndarray, shape (T, k)
-        Offsets, in m or m/s; infinite in periods without the constraint.
+        Offsets, in m or m/s as normals . x; infinite in periods without the constraint.
     """
 
     flight: Coasting
