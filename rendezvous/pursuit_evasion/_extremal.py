@@ -353,6 +353,7 @@ def rate(y: Floats, mu: float, oblateness: float, push: float) -> Floats:
     """
     out = np.empty(6)
     gradient = np.empty((3, 3))
+    # With oblateness it is written to, though its values have no meaning.
     unused = np.zeros((3, 3))
     derivatives(y[:3], y[9:], mu, oblateness, out[3:], gradient, unused, False)
     size = np.sqrt(y[9] * y[9] + y[10] * y[10] + y[11] * y[11])

@@ -105,8 +105,9 @@ def block_optimum(block: StateBlock, *, relative: bool = False) -> BlockOptimum:
     """Return the minimum terminal norm of a block, and all controls that reach it.
 
     If `relative`, the norm is of states divided by their bounds; otherwise in the units of the
-    problem. Constraints that no control satisfies are relaxed by at most 1e-9 of their size;
-    `EmptyTubeError` is raised if that is not enough (`admissible`).
+    problem. Constraints that no control keeps with a margin of 1e-9 of their bounds are relaxed
+    until one does, by at most 2e-9. `EmptyTubeError` is raised if no control keeps them after a
+    relaxation of 1e-9 (`admissible`).
 
     A cone program gives the terminal state, which is unique, and multipliers (see `min_norm`). A
     row with a positive multiplier is tight for every optimal control: with the terminal equations
@@ -201,6 +202,7 @@ def admissible(block: StateBlock) -> StateBlock:
 
 
 def _relaxed(block: StateBlock, relaxation: float) -> StateBlock:
+    """Return a block with larger offsets: a control keeps all of them with the margin `_KEPT`."""
     margin = relaxation + _KEPT
     if margin <= 0.0:
         return block

@@ -40,11 +40,13 @@ def animate(
 
     Frames are evenly distributed over the time axis of the lower panels, which is logarithmic for
     long flights, and take about 0.2 s of computing each. A frame is 425 pixels wide, or 320 for
-    each of several planes: the file stays small enough for a web page.
+    each of several planes: the file stays small enough for a web page. `max_frames` is chosen: 40
+    frames are five a second.
     """
     clock = Clock.of(records)
     chosen = _frame_times(records, clock, max_frames)
     traces = traces_of(records)
+    # The sizes in mm, chosen, decide only how large the text is in a frame.
     width_mm = 120.0
     width_px = 425
     if len(traces) > 1:

@@ -78,8 +78,9 @@ def largest_ball(rows: Floats, limits: Floats) -> tuple[Floats, float]:
         If the linear program (HiGHS) was not solved, for example because the set has balls of any
         size.
     """
-    # The program has rows of size one; the radius is in units of the smallest row, at most 1. The
-    # value 1e-300 only avoids a division by zero: with a row of zeros the program is not solved.
+    # The program has rows of size one. Its last variable is the radius / `minimum`, the size of the
+    # smallest row, or 1 if that is less: no coefficient exceeds 1. The value 1e-300 only avoids a
+    # division by zero: with a row of zeros the program is not solved.
     units = np.abs(rows).max(axis=1, initial=1e-300)
     minimum = float(units.min(initial=1.0))
     matrix = np.column_stack([rows / units[:, None], minimum / units])
