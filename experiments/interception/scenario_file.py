@@ -157,6 +157,7 @@ def scenario_warnings(scenario: Scenario) -> list[str]:
         *_dispersion_warnings(scenario),
         *_approach_warnings(scenario),
         *_angle_warnings(scenario),
+        *_brightness_warnings(scenario),
         *_target_warnings(scenario),
         *_timing_warnings(scenario),
     ]
@@ -208,6 +209,20 @@ def _angle_warnings(scenario: Scenario) -> Iterator[str]:
             "information_set.model is paper, which replaces tangents by their angles, and the "
             f"line of sight may be {steepest:.3g} rad off the x axis: beyond {SMALL_ANGLE_RAD:g} "
             "rad the set may lose the true state; write model = guaranteed"
+        )
+
+
+def _brightness_warnings(scenario: Scenario) -> Iterator[str]:
+    """Yield a line if the bound of the centroid is less than the residual of a correction."""
+    camera = scenario.bearing_sensor
+    residual = _residual(scenario)
+    if not isinstance(camera, OffsetCamera) or residual is None:
+        return
+    if camera.centroid_error_m < residual.total_m:
+        yield (
+            f"camera.centroid_error_m, {camera.centroid_error_m:g} m, is less than the residual of "
+            f"a correction by the rule, {residual.total_m:.3g} m: if that is the real error, the "
+            "set may lose the true state"
         )
 
 

@@ -126,3 +126,22 @@ def test_offset_in_a_plane_is_toward_the_sun() -> None:
         assert isinstance(sensor, OffsetCamera)
         assert sensor.offset_m == pytest.approx((side * 38.9064,), abs=1e-3)
         assert read_text(Scenario, to_toml(scenario), "written") == scenario
+
+
+@pytest.mark.parametrize(("centroid_error_m", "warns"), [(32.0, True), (33.0, False)])
+def test_a_centroid_error_below_the_residual_of_the_light_has_a_warning(
+    centroid_error_m: float, warns: bool
+) -> None:
+    # R (k (0.3 + 0.06 1.3) + 0.85 1.3 0.3 sin 60 deg) = 32.6 m for R = 75 m and k = 0.389.
+    text = scenario_text("dart-2022")
+    settings = [
+        "camera.phase_angle_deg=60",
+        "camera.sun_angle_deg=0",
+        f"camera.centroid_error_m={centroid_error_m}",
+    ]
+    scenario = read_text(Scenario, text, "file", settings)
+
+    lines = [line for line in scenario_warnings(scenario) if "residual" in line]
+
+    assert len(lines) == warns
+    assert all("32.6 m" in line for line in lines)
