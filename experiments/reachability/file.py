@@ -335,6 +335,24 @@ class Rendezvous:
             raise ValueError(
                 f"passive_safety.until_period: must be at most {self.periods - 1}, the last impulse"
             )
+        self._check_keep_out(self.passive_safety)
+
+    def _check_keep_out(self, safety: KeepOut | None) -> None:
+        """Raise `ValueError` if drifts begin inside the ball, or lead to a hold point inside it."""
+        if safety is None or self.goal is None:
+            return
+        points = [("initial.position_m", self.initial.position_m)]
+        if safety.until_period in (None, self.periods - 1):
+            # The drift after the last impulse passes the hold point.
+            points.append(("goal.position_m", self.goal.position_m))
+        for key, point in points:
+            distance_m = math.hypot(*point)
+            if distance_m < safety.keep_out_m:
+                raise ValueError(
+                    f"{key}: is {distance_m:g} m from the target, inside the ball of "
+                    f"passive_safety.keep_out_m, {safety.keep_out_m:g} m; move it or make the ball "
+                    "smaller"
+                )
 
     def _check_engine(self) -> None:
         if self.has_impulses:
