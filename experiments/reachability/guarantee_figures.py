@@ -121,7 +121,7 @@ def _draw_widths(axes: Axes, report: GuaranteeReport) -> None:
         ("affine feedback", report.plan, {"color": TRUTH, "marker": "o", "markersize": 3.5}),
     ]
     for label, plan, look in plans:
-        if plan is None or (plan is report.plan and report.bound is None):
+        if plan is None or (plan is report.plan and not rendezvous.has_feedback):
             continue
         ranges = plan.state_ranges
         widths = 0.5 * (ranges.upper - ranges.lower)[:, :3].max(axis=1)

@@ -246,6 +246,19 @@ def test_thrust_in_norm_keeps_its_limit_and_tells_its_loss(infoset: Command) -> 
 SENSOR = "position_error_m = 3.0"
 
 
+def test_figure_of_directions_and_ranges_shows_the_tubes_of_both_plans(tmp_path: Path) -> None:
+    file = tmp_path / "sight.toml"
+    text = problem_text(ARCH).replace(SENSOR, "range_error_m = 3.0\nangle_error_deg = 0.5")
+    file.write_text(text)
+    options = Reach(problem=str(file), settings=[SHORT[1], SHORT[3]], flights=0)
+    report = COMMAND.report(options)
+
+    (panel,) = draw_guarantee(report).axes
+
+    labels = [line.get_label() for line in panel.lines]
+    assert labels == ["without measurements", "affine feedback"]
+
+
 def test_directions_and_ranges_guarantee_less_than_fixed_lines_of_sight(infoset: Command) -> None:
     text = problem_text(ARCH).replace(SENSOR, "range_error_m = 3.0\nangle_error_deg = 0.5")
     Path("sight.toml").write_text(text)
