@@ -62,6 +62,8 @@ _LAST_LIMIT = 2.0
 """Limit of the last control, as a multiple of its largest value in the affine plan, if constraints
 after it do not follow from its own limit. Chosen: an answer is about as large as the affine
 reaction."""
+_NO_GAIN = 1e-5
+"""Part of a guarantee that is not printed: five digits are."""
 _RELAXED = 10.0
 """Factor of the bounds of states that shows whether they are the conflict; chosen."""
 
@@ -189,12 +191,13 @@ def solve_guarantee(
         except NoRobustPlanError:
             raise _conflict(rendezvous, progress) from None
         progress(0.3)
-        answered, refusal = _answered(rendezvous, plan)
-        progress(0.5)
         if not rendezvous.nonlinear and rendezvous.sight is None:
             parts = [part.problem for part in independent_parts(problem)]
             bound = max((lower_bound(part).value for part in parts), default=0.0)
             radius = max((information_radius(part).value for part in parts), default=0.0)
+        progress(0.4)
+        answered, refusal = _answered(rendezvous, plan, bound)
+        progress(0.5)
     progress(0.6)
     checked = _checked_plan(rendezvous, plan, progress)
     progress(0.9)
@@ -366,11 +369,13 @@ def _within(
     return solve(problem) if limits is None else plan_within(problem, limits, solve)
 
 
-def _answered(rendezvous: Rendezvous, plan: AffinePlan) -> tuple[float | None, str | None]:
+def _answered(
+    rendezvous: Rendezvous, plan: AffinePlan, bound: float | None
+) -> tuple[float | None, str | None]:
     """Return the guarantee with a last control that answers all outputs, or why there is none.
 
-    If constraints after the last control do not follow from its limits, smaller limits are tried.
-    The problem of a plan has the caps of errors that are proportional to controls.
+    It is that of the affine plan if no strategy can guarantee less than `_NO_GAIN` below it: an
+    affine reaction is one of the possible answers.
     """
     if rendezvous.nonlinear:
         return None, "only for linear motion"
@@ -379,6 +384,17 @@ def _answered(rendezvous: Rendezvous, plan: AffinePlan) -> tuple[float | None, s
     if rendezvous.passive_safety is not None:
         # The last control, and so the drift after it, is not known before the flight.
         return None, "not with [passive_safety]"
+    if bound is not None and plan.guarantee <= bound * (1.0 + _NO_GAIN):
+        return plan.guarantee, None
+    return _best_answer(rendezvous, plan)
+
+
+def _best_answer(rendezvous: Rendezvous, plan: AffinePlan) -> tuple[float | None, str | None]:
+    """Return the smallest guarantee with an answer, or why there is none.
+
+    If constraints after the last control do not follow from its limits, smaller limits are tried.
+    The problem of a plan has the caps of errors that are proportional to controls.
+    """
     refusal = ""
     problem = replace(rendezvous.output_problem, caps=plan.problem.caps)
     own = problem.limits.copy()
