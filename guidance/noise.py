@@ -13,6 +13,7 @@ from infoset.arrays import Floats
 from infoset.information_set import InformationSetView
 from infoset.limits import real_array, real_values, shown
 from infoset.sensors import Measurements, Sensor
+from infoset.sensors.sensor import along_x_m
 
 
 class TieRule(Enum):
@@ -47,6 +48,9 @@ class LineOfSight:
     uniform : mapping of str to ndarray
         Random numbers of this step by sensor, with the shape of its measurements: independent,
         uniform in [-1, 1], and the same for a run of a seed in every batch.
+    x_m : ndarray, shape (B,), or None
+        True distance along x, m; None is that of the angles and the distance. The angles of a
+        misaligned camera are turned.
     """
 
     step: int
@@ -57,6 +61,14 @@ class LineOfSight:
     pending: Sequence[tuple[float, Floats]] = ()
     time_s: float = 0.0
     uniform: Mapping[str, Floats] = field(default_factory=dict)
+    x_m: Floats | None = None
+
+    @property
+    def along_x_m(self) -> Floats:
+        """Part of the distance along x, m, shape (B,)."""
+        if self.x_m is not None:
+            return self.x_m
+        return along_x_m(self.alpha_rad, self.range_m)
 
     def shape(self, sensor: Sensor) -> tuple[int, ...]:
         """Return the shape of the measurements of a sensor."""

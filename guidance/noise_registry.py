@@ -32,8 +32,8 @@ class NoiseSettings(Protocol):
     """Settings of noises: fields and properties of a scenario, with the same names."""
 
     @property
-    def step_s(self) -> float:
-        """Length of a step, s."""
+    def fitted_step_s(self) -> float:
+        """Length of a step of the flight, s."""
 
     @property
     def tie(self) -> TieRule:
@@ -100,7 +100,7 @@ def _gaussian(settings: NoiseSettings, batch: NoiseBatch) -> MeasurementNoise:
 
 
 def _correlated(settings: NoiseSettings, batch: NoiseBatch) -> MeasurementNoise:
-    correlation = math.exp(-settings.step_s / settings.correlation_time_s)
+    correlation = math.exp(-settings.fitted_step_s / settings.correlation_time_s)
     return gaussian_noise(batch.errors, batch.bias, settings.noise_sigma, correlation, batch.drift)
 
 

@@ -103,6 +103,7 @@ class Instruments:
             pending,
             step * self._step_s,
             {name: errors[name][..., step] for name in due if name in errors},
+            sight.along_x_m,
         )
         values = self._noise.measure(asked, information)
         measured = checked_measurements(values, asked, self._noise)

@@ -51,8 +51,8 @@ class Sight:
     ----------
     alpha_rad, omega_rad_s : ndarray
         Line-of-sight angle and rate, equation (12) of the paper.
-    range_m : ndarray, shape (B,)
-        Distance between the centres of mass.
+    range_m, along_x_m : ndarray, shape (B,)
+        Distance between the centres of mass, and its part along x.
     slope, slope_rate_per_s : ndarray
         z/x, that is tan(alpha) without the rounding of the angle, and its rate; zero where x is
         zero.
@@ -61,6 +61,7 @@ class Sight:
     alpha_rad: Floats
     omega_rad_s: Floats
     range_m: Floats
+    along_x_m: Floats
     slope: Floats
     slope_rate_per_s: Floats
 
@@ -175,6 +176,7 @@ class KeplerMotion:
             alpha_rad=np.arctan2(lateral, x),
             omega_rad_s=_ratio(speed * x - v_x * lateral, lateral * lateral + x * x),
             range_m=np.sqrt((position * position).sum(axis=0)),
+            along_x_m=position[X],
             slope=slope,
             slope_rate_per_s=_ratio(speed - v_x * slope, x),
         )

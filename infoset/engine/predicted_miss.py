@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from infoset.arrays import Flags, Floats
+from infoset.sensors.sensor import along_x_m
 
 
 @dataclass(frozen=True)
@@ -21,6 +22,11 @@ class ExtremePoints:
     alpha_rad: Floats
     omega_rad_s: Floats
     range_m: Floats
+
+    @property
+    def along_x_m(self) -> Floats:
+        """Parts of the ranges along x, m, shape (C, B)."""
+        return along_x_m(self.alpha_rad, self.range_m)
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from infoset.arrays import Flags, Floats
 from infoset.clock import steps_between
 from infoset.limits import NUMBER, Fraction, Limits, NotNegative, Part, Positive, check_fields
 from infoset.sensors.brightness import Brightness
-from infoset.sensors.sensor import Apart, Cuttable, Geometry, Measurements, Sensor
+from infoset.sensors.sensor import Apart, Cuttable, Geometry, Measurements, Sensor, along_x_m
 
 RangeOrRanges = TypeVar("RangeOrRanges", float, Floats)
 
@@ -487,21 +487,21 @@ class OffsetCamera(Camera):
 
     def true_value(self, sight: Geometry) -> Floats:
         """Return the angles of the point that the images show, rad."""
-        return self._angle_of_point(sight.alpha_rad, sight.range_m)
+        return self._angle_of_point(sight.alpha_rad, sight.along_x_m)
 
     def expected(self, alpha_rad: Floats, range_m: Floats) -> Floats:
         """Return the measured angles, rad, that the set expects of points at line-of-sight angles.
 
         Both have the shape (C, B).
         """
-        return self._angle_of_point(alpha_rad, range_m) if self.phase_correction else alpha_rad
+        if not self.phase_correction:
+            return alpha_rad
+        return self._angle_of_point(alpha_rad, along_x_m(alpha_rad, range_m))
 
-    def _angle_of_point(self, alpha_rad: Floats, range_m: Floats) -> Floats:
-        """Return atan((z + o)/x) of each axis, rad, shape (C, B), from angles and distances."""
-        slope = np.tan(alpha_rad)
-        distance_per_x = np.sqrt(1.0 + (slope * slope).sum(axis=0))
-        x = np.copysign(range_m / distance_per_x, np.cos(alpha_rad))
-        return np.asarray(np.arctan2(x * slope + np.reshape(self.offset_m, (-1, 1)), x))
+    def _angle_of_point(self, alpha_rad: Floats, x_m: Floats) -> Floats:
+        """Return atan((z + o)/x) of each axis, rad, shape (C, B), from the angles and x."""
+        offset_m = np.reshape(self.offset_m, (-1, 1))
+        return np.asarray(np.arctan2(x_m * np.tan(alpha_rad) + offset_m, x_m))
 
     def bound(self, sight: Geometry) -> Floats:
         """Return the error bound of images about the point that they show, rad."""

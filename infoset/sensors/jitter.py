@@ -69,10 +69,10 @@ def jitter(
     constant. The time constant is that of a Gauss-Markov process with the same frequency below
     which half of its variance is.
 
-    A Gaussian error has no bound. With N images of two angles, 4 (N + 1) Q(k) = 1 - confidence for
-    k standard deviations, where Q is the tail of a Gaussian: a flight leaves the assumptions with
-    at most this probability. The set on board uses the bounds only, and neither the spectrum nor
-    the time constant.
+    A Gaussian error has no bound. In N images of two angles there are 2 N new errors, 2 N of the
+    drift and 2 constant ones: 4 (2 N + 1) Q(k) = 1 - confidence for k standard deviations, where Q
+    is the tail of a Gaussian. A flight leaves the assumptions with at most this probability. The
+    set on board uses the bounds only, and neither the spectrum nor the time constant.
     """
     if not 0.0 < exposure_s < period_s < flight_s:
         raise ValueError(
@@ -95,7 +95,7 @@ def jitter(
     constant = quad(psd, 0.0, constant_hz)[0]
 
     images = flight_s / period_s + 1.0
-    tail = (1.0 - confidence) / (2.0 * AXES * (images + 1.0))
+    tail = (1.0 - confidence) / (2.0 * AXES * (2.0 * images + 1.0))
     sigmas = float(-ndtri(tail))
     return Jitter(
         pixel_error_rad=sigmas * math.sqrt(white),

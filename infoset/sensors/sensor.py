@@ -43,6 +43,20 @@ class Geometry(Protocol):
     def range_m(self) -> Floats:
         """Distance, m, shape (B,), or for points that differ by axis (C, B)."""
 
+    @property
+    def along_x_m(self) -> Floats:
+        """Part of the distance along x, m, with its shape.
+
+        A misaligned camera turns the angles, and neither the distance nor this part.
+        """
+
+
+def along_x_m(alpha_rad: Floats, range_m: Floats) -> Floats:
+    """Return the part of distances along x, m, from line-of-sight angles, shape (C, B), rad."""
+    slope = np.tan(alpha_rad)
+    distance_per_x = np.sqrt(1.0 + (slope * slope).sum(axis=0))
+    return np.asarray(np.copysign(range_m / distance_per_x, np.cos(alpha_rad[0])))
+
 
 @dataclass(frozen=True)
 class Apart:

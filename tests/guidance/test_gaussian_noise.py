@@ -4,18 +4,23 @@ process.
 
 from __future__ import annotations
 
+import math
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from infoset.guidance import NoiseKind, RandomNoise, TieRule
 from infoset.guidance.gaussian_noise import (
     correlated_uniform,
     gaussian_noise,
     share_cut,
     truncated_gaussian,
 )
+from infoset.guidance.noise_registry import NoiseBatch, make_noise
 
 SIGMAS = [0.05, 1.0 / 3.0, 1.0, 5.0]
 
@@ -92,3 +97,24 @@ def test_a_noise_has_the_errors_of_every_sensor_and_of_the_centroid() -> None:
     assert noise.bias is not None
     assert np.array_equal(noise.bias, truncated_gaussian(bias, 0.5))
     assert gaussian_noise(numbers, None, 0.5).bias is None
+
+
+def test_correlation_of_a_step_is_that_of_the_steps_of_the_flight() -> None:
+    """A step of 50 s is fitted to 40 s, so that the times before the arrival are exact."""
+
+    class Settings(NamedTuple):
+        fitted_step_s: float = 40.0
+        step_s: float = 50.0
+        tie: TieRule = TieRule.UPPER
+        noise_sigma: float = 0.5
+        correlation_time_s: float = 100.0
+
+    independent = np.random.default_rng(0).uniform(-1.0, 1.0, (1, 2, 30))
+    batch = NoiseBatch({"angle": independent}, None, None, independent, lambda: None, lambda: None)
+
+    made = make_noise(NoiseKind.CORRELATED, Settings(), batch)
+    expected = gaussian_noise({"angle": independent}, None, 0.5, math.exp(-40.0 / 100.0))
+
+    assert isinstance(made, RandomNoise)
+    assert isinstance(expected, RandomNoise)
+    np.testing.assert_array_equal(made.errors["angle"], expected.errors["angle"])

@@ -57,12 +57,11 @@ def test_white_spectrum_is_new_in_each_image() -> None:
     assert found.pixel_error_rad / found.sigmas == pytest.approx(math.sqrt(variance), rel=1e-7)
 
 
-@pytest.mark.parametrize(("images", "sigmas"), [(178, 4.19), (1069, 4.58), (1426, 4.64)])
-def test_bounds_hold_for_all_images_of_a_flight(images: int, sigmas: float) -> None:
-    """4 N Q(k) = 0.01, to the digits of the table; one more for the constant part."""
+@pytest.mark.parametrize("images", [178, 1069, 1426])
+def test_bounds_hold_for_all_images_of_a_flight(images: int) -> None:
+    """New errors and drift of N images of two angles, to both sides, and two constant errors."""
     found = jitter(lambda _: 1e-12, exposure_s=EXPOSURE_S, period_s=1.0, flight_s=float(images - 1))
-    assert found.sigmas == pytest.approx(sigmas, abs=6e-3)
-    assert 4.0 * (images + 1) * norm.sf(found.sigmas) == pytest.approx(0.01)
+    assert 4.0 * (2 * images + 1) * norm.sf(found.sigmas) == pytest.approx(0.01)
 
 
 def test_times_that_do_not_increase_are_refused() -> None:

@@ -15,6 +15,7 @@ from infoset.arrays import Floats
 from infoset.engine import section_life
 from infoset.engine.section_law import section_laws
 from infoset.sensors import OffsetCamera
+from infoset.sensors.sensor import along_x_m
 from tests.kernels import callable_kernels
 
 EPS = float(np.finfo(np.float64).eps)
@@ -38,6 +39,10 @@ class Sight:
     @property
     def omega_rad_s(self) -> Floats:
         return np.zeros_like(self.alpha_rad)
+
+    @property
+    def along_x_m(self) -> Floats:
+        return along_x_m(self.alpha_rad, self.range_m)
 
 
 def sight(x_m: float, angles: tuple[float, float]) -> Sight:

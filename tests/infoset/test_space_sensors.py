@@ -39,6 +39,10 @@ class Place:
     def range_m(self) -> Floats:
         return np.array([np.hypot(self.x_m, np.hypot(self.y_m, self.z_m))])
 
+    @property
+    def along_x_m(self) -> Floats:
+        return np.array([self.x_m])
+
 
 places = st.builds(
     lambda x, y, z: Place(x, x * np.tan(y), x * np.tan(z)), st.floats(1e3, 7e6), angles, angles

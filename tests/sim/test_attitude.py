@@ -92,3 +92,20 @@ def test_drift_is_correlated_over_its_time_constant() -> None:
 
 def test_drift_time_is_a_tenth_of_the_flight_by_default() -> None:
     assert with_attitude("camera.drift_urad=7").drift_time_s == pytest.approx(1080.0)
+
+
+def test_a_strongly_misaligned_camera_keeps_the_truth_with_an_offset_of_the_light() -> None:
+    """1.1 degrees and an image without an error of its own but 1e-7 rad.
+
+    The offset of the light is a part of x: its error would be 2e-4 of the offset, and beyond the
+    bound, if x were computed from the turned angles.
+    """
+    settings = [
+        "camera.misalignment_urad=20000",
+        "camera.pixel_error_urad=0.1",
+        "camera.centroid_error_m=0",
+        "body.radius_m=300",
+        "information_set.range_threshold_km=10",
+    ]
+    scenario = replace(with_attitude(*settings), noise=NoiseKind.GAME)
+    assert simulate(scenario, 12).truth_kept.all()

@@ -94,7 +94,7 @@ class ModelMotion:
         alpha = self._z / self._x
         omega = (self._v + self._e * alpha) / self._x
         slope = np.tan(alpha)
-        return Sight(alpha, omega, self._x, slope, omega * (1.0 + slope * slope))
+        return Sight(alpha, omega, self._x, self._x, slope, omega * (1.0 + slope * slope))
 
     def fire(self, impulse_m_s: Floats) -> None:
         self._v = self._v - impulse_m_s
