@@ -478,6 +478,14 @@ class Rendezvous:
         """Whether a plan before the flight reacts to measurements."""
         return self.sensor is not None and self.sensor.acts_before_flight
 
+    @property
+    def couples_all_states(self) -> bool:
+        """Whether plans are for all states together: independent parts are not planned apart.
+
+        Drifts, distances of nonlinear motion and lines of sight depend on all states.
+        """
+        return self.nonlinear or self.sight is not None or self.passive_safety is not None
+
     @cached_property
     def output_problem(self) -> OutputProblem:
         """The problem with bounded errors."""
@@ -485,7 +493,9 @@ class Rendezvous:
         assert goal is not None
         box = goal.position_box_m + (goal.velocity_box_m_s or (np.inf,) * 3)
         target = np.array(goal.position_m + goal.velocity_m_s)
-        return with_errors(self.problem, self.errors, target, np.array(box))
+        return with_errors(
+            self.problem, self.errors, target, np.array(box), all_act=self.couples_all_states
+        )
 
     @property
     def drifts(self) -> Coasting:

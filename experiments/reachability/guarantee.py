@@ -290,11 +290,10 @@ def _plan_in_flight(rendezvous: Rendezvous, checked: CheckedPlan) -> ReplannedPl
 def _parts_in_flight(rendezvous: Rendezvous, problem: OutputProblem) -> tuple[ProblemPart, ...]:
     """Return the parts of a problem that can be planned again apart.
 
-    Drifts, distances of nonlinear motion and lines of sight depend on all states, as constraints
-    between impulses may: the problem is then one part.
+    Constraints between impulses may depend on all states: the problem is then one part.
     """
     whole = (whole_problem(problem),)
-    if rendezvous.nonlinear or rendezvous.sight or rendezvous.passive_safety:
+    if rendezvous.couples_all_states:
         return whole
     parts = independent_parts(problem)
     limits = rendezvous.path_limits

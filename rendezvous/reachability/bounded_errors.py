@@ -9,7 +9,7 @@ import numpy as np
 from infoset.geometry.zonotope import Zonotope
 from infoset.rendezvous._arrays import Floats
 from infoset.rendezvous.reachability.line_of_sight import SightSensor
-from infoset.rendezvous.reachability.norm_limit import with_norm_limit
+from infoset.rendezvous.reachability.norm_limit import acting_controls, with_norm_limit
 from infoset.rendezvous.reachability.outputs import OutputProblem, PathRows
 from infoset.rendezvous.reachability.problem import ReachabilityProblem, ThrustShape
 
@@ -43,13 +43,20 @@ class ErrorBounds:
 
 
 def with_errors(
-    problem: ReachabilityProblem, errors: ErrorBounds, target: Floats, box: Floats
+    problem: ReachabilityProblem,
+    errors: ErrorBounds,
+    target: Floats,
+    box: Floats,
+    *,
+    all_act: bool = False,
 ) -> OutputProblem:
     """Return a rendezvous with bounded errors.
 
     The norm of the goal is that of a `box` of half-widths, shape (n,), about the state `target`; a
     component whose half-width is infinite does not count. All constraints hold for all errors.
-    Thrust in a ball is limited by the faces of a polytope inside it (`norm_faces`).
+    Thrust in a ball is limited by the faces of a polytope inside it (`norm_faces`), in the plane of
+    the controls that act in this problem. `all_act` is needed if a plan may use the others too: if
+    errors or constraints are added later, or the independent parts are not planned apart.
     """
     periods = problem.periods
     output = np.eye(len(errors.measured), problem.states)
@@ -76,7 +83,8 @@ def with_errors(
         constraint_rows(problem, largest),
     )
     if problem.thrust is ThrustShape.BALL:
-        return with_norm_limit(whole, float(problem.control_bounds[0]))
+        acting = np.arange(problem.controls) if all_act else acting_controls(whole)
+        return with_norm_limit(whole, float(problem.control_bounds[0]), acting)
     return whole
 
 

@@ -67,9 +67,11 @@ def acting_controls(problem: OutputProblem) -> Places:
     return np.sort(np.concatenate([np.zeros(0, dtype=np.int64), *(p.controls for p in parts)]))
 
 
-def with_norm_limit(problem: OutputProblem, limit: float) -> OutputProblem:
-    """Return the problem with a limit of the norm of each control, by faces inside the ball."""
-    acting = acting_controls(problem)
+def with_norm_limit(problem: OutputProblem, limit: float, acting: Places) -> OutputProblem:
+    """Return the problem with a limit of the norm of each control, by faces inside the ball.
+
+    Controls that are not `acting` must be zero.
+    """
     if len(acting) < 2:
         return problem
     faces = norm_faces(len(acting))

@@ -20,7 +20,7 @@ from infoset.experiments.reachability.guarantee_figures import draw_guarantee
 from infoset.experiments.reachability.guarantee_flights import flown_problem, motion_of_flights
 from infoset.experiments.reachability.guarantee_page import guarantee_page
 from infoset.experiments.reachability.guarantee_report import COMMAND
-from infoset.rendezvous.reachability import IMPULSE, linear_motion
+from infoset.rendezvous.reachability import IMPULSE, acting_controls, linear_motion
 from tests.built_in import problem_text
 from tests.experiments.command_line import Command
 from tests.rendezvous.reachability.leo_rendezvous import orbit_of, two_body
@@ -243,7 +243,52 @@ def test_thrust_in_norm_keeps_its_limit_and_tells_its_loss(infoset: Command) -> 
     assert told in out
 
 
+def test_thrust_in_norm_is_kept_if_only_drifts_act_along_an_axis(infoset: Command) -> None:
+    settings = (
+        'thrust="ball"',
+        "initial_error.position_m=[20, 20, 0]",
+        "initial_error.velocity_m_s=[0.01, 0.01, 0]",
+        "execution_error.absolute_m_s=[0.001, 0.001, 0]",
+        "periods=3",
+        "max_impulse_m_s=1.5",
+        "passive_safety.keep_out_m=140",
+        "passive_safety.drift_periods=2",
+        "passive_safety.until_period=1",
+    )
+    found = infoset.json("reach", "safe-approach", *(f"--set={each}" for each in settings))
+
+    controls = np.array(found["controls"]["nominal"])
+    # The drifts pass the ball beside the plane, and the limit is active.
+    assert np.abs(controls[:, 2]).max() > 0.1
+    assert 1.4 < np.linalg.norm(controls, axis=1).max() <= 1.5
+    assert found["flights"]["outside"] == 0
+
+
 SENSOR = "position_error_m = 3.0"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "acting"),
+    [
+        ("", "", [0, 1]),
+        ("[orbit]", "nonlinear = true\n[orbit]", [0, 1, 2]),
+        (
+            "[orbit]",
+            "[passive_safety]\nkeep_out_m = 1.0\ndrift_periods = 1\nuntil_period = 1\n[orbit]",
+            [0, 1, 2],
+        ),
+        (SENSOR, "range_error_m = 3.0\nangle_error_deg = 0.5", [0, 1, 2]),
+    ],
+)
+def test_norm_of_thrust_is_in_space_if_plans_are_for_all_states_together(
+    old: str, new: str, acting: list[int]
+) -> None:
+    text = problem_text(ARCH).replace(old, new, 1)
+
+    rendezvous = read_text(Rendezvous, text, "planar", ['thrust="ball"'])
+
+    # The faces couple the controls in which they limit the norm.
+    assert acting_controls(rendezvous.output_problem).tolist() == acting
 
 
 def test_figure_of_directions_and_ranges_shows_the_tubes_of_both_plans(tmp_path: Path) -> None:
