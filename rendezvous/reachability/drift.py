@@ -232,13 +232,17 @@ def safe_plan(
 
 
 def _at_own_caps(plan: AffinePlan) -> AffinePlan:
-    """Return the plan with errors proportional to its own largest controls."""
+    """Return the plan with errors proportional to its own largest controls.
+
+    No cap is larger than that of the plan's problem: the errors do not increase, and the plan still
+    keeps all constraints.
+    """
     problem = plan.problem
-    if problem.relative_error is None:
+    if problem.relative_error is None or problem.caps is None:
         return plan
     limits = replace(problem, caps=None).limits
     caps = plan.control_ranges.largest + _CAP_RESERVE * limits
-    return plan.under(replace(problem, caps=np.minimum(limits, caps)))
+    return plan.under(replace(problem, caps=np.minimum(problem.caps, caps)))
 
 
 def _first_safe(search: _Search, free: PlanWithRows) -> _SafePlan:

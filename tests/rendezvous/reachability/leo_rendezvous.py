@@ -22,21 +22,26 @@ def orbit_of(eccentricity: float = 0.0) -> EllipticOrbit:
 
 
 def rendezvous(
-    orbit: EllipticOrbit, behind_m: float = 1000.0, period_s: float = 240.0, limit: float = 1.0
+    orbit: EllipticOrbit,
+    behind_m: float = 1000.0,
+    period_s: float = 240.0,
+    limit: float = 1.0,
+    periods: int = PERIODS,
+    error: Floats = START_ERROR,
 ) -> OutputProblem:
-    """Twelve impulses of 1 mm/s error to a point 150 m behind; position is known to 1 m."""
-    transition, control = impulsive(TschaunerHempel(orbit), PERIODS, period_s)
+    """Impulses of 1 mm/s error to a point 150 m behind; the position is known to 1 m."""
+    transition, control = impulsive(TschaunerHempel(orbit), periods, period_s)
     start = np.array([0.0, -behind_m, 0.0, 0.0, 0.0, 0.0])
     return OutputProblem(
         transition,
         control,
-        np.repeat(np.eye(3, 6)[None], PERIODS, axis=0),
-        np.repeat(np.eye(3)[None], PERIODS, axis=0),
-        Zonotope.box(start - START_ERROR, start + START_ERROR),
+        np.repeat(np.eye(3, 6)[None], periods, axis=0),
+        np.repeat(np.eye(3)[None], periods, axis=0),
+        Zonotope.box(start - error, start + error),
         np.diag(np.repeat([1.0, 50.0], 3)),
         target=np.array([0.0, -150.0, 0.0, 0.0, 0.0, 0.0]),
         execution_error=np.full(3, 1e-3),
-        control_limits=np.full((PERIODS, 3), limit),
+        control_limits=np.full((periods, 3), limit),
     )
 
 

@@ -297,6 +297,18 @@ def test_proportional_errors_are_those_of_the_plan() -> None:
     assert (plan.control_ranges.largest <= plan.problem.caps).all()
 
 
+def test_limits_hold_for_proportional_errors_of_the_plan() -> None:
+    """Three impulses at their limits, which larger errors would exceed."""
+    orbit = orbit_of()
+    problem = rendezvous(orbit, limit=1.2, periods=3)
+    problem = replace(problem, relative_error=np.full(3, 0.08))
+
+    found = safe_plan(problem, PassiveSafety(Coasting(orbit, 240.0, 1, 1), 10.0), 3)
+
+    assert found.plan.control_ranges.largest.max() > 0.99 * 1.2
+    assert found.plan.excess <= 0.0
+
+
 @pytest.mark.thorough
 def test_least_violation_gives_normals_if_those_of_the_free_plan_conflict() -> None:
     orbit = orbit_of()
