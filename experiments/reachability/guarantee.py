@@ -200,6 +200,9 @@ def solve_guarantee(
         progress(0.5)
     progress(0.6)
     checked = _checked_plan(rendezvous, plan, progress)
+    if not rendezvous.has_feedback:
+        # The printed guarantee is that of the plan that is flown.
+        open_loop = checked.plan
     progress(0.9)
     flights = affine_flights(rendezvous, checked.plan, options)
     progress(1.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,11 @@ from infoset.experiments.common.errors import InputError
 from infoset.experiments.common.input_file import read_text
 from infoset.experiments.reachability.command import Reach
 from infoset.experiments.reachability.file import Rendezvous
-from infoset.experiments.reachability.guarantee import guarantee_lines
+from infoset.experiments.reachability.guarantee import (
+    best_plan,
+    guarantee_lines,
+    solve_guarantee,
+)
 from infoset.experiments.reachability.guarantee_figures import draw_guarantee
 from infoset.experiments.reachability.guarantee_flights import flown_problem, motion_of_flights
 from infoset.experiments.reachability.guarantee_page import guarantee_page
@@ -31,6 +36,10 @@ SHORT = ("--set", "periods=4", "--set", "max_impulse_m_s=5.0")
 """Four periods without active limits: the known guarantees 8.5434 and 8.2343, and 5.7698."""
 PRINTED = 1e-4
 """Half a unit of the last digit of the known numbers, and a little more."""
+
+
+def no_progress(_title: str) -> Callable[[float], None]:
+    return lambda _done: None
 
 
 def test_known_guarantees_of_the_arch_rendezvous_are_printed(infoset: Command) -> None:
@@ -501,6 +510,25 @@ def test_guarantee_for_nonlinear_motion_is_greater(infoset: Command) -> None:
     assert found["bound"] is None
     assert found["answered_refusal"] == "only for linear motion"
     assert linear["affine"] < found["affine"] < 1.01 * linear["affine"]
+
+
+def test_guarantee_without_measurements_is_that_of_the_plan_that_is_flown() -> None:
+    text = problem_text("safe-approach")
+    sensor = text[text.index("[sensor]") : text.index("[goal]")]
+    safety = text[text.rindex("[passive_safety]") :]
+    text = text.replace(safety, "").replace(sensor, "")
+    settings = ["nonlinear=true", "periods=3", "max_impulse_m_s=10"]
+    rendezvous = read_text(Rendezvous, text, "blind.toml", settings)
+
+    report = solve_guarantee(rendezvous, Reach(problem="blind", flights=0), no_progress)
+
+    assert report.open_loop is report.plan
+    # The acceleration that is added for the remainder of gravity makes errors larger.
+    linear = best_plan(rendezvous, rendezvous.output_problem).guarantee
+    assert report.plan.guarantee > linear
+    printed = next(guarantee_lines(report))
+    assert f"{report.plan.guarantee:.5g} m" in printed
+    assert f"{linear:.5g} m" not in printed
 
 
 def test_flights_of_nonlinear_motion_are_about_a_central_body(infoset: Command) -> None:
