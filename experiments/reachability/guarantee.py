@@ -73,6 +73,7 @@ class GuaranteeReport:
     """Results of one command; guarantees are in units of the goal's box.
 
     `open_loop` is the best plan without measurements, None if no such plan keeps the constraints.
+    With measurements it is for linear motion and its drifts are not proved.
     `answered`, `bound` and `radius` are None without measured positions and for nonlinear motion;
     `answered` is also None if `refusal` says why there is none. `drifts` are the certain distances
     if the engines fail, None if the problem does not ask for them, and `replanned` are flights that
@@ -462,10 +463,9 @@ def guarantee_lines(report: GuaranteeReport) -> Iterator[str]:
         number = "none" if value is None else f"{factor * value:.5g} {unit}"
         return f"{title:<29}{number:<10}  {note}".rstrip()
 
-    open_loop = None if report.open_loop is None else report.open_loop.guarantee
-    note = "certified" if report.open_loop else "no plan keeps the constraints for all errors"
-    yield line("without measurements", open_loop, note)
     rendezvous = report.rendezvous
+    open_loop = None if report.open_loop is None else report.open_loop.guarantee
+    yield line("without measurements", open_loop, _open_loop_note(report))
     if not rendezvous.has_feedback:
         if rendezvous.sensor is not None:
             yield line("affine feedback", None, "known only in flight: directions without ranges")
@@ -485,6 +485,21 @@ def guarantee_lines(report: GuaranteeReport) -> Iterator[str]:
         note = "only for measured positions"
     yield line("no strategy guarantees less", report.bound, note)
     yield from _further_lines(report)
+
+
+def _open_loop_note(report: GuaranteeReport) -> str:
+    """Return for what the guarantee without measurements holds."""
+    rendezvous = report.rendezvous
+    if report.open_loop is None:
+        return "no plan keeps the constraints for all errors"
+    note = "certified"
+    if report.open_loop is report.plan:
+        return note
+    if rendezvous.nonlinear:
+        note += " for linear motion"
+    if rendezvous.passive_safety is not None:
+        note += ", without [passive_safety]"
+    return note
 
 
 def constraint_times(rendezvous: Rendezvous) -> str:

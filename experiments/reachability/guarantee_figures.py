@@ -54,10 +54,11 @@ def draw_all(report: GuaranteeReport) -> Iterator[Figure]:
 def draw_guarantee(report: GuaranteeReport) -> Figure:
     """Draw the guarantee by the number of measurements, and the tube of the position by time.
 
-    Without a sensor there is only the tube. Flights that are planned again have a panel.
+    Without a sensor there is only the tube, also with safe drifts: the plans with some measurements
+    are not proved to have them. Flights that are planned again have a panel.
     """
     drawn = [_draw_widths]
-    if report.bound is not None:
+    if report.bound is not None and report.rendezvous.passive_safety is None:
         drawn.insert(0, _draw_by_measurements)
     if report.replanned is not None and len(report.replanned.distances):
         drawn.append(_draw_in_flight)

@@ -25,7 +25,12 @@ from infoset.experiments.reachability.guarantee_figures import draw_guarantee
 from infoset.experiments.reachability.guarantee_flights import flown_problem, motion_of_flights
 from infoset.experiments.reachability.guarantee_page import guarantee_page
 from infoset.experiments.reachability.guarantee_report import COMMAND
-from infoset.rendezvous.reachability import IMPULSE, acting_controls, linear_motion
+from infoset.rendezvous.reachability import (
+    IMPULSE,
+    acting_controls,
+    drift_certificate,
+    linear_motion,
+)
 from tests.built_in import problem_text
 from tests.experiments.command_line import Command
 from tests.rendezvous.reachability.leo_rendezvous import orbit_of, two_body
@@ -502,6 +507,24 @@ def test_drifts_after_a_failure_of_the_engines_are_certified(infoset: Command) -
     assert "engines failing after any impulse until t = 4: at least " in out
 
 
+def test_plan_without_measurements_names_what_it_does_not_prove() -> None:
+    settings = ["periods=5", "passive_safety.drift_periods=2"]
+
+    report = COMMAND.report(Reach(problem="safe-approach", settings=settings, flights=0))
+
+    # The best plan without measurements drifts through the ball.
+    assert report.open_loop is not None
+    drifts = drift_certificate(report.open_loop, report.rendezvous.drifts)
+    assert drifts.least_distance < 60.0
+    note = "certified, without [passive_safety]"
+    assert re.fullmatch(
+        rf"without measurements .* m +{re.escape(note)}", next(guarantee_lines(report))
+    )
+    # Plans with some measurements are not proved to have safe drifts.
+    (panel,) = draw_guarantee(report).axes
+    assert panel.get_xlabel().startswith("time, ")
+
+
 def test_guarantee_for_nonlinear_motion_is_greater(infoset: Command) -> None:
     options = ("--set", "periods=3", "--set", "max_impulse_m_s=10", "--flights", "0")
     linear = infoset.json("reach", ARCH, *options)
@@ -539,6 +562,7 @@ def test_flights_of_nonlinear_motion_are_about_a_central_body(infoset: Command) 
 
     assert found["flights"]["outside"] == found["replanned"]["outside"] == 0
     assert "2 flights of affine feedback about a central body, half" in out
+    assert re.search("without measurements +[0-9.]+ m +certified for linear motion\n", out)
     assert "2 flights re-planned in flight about a central body, half" in out
 
 
