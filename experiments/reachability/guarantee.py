@@ -26,6 +26,7 @@ from infoset.rendezvous.reachability import (
     NonlinearPlan,
     NormFaces,
     NoRobustPlanError,
+    NoSolutionError,
     OutputProblem,
     PassiveSafety,
     PlanFlights,
@@ -64,6 +65,8 @@ after it do not follow from its own limit. Chosen: an answer is about as large a
 reaction."""
 _NO_GAIN = 1e-5
 """Part of a guarantee that is not printed: five digits are."""
+_NO_PLAN = (NoRobustPlanError, NoSolutionError, UnboundedCoastError)
+"""Reasons why there is no plan: constraints, the solver, and no bound of nonlinear motion."""
 _RELAXED = 10.0
 """Factor of the bounds of states that shows whether they are the conflict; chosen."""
 
@@ -72,7 +75,7 @@ _RELAXED = 10.0
 class GuaranteeReport:
     """Results of one command; guarantees are in units of the goal's box.
 
-    `open_loop` is the best plan without measurements, None if no such plan keeps the constraints.
+    `open_loop` is the best plan without measurements, None if no such plan was found.
     With measurements it is for linear motion and its drifts are not proved.
     `answered`, `bound` and `radius` are None without measured positions and for nonlinear motion;
     `answered` is also None if `refusal` says why there is none. `drifts` are the certain distances
@@ -95,7 +98,7 @@ class GuaranteeReport:
     def by_measurements(self) -> Floats:
         """The guarantees of affine plans that have only the first k = 0..T measurements.
 
-        NaN if none keeps the constraints. It takes a program for each.
+        NaN if none was found. It takes a program for each.
         """
         problem = self.rendezvous.output_problem
         guarantees = [np.nan if self.open_loop is None else self.open_loop.guarantee]
@@ -103,7 +106,7 @@ class GuaranteeReport:
             try:
                 shorter = first_measurements(problem, count)
                 guarantees.append(best_plan(self.rendezvous, shorter).guarantee)
-            except NoRobustPlanError:
+            except _NO_PLAN:
                 guarantees.append(np.nan)
         return np.array([*guarantees, self.plan.guarantee])
 
@@ -178,9 +181,9 @@ def solve_guarantee(
     open_loop = None
     try:
         open_loop = best_plan(rendezvous, first_measurements(problem, 0))
-    except NoRobustPlanError:
+    except _NO_PLAN as error:
         if not rendezvous.has_feedback:
-            raise _conflict(rendezvous, progress) from None
+            raise _refusal(rendezvous, error, progress) from None
     progress(0.1)
     answered, refusal, bound, radius = None, None, None, None
     if not rendezvous.has_feedback:
@@ -189,8 +192,8 @@ def solve_guarantee(
     else:
         try:
             plan = _feedback(rendezvous, problem)
-        except NoRobustPlanError:
-            raise _conflict(rendezvous, progress) from None
+        except _NO_PLAN as error:
+            raise _refusal(rendezvous, error, progress) from None
         progress(0.3)
         if not rendezvous.nonlinear and rendezvous.sight is None:
             parts = [part.problem for part in independent_parts(problem)]
@@ -419,13 +422,25 @@ def _best_answer(rendezvous: Rendezvous, plan: AffinePlan) -> tuple[float | None
     return None, refusal
 
 
+def _refusal(
+    rendezvous: Rendezvous, error: Exception, progress: Callable[[float], None]
+) -> Exception:
+    """Return the error of a rendezvous without a plan, which says what to change."""
+    if isinstance(error, NoRobustPlanError):
+        return _conflict(rendezvous, progress)
+    if isinstance(error, UnboundedCoastError):
+        return InputError(f"{rendezvous.name}: {error}")
+    # The command adds what to check if a program is not solved.
+    return error
+
+
 def _conflict(rendezvous: Rendezvous, progress: Callable[[float], None]) -> InputError:
     """Return the error of a rendezvous whose constraints no plan keeps, with what to change."""
     found = []
     for done, (name, relaxed) in enumerate(_relaxations(rendezvous)):
         try:
             _feedback(relaxed, relaxed.output_problem)
-        except NoRobustPlanError:
+        except _NO_PLAN:
             continue
         finally:
             progress(1.0 - 0.5 ** (done + 1))
@@ -491,7 +506,7 @@ def _open_loop_note(report: GuaranteeReport) -> str:
     """Return for what the guarantee without measurements holds."""
     rendezvous = report.rendezvous
     if report.open_loop is None:
-        return "no plan keeps the constraints for all errors"
+        return "no plan was found that keeps the constraints for all errors"
     note = "certified"
     if report.open_loop is report.plan:
         return note

@@ -23,6 +23,7 @@ from infoset.rendezvous.reachability.backward import backward_bounds
 from infoset.rendezvous.reachability.bounded_errors import ErrorBounds, with_errors
 from infoset.rendezvous.reachability.closed_loop import ClosedLoopFlight, replan
 from infoset.rendezvous.reachability.coasting import Coasting, CoastTube, UnboundedCoastError
+from infoset.rendezvous.reachability.conic import NoSolutionError
 from infoset.rendezvous.reachability.drift import (
     DriftCertificate,
     PassiveSafety,
@@ -152,6 +153,7 @@ __all__ = [
     "Move",
     "Multipliers",
     "NoRobustPlanError",
+    "NoSolutionError",
     "NonlinearMotion",
     "NonlinearPlan",
     "NormFaces",

@@ -14,6 +14,7 @@ import pytest
 from infoset.arrays import Floats
 from infoset.experiments.common.errors import InputError
 from infoset.experiments.common.input_file import read_text
+from infoset.experiments.reachability import guarantee
 from infoset.experiments.reachability.command import Reach
 from infoset.experiments.reachability.file import Rendezvous
 from infoset.experiments.reachability.guarantee import (
@@ -27,6 +28,11 @@ from infoset.experiments.reachability.guarantee_page import guarantee_page
 from infoset.experiments.reachability.guarantee_report import COMMAND
 from infoset.rendezvous.reachability import (
     IMPULSE,
+    AffinePlan,
+    NoRobustPlanError,
+    NoSolutionError,
+    OutputProblem,
+    UnboundedCoastError,
     acting_controls,
     drift_certificate,
     linear_motion,
@@ -552,6 +558,45 @@ def test_guarantee_without_measurements_is_that_of_the_plan_that_is_flown() -> N
     printed = next(guarantee_lines(report))
     assert f"{report.plan.guarantee:.5g} m" in printed
     assert f"{linear:.5g} m" not in printed
+
+
+@pytest.mark.parametrize("error", [UnboundedCoastError, NoSolutionError, NoRobustPlanError])
+def test_feedback_has_a_guarantee_if_there_is_no_plan_without_measurements(
+    monkeypatch: pytest.MonkeyPatch, error: type[Exception]
+) -> None:
+    def found(rendezvous: Rendezvous, problem: OutputProblem) -> AffinePlan:
+        if not problem.output.any():
+            raise error("none without measurements")
+        return best_plan(rendezvous, problem)
+
+    monkeypatch.setattr(guarantee, "best_plan", found)
+
+    report = COMMAND.report(Reach(problem=ARCH, settings=[SHORT[1], SHORT[3]], flights=0))
+
+    assert report.open_loop is None
+    assert report.plan.guarantee == pytest.approx(8.5434, abs=PRINTED)
+    assert np.isnan(report.by_measurements).tolist() == [True, False, False, False, False]
+    printed = next(guarantee_lines(report))
+    assert printed.endswith("no plan was found that keeps the constraints for all errors")
+
+
+def test_nonlinear_motion_without_a_bound_and_without_a_sensor_is_one_message(
+    infoset: Command,
+) -> None:
+    # A start known to 1 km/s: after 20 minutes the craft may be anywhere about the Earth.
+    text = problem_text("safe-approach")
+    text = text[: text.rindex("[passive_safety]")]
+    text = text.replace(text[text.index("[sensor]") : text.index("[goal]")], "")
+    Path("fast.toml").write_text(text.replace("# nonlinear = true", "nonlinear = true"))
+    settings = ["periods=5", "max_impulse_m_s=3000", "bounds.position_m=1e7"]
+    settings += ["bounds.velocity_m_s=1e4", "initial_error.velocity_m_s=1000"]
+
+    told = infoset.refused("reach", "fast.toml", *(f"--set={each}" for each in settings))
+
+    assert told == (
+        "error: safe-approach: nonlinear motion without control is not proved to stay near the "
+        "target; reduce the errors or the number of periods without control\n"
+    )
 
 
 def test_flights_of_nonlinear_motion_are_about_a_central_body(infoset: Command) -> None:
