@@ -517,6 +517,11 @@ def _open_loop_note(report: GuaranteeReport) -> str:
     return note
 
 
+def _plan_name(rendezvous: Rendezvous) -> str:
+    """Return what the plan of a report is called in texts."""
+    return "affine feedback" if rendezvous.has_feedback else "the plan without measurements"
+
+
 def constraint_times(rendezvous: Rendezvous) -> str:
     """Return the times at which the constraints on states hold for all errors."""
     if rendezvous.path_limits is not None:
@@ -540,7 +545,7 @@ def _further_lines(report: GuaranteeReport) -> Iterator[str]:
         )
     yield f"constraints hold for all errors {constraint_times(rendezvous)}"
     if rendezvous.nonlinear:
-        yield "affine feedback and its ranges hold for the motion about a central body"
+        yield f"{_plan_name(rendezvous)} and its ranges hold for the motion about a central body"
     if report.drifts is None or rendezvous.passive_safety is None:
         return
     safety = rendezvous.passive_safety
@@ -559,7 +564,7 @@ def flight_lines(report: GuaranteeReport) -> Iterator[str]:
     if len(flights.distances):
         share = flights.distances.max() / report.plan.guarantee if report.plan.guarantee else 0.0
         yield (
-            f"{len(flights.distances)} flights of affine feedback{motion}, {bounds}: "
+            f"{len(flights.distances)} flights of {_plan_name(report.rendezvous)}{motion}, {bounds}: "
             f"{flights.outside} outside, worst {100.0 * share:.0f} % of the guarantee"
         )
     replanned = report.replanned

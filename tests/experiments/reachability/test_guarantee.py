@@ -19,6 +19,7 @@ from infoset.experiments.reachability.command import Reach
 from infoset.experiments.reachability.file import Rendezvous
 from infoset.experiments.reachability.guarantee import (
     best_plan,
+    flight_lines,
     guarantee_lines,
     solve_guarantee,
 )
@@ -549,7 +550,7 @@ def test_guarantee_without_measurements_is_that_of_the_plan_that_is_flown() -> N
     settings = ["nonlinear=true", "periods=3", "max_impulse_m_s=10"]
     rendezvous = read_text(Rendezvous, text, "blind.toml", settings)
 
-    report = solve_guarantee(rendezvous, Reach(problem="blind", flights=0), no_progress)
+    report = solve_guarantee(rendezvous, Reach(problem="blind", flights=2), no_progress)
 
     assert report.open_loop is report.plan
     # The acceleration that is added for the remainder of gravity makes errors larger.
@@ -558,6 +559,11 @@ def test_guarantee_without_measurements_is_that_of_the_plan_that_is_flown() -> N
     printed = next(guarantee_lines(report))
     assert f"{report.plan.guarantee:.5g} m" in printed
     assert f"{linear:.5g} m" not in printed
+    lines = [*guarantee_lines(report), *flight_lines(report)]
+    told = "the plan without measurements and its ranges hold for the motion about a central body"
+    assert told in lines
+    assert not any("affine feedback" in line for line in lines)
+    assert "2 flights of the plan without measurements about a central body, half" in lines[-1]
 
 
 @pytest.mark.parametrize("error", [UnboundedCoastError, NoSolutionError, NoRobustPlanError])
