@@ -42,7 +42,6 @@ from tests.built_in import problem_text
 from tests.experiments.command_line import Command
 from tests.rendezvous.reachability.leo_rendezvous import orbit_of, two_body
 
-ROOT = Path(__file__).resolve().parents[3]
 ARCH = "approach-guaranteed"
 SHORT = ("--set", "periods=4", "--set", "max_impulse_m_s=5.0")
 """Four periods without active limits: the known guarantees 8.5434 and 8.2343, and 5.7698."""
@@ -65,9 +64,6 @@ def test_known_guarantees_of_the_arch_rendezvous_are_printed(infoset: Command) -
         ("no strategy guarantees less", "6.0496"),
     ]
     assert "reacts to the last 4 measurements" in out
-    # The page shows the same lines; the other numbers depend on the solver's choice of a plan.
-    page = (ROOT / "docs" / "guaranteed-rendezvous.md").read_text(encoding="utf-8")
-    assert "\n".join(out.splitlines()[:6]) in page
     assert "100 flights of affine feedback" in out
     assert ": 0 outside, worst" in out
     assert "\nconstraints hold for all errors at all times\n" in out
