@@ -112,7 +112,7 @@ def _draw_outline(axes: Axes, half_m: float, body: Body, t_rad: float | None) ->
         label = f"body, {longer_m:g} m x {shorter_m:g} m"
     if body.is_turned_by_chance:
         axes.plot(
-            *ring(longer_m), zorder=0.7, label=f"its longer semi-axis, {longer_m:g} m", **RADIUS
+            *ring(longer_m), zorder=0.7, label=f"body, longer semi-axis, {longer_m:g} m", **RADIUS
         )
         label = f"body, shorter semi-axis, {shorter_m:g} m"
     if shorter_m > half_m:

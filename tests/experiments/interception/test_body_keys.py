@@ -110,5 +110,5 @@ def test_plane_shows_both_axes_of_an_unknown_direction() -> None:
     cloud = Cloud("runs", across_m, np.hypot(*across_m.T), hits=30)
     (axes,) = draw_b_plane([cloud], Body(semi_axes_m=(30.0, 20.0))).axes
     _, labels = axes.get_legend_handles_labels()
-    assert "its longer semi-axis, 30 m" in labels
+    assert "body, longer semi-axis, 30 m" in labels
     assert "body, shorter semi-axis, 20 m" in labels
