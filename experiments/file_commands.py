@@ -44,10 +44,11 @@ MagnitudeText = Annotated[
     str | None,
     typer.Option(
         "--magnitude",
-        metavar="H=H,limit=V,phase=DEG",
+        metavar="H=MAG,limit=MAG,phase=DEG",
         help=(
             "Print the first image in which the body is bright enough: from its absolute magnitude "
-            "H, the limiting magnitude of the camera and the phase angle, deg."
+            "H, the limiting magnitude of the camera and the phase angle, deg (default: "
+            "camera.phase_angle_deg)."
         ),
     ),
 ]
@@ -237,7 +238,7 @@ class _Checked(NamedTuple):
 
 
 def _checked_scenario(file: str, settings: Sequence[str] | None, magnitude: str | None) -> _Checked:
-    from infoset.experiments.interception.first_image import first_image, read_magnitude
+    from infoset.experiments.interception.first_image import first_image
     from infoset.experiments.interception.scenario_file import (
         all_warnings,
         brightness_json,
@@ -257,7 +258,7 @@ def _checked_scenario(file: str, settings: Sequence[str] | None, magnitude: str 
     }
     facts = flight_facts(scenario)
     if magnitude is not None:
-        first = first_image(scenario, read_magnitude(magnitude))
+        first = first_image(scenario, magnitude)
         keys["first_image"] = first
         facts = [*facts, str(first)]
     return _Checked(

@@ -18,9 +18,9 @@ FACTOR_PER_MAGNITUDE = 10.0**0.2
 square."""
 _CONSTANTS = ((3.332, 0.631, 0.986), (1.862, 1.218, 0.238))
 """A, B and C of the phase functions 1 and 2 (Bowell and others 1989)."""
-_MAGNITUDE = Limits(minimum=-30.0, maximum=60.0)
+MAGNITUDE = Limits(minimum=-30.0, maximum=60.0)
 """Limits of a magnitude: from that of the Sun to that of a grain of dust."""
-_PHASE_DEG = Limits(minimum=0.0, maximum=120.0)
+PHASE_DEG = Limits(minimum=0.0, maximum=120.0)
 """Limits of a phase angle, deg: the function was fitted to smaller ones (Bowell and others
 1989)."""
 
@@ -40,9 +40,9 @@ class Magnitude(Checked):
         Phase angle, between the Sun and the camera seen from the body, deg.
     """
 
-    absolute: Annotated[float, _MAGNITUDE]
-    limit: Annotated[float, _MAGNITUDE]
-    phase_deg: Annotated[float, _PHASE_DEG]
+    absolute: Annotated[float, MAGNITUDE]
+    limit: Annotated[float, MAGNITUDE]
+    phase_deg: Annotated[float, PHASE_DEG]
 
     def distance_m(self, sun_distance_m: float) -> float:
         """Return the distance of the camera at which the body has the limiting magnitude, m.

@@ -11,14 +11,56 @@ from tests.experiments.command_line import Command
 
 def test_check_prints_the_first_image_and_its_error(infoset: Command) -> None:
     code, out, _ = infoset(
+        "scenarios", "check", "haiv-2013", "--magnitude", "H=23.8,limit=9,phase=40"
+    )
+    assert code == 0
+    # 10^((9 - 23.8 - 1.5807) / 5) au at 11.5 km/s is 6886 s.
+    assert out.splitlines()[-1] == (
+        "first image by the magnitude, 1 au from the Sun: camera.first_image_s = 6890 (115 "
+        "min before the arrival); an error of one magnitude is a factor of 1.6: 72.4 min to 3.03 h"
+    )
+
+
+def test_all_images_are_bright_enough_if_the_first_one_is_before_the_start(
+    infoset: Command,
+) -> None:
+    code, out, _ = infoset(
         "scenarios", "check", "haiv-2013", "--magnitude", "H=23.8,limit=11,phase=40"
     )
     assert code == 0
-    # 10^((11 - 23.8 - 1.5807) / 5) au at 11.5 km/s
+    # Two magnitudes fainter: 10^(2 / 5) times as early as above, and the flight takes 2 h.
     assert out.splitlines()[-1] == (
-        "first image by the magnitude, 1 au from the Sun: camera.first_image_s = 17300 (4.81 h "
-        "before the arrival); an error of one magnitude is a factor of 1.6: 3.03 h to 7.62 h"
+        "first image by the magnitude, 1 au from the Sun: the body has the limiting magnitude 11 "
+        "4.81 h before the arrival, before the start of the flight: all images are bright enough "
+        "(an error of one magnitude is a factor of 1.6: 3.03 h to 7.62 h)"
     )
+
+
+def test_key_of_the_first_image_is_that_of_the_sensor(infoset: Command) -> None:
+    asked = ("scenarios", "check", "asteroid-1997", "--json", "--magnitude")
+    _, out, _ = infoset(*asked, "H=20,limit=-3,phase=0")
+    found = json.loads(out)["first_image"]
+    assert (found["key"], found["before_start"]) == ("angle_sensor.first_image_s", False)
+
+
+LIT = ("--set", "camera.phase_angle_deg=60", "--set", "camera.sun_angle_deg=0")
+
+
+def test_phase_angle_of_the_file_is_the_default(infoset: Command) -> None:
+    asked = ("scenarios", "check", "haiv-2013", "--json", *LIT, "--magnitude")
+    found = []
+    for text in ("H=23.8,limit=9", "H=23.8,limit=9,phase=60"):
+        _, out, _ = infoset(*asked, text)
+        found.append(json.loads(out)["first_image"]["first_image_s"])
+    default_s, asked_s = found
+    assert default_s == asked_s
+
+
+def test_phase_angle_that_is_not_that_of_the_file_is_refused(infoset: Command) -> None:
+    message = infoset.refused(
+        "scenarios", "check", "haiv-2013", *LIT, "--magnitude", "H=23.8,limit=9,phase=10"
+    )
+    assert "--magnitude: phase is 10, camera.phase_angle_deg is 60" in message
 
 
 def test_distance_of_the_sun_is_that_of_the_file(infoset: Command) -> None:
@@ -35,11 +77,13 @@ def test_distance_of_the_sun_is_that_of_the_file(infoset: Command) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("H=23.8,limit=11", "must be three numbers, for example H=23.8,limit=11,phase=40"),
+        ("H=23.8,limit=11", "phase is missing: write it, for example H=23.8,limit=11,phase=40"),
+        ("H=23.8,phase=40", "must be three numbers, for example H=23.8,limit=11,phase=40"),
+        ("H=23.8,limit=11,phase=40,size=3", "must be three numbers"),
         ("H=23.8,limit=11,phase=40,phase=50", "must be three numbers"),
         ("H=bright,limit=11,phase=40", "must be three numbers"),
-        ("H=23.8,limit=11,phase=140", "phase_deg must be at most 120: got 140.0"),
-        ("H=23.8,limit=nan,phase=40", "limit must be finite"),
+        ("H=23.8,limit=11,phase=140", "--magnitude: phase must be at most 120: got 140"),
+        ("H=23.8,limit=nan,phase=40", "--magnitude: limit must be a finite number: got nan"),
     ],
 )
 def test_mistaken_magnitude_is_refused(infoset: Command, text: str, message: str) -> None:
