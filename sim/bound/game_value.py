@@ -82,7 +82,7 @@ def why_no_value(scenario: Scenario) -> tuple[str, ...]:
         # An impulse must shift all possible misses alike, and before the next measurement.
         "impulses with errors": thruster.execution_error_relative > 0.0,
         "impulses with a delay": thruster.delay_steps > 0,
-        "burns, which are no instantaneous impulses": thruster.acceleration_m_s2 is not None,
+        "burns that take time": thruster.acceleration_m_s2 is not None,
         # In the paper's model the set can lose the true state, and symmetric-miss guarantees
         # nothing.
         "model paper": not model.is_guaranteed,
