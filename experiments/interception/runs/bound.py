@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -31,7 +31,9 @@ from infoset.experiments.interception.scenario_file import study_scenario
 from infoset.experiments.interception.strategies import chosen_strategies
 from infoset.experiments.interception.study import max_guarantee_m, some_wrong_images
 from infoset.guidance import Strategy
-from infoset.sim import Record, Results, Scenario
+from infoset.model import StateBox
+from infoset.sensors import Camera
+from infoset.sim import Body, Record, Results, Scenario
 from infoset.sim.bound.game_value import ValueReserve, value_reserve, why_no_value
 from infoset.sim.bound.lower_bound import LowerBound, lower_bound, pair_at
 from infoset.sim.bound.pair_flight import PairFlight, fly_pair
@@ -372,7 +374,7 @@ def _bound_parts(
     bound_m = number(lower.bound_m)
     line = (
         f"{scenario.name}, model {model.model.value}: no strategy can guarantee a miss below "
-        f"{bound_m} m"
+        f"{bound_m} m for all starts in [uncertainty]"
     )
     if model.wrong_images:
         line += (
@@ -381,13 +383,13 @@ def _bound_parts(
         )
     yield line
     if scenario.body is not None:
-        body = f"the body of radius {scenario.radius_m:g} m"
-        if not scenario.body.is_sphere_around_aim:
-            body = f"the body, within {scenario.body.certain_miss_m:.4g} m of the aim point,"
-        if lower.bound_m > scenario.body.certain_miss_m:
-            yield f"a hit of {body} cannot be guaranteed by any strategy"
-        else:
-            yield f"this does not exclude a strategy that guarantees a hit of {body}"
+        yield _body_line(scenario.body, lower.bound_m)
+    if _starts_nearer(scenario):
+        yield (
+            "the simulated runs start in [dispersion], which is narrower: their misses can be "
+            "smaller"
+        )
+    yield from _attitude_lines(scenario)
     yield (
         f"at the range {nominal.label_m / M_PER_KM:.1f} km and closing speed "
         f"{-nominal.vx_m_s / M_PER_KM:g} km/s, the nominal ones: {number(nominal.bound_m)} m"
@@ -417,6 +419,53 @@ def _bound_parts(
     yield bounds
     yield from _wrong_image_lines(scenario, lower.pair)
     yield ""
+
+
+def _body_line(body: Body, bound_m: float) -> str:
+    """Return whether a strategy can guarantee a hit of the body, as far as the bound says it."""
+    far = f"{body.certain_miss_m:.4g} m"
+    text = f"the body, which extends up to {far} from the aim point"
+    far_text = f"it extends at most {far} from the aim point"
+    if body.is_turned_by_chance:
+        text = f"the body in all directions of the ellipse, up to {far} from the aim point"
+        far_text = f"a miss of more than {far} does not hit in all directions of the ellipse"
+
+    near = f"the body: a miss of at most {body.inscribed_m:.4g} m hits"
+    if body.is_sphere_around_aim:
+        near = f"the body of radius {body.inscribed_m:g} m"
+
+    if bound_m <= body.inscribed_m:
+        return f"this does not exclude a strategy that guarantees a hit of {near}"
+    if bound_m <= body.certain_miss_m:
+        return f"no statement about a hit: a miss of {number(bound_m)} m can hit {text}"
+    if body.is_sphere_around_aim:
+        return f"a hit of {near} cannot be guaranteed by any strategy"
+    return f"a hit of the body cannot be guaranteed by any strategy: {far_text}"
+
+
+def _starts_nearer(scenario: Scenario) -> bool:
+    """Whether the starts of simulated runs are in a part of the uncertainty only."""
+    for field in fields(StateBox):
+        known = getattr(scenario.uncertainty, field.name)
+        true = getattr(scenario.dispersion, field.name)
+        if known is not None and (known[0] < true[0] or true[1] < known[1]):
+            return True
+    return False
+
+
+def _attitude_lines(scenario: Scenario) -> Iterator[str]:
+    """Yield lines about the errors of the attitude of a camera."""
+    sensor = scenario.bearing_sensor
+    if sensor.misalignment_rad > 0.0:
+        yield (
+            "the misalignment of the camera is left out: the bound is that of an aligned camera, "
+            "and a misaligned one can only make it greater"
+        )
+    if isinstance(sensor, Camera) and sensor.drift_rad > 0.0:
+        yield (
+            "the drift of the camera is an error like that of the pixel: it may change from image "
+            "to image; of a drift that changes slowly nothing is proved"
+        )
 
 
 def _wrong_image_lines(scenario: Scenario, pair: TruthPair) -> Iterator[str]:

@@ -15,7 +15,7 @@ from infoset.experiments.interception.figures.bound import draw_bound
 from infoset.experiments.interception.runs import bound
 from infoset.experiments.interception.scenario_file import load_scenario
 from infoset.guidance import strategy_names
-from infoset.sim import Scenario
+from infoset.sim import Body, Scenario
 from infoset.sim.bound.lower_bound import LowerBound, lower_bound, pair_at
 from infoset.sim.scenario import of_model
 from infoset.sim.storage.codec import fingerprint
@@ -159,8 +159,8 @@ def test_bound_with_wrong_images_names_them_and_the_bound_without(
     bound_m = found["lower_bound_m"]
     heading, *_ = out.splitlines()
     assert heading.endswith(
-        f"below {bound_m:.3g} m with 1 wrong image in a flight ({planar.bound_m:.3g} m without "
-        "wrong images)"
+        f"below {bound_m:.3g} m for all starts in [uncertainty] with 1 wrong image in a flight "
+        f"({planar.bound_m:.3g} m without wrong images)"
     )
     ((last_s,), (before_s,)) = found["reached_at"]["wrong_images_before_arrival_s"]
     assert last_s == found["reached_at"]["alike_until_before_arrival_s"]
@@ -190,6 +190,68 @@ def test_the_bound_alone_names_the_body(
     assert "symmetric-miss" not in out
     found = json.loads(Path("bound.json").read_text())
     assert (found["strategies"], found["hit_cannot_be_guaranteed"]) == ([], share < 1.0)
+
+
+@pytest.mark.parametrize(
+    ("angle_rad", "bound_m", "line"),
+    [
+        (
+            0.0,
+            30.0,
+            "this does not exclude a strategy that guarantees a hit of the body: a miss of at most "
+            "36 m hits",
+        ),
+        (
+            0.0,
+            40.0,
+            "no statement about a hit: a miss of 40 m can hit the body, which extends up to 60 m "
+            "from the aim point",
+        ),
+        (
+            0.0,
+            70.0,
+            "a hit of the body cannot be guaranteed by any strategy: it extends at most 60 m from "
+            "the aim point",
+        ),
+        (
+            None,
+            40.0,
+            "a hit of the body cannot be guaranteed by any strategy: a miss of more than 36 m does "
+            "not hit in all directions of the ellipse",
+        ),
+    ],
+)
+def test_bound_says_what_it_means_for_an_ellipse(
+    angle_rad: float | None, bound_m: float, line: str
+) -> None:
+    body = Body(semi_axes_m=(60.0, 36.0), axis_angle_rad=angle_rad)
+    assert bound._body_line(body, bound_m) == line
+
+
+NARROWER = "the simulated runs start in [dispersion], which is narrower"
+
+
+@pytest.mark.usefixtures("known")
+def test_bound_is_for_all_starts_and_says_that_runs_start_nearer(
+    infoset: Command, short_file: Path
+) -> None:
+    asked = ("bound", short_file, "--budget", 0)
+    _, out, _ = infoset(*asked)
+    assert "m for all starts in [uncertainty]\n" in out
+    assert NARROWER not in out
+
+    _, out, _ = infoset(*asked, "--set", "dispersion.z_m=[-100, 1000]")
+    assert f"{NARROWER}: their misses can be smaller\n" in out
+
+
+def test_bound_names_the_errors_of_the_attitude() -> None:
+    aligned = load_scenario("haiv-2013")
+    assert [*bound._attitude_lines(aligned)] == []
+
+    settings = ["camera.misalignment_urad=7", "camera.drift_urad=2"]
+    misaligned, drifting = bound._attitude_lines(load_scenario("haiv-2013", settings))
+    assert misaligned.startswith("the misalignment of the camera is left out")
+    assert drifting.startswith("the drift of the camera is an error like that of the pixel")
 
 
 @pytest.mark.usefixtures("known")
