@@ -46,8 +46,12 @@ def run(options: Options) -> None:
         if options.runs == NEEDED:
             options = replace(options, runs=needed_runs(options, required))
         runs = _runs(options, required)
-        most = runs.max_runs if isinstance(runs, RunsUntil) else runs
-        notes += needed_notes(required, most // noises_at_once(options))
+        most = runs
+        option = "--runs"
+        if isinstance(runs, RunsUntil):
+            most = runs.max_runs
+            option = "--max-runs"
+        notes += needed_notes(required, most // noises_at_once(options), option)
         swept = Campaign(
             scenario,
             runs,

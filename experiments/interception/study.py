@@ -356,21 +356,21 @@ def certain_hits_text(results: Results, scenario: Scenario) -> str:
     return "; ".join(texts)
 
 
-def needed_notes(required: AnyRequirement, runs: int) -> list[str]:
+def needed_notes(required: AnyRequirement, runs: int, option: str = "--runs") -> list[str]:
     """Return a line about the runs of a noise that a requirement needs; none if `runs` are enough.
 
-    Runs are enough if they can decide also after looks at the results.
+    Runs are enough if they can decide also after looks at the results. `option` gives their number.
     """
     needed = least_runs(required.share, watched=True)
     if runs >= needed:
         return []
-    all_runs = "all hits"
+    all_runs = "if all hit"
     if not isinstance(required, HitRequirement) or required.cause is not None:
-        all_runs = "all of which satisfy it"
+        all_runs = "if all satisfy it"
     fixed = least_runs(required.share, watched=False)
     return [
         f"{required} needs at least {needed} runs of each noise, {all_runs} ({fixed} if the number "
-        f"is fixed before the first run); you asked for {runs}"
+        f"is fixed before the first run); {option} gives {runs}"
     ]
 
 

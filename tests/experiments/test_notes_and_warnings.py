@@ -146,14 +146,16 @@ def test_outlook_names_what_the_hits_show_and_the_runs_that_show_more(
 def test_needed_runs_are_named_if_the_asked_ones_are_too_few() -> None:
     asked = HitRequirement(0.99)
     assert needed_notes(asked, 100) == [
-        "hit>=0.99 needs at least 535 runs of each noise, all hits (368 if the number is fixed "
-        "before the first run); you asked for 100"
+        "hit>=0.99 needs at least 535 runs of each noise, if all hit (368 if the number is "
+        "fixed before the first run); --runs gives 100"
     ]
+    (decided,) = needed_notes(asked, 100, "--max-runs")
+    assert decided.endswith("; --max-runs gives 100")
     assert needed_notes(asked, 534)
     assert needed_notes(asked, 535) == []
     (quantile,) = needed_notes(parse_requirement("miss_m p90<10"), 20)
     assert quantile.startswith(
-        "miss_m p90<10 needs at least 51 runs of each noise, all of which satisfy it (36 if "
+        "miss_m p90<10 needs at least 51 runs of each noise, if all satisfy it (36 if "
     )
 
 
