@@ -71,9 +71,9 @@ FIGURE = "figure-distributions"
 FIGURE_OF_PAPER = "figure-4-distributions"
 CORRIDOR = "figure-corridor"
 LEVELS = {"p50_m_s": 0.5, "p99_m_s": 0.99}
-"""Levels of the quantiles of a burn, by key in JSON."""
-MAX_BURN_ROWS = 20
-"""Maximum number of burns of a curve in the table: four curves then fill two screens."""
+"""Levels of the quantiles of an impulse, by key in JSON."""
+MAX_IMPULSE_ROWS = 20
+"""Maximum number of impulses of a curve in the table: four curves then fill two screens."""
 
 
 class _ChosenNoise(NamedTuple):
@@ -215,7 +215,7 @@ def _curve_json(
     keys = _key(scenario, curve) | hit_key(results.hits, results.missed)
     if results.redrawn_share is not None:
         keys["redrawn_share"] = results.redrawn_share
-    keys |= burns_key(scenario, results)
+    keys |= impulses_key(scenario, results)
     if remedies is not None:
         keys["remedies"] = remedies
     return keys | outcome_columns(results)
@@ -242,7 +242,7 @@ def _csv(scenario: Scenario, curves: Sequence[Curve]) -> str:
 def _parts(
     scenario: Scenario, curves: Sequence[Curve], remedies: Mapping[int, Sequence[Remedy]]
 ) -> Iterator[Part]:
-    """Yield the quantiles, the burns, and lines about hits, sets and noises, for the screen."""
+    """Yield the quantiles, the impulses, and lines about hits, sets and noises."""
     runs = len(curves[0].results)
     yield (
         f"{scenario.name}: quantiles of {some_runs(runs)} per {_heading(scenario)}; game noise "
@@ -250,13 +250,13 @@ def _parts(
     )
     yield _quantile_table(scenario, curves)
 
-    burns = 0
+    times = 0
     if scenario.thruster.is_scheduled:
-        burns = len(scenario.impulse_steps or ())
-    if burns > MAX_BURN_ROWS:
-        yield f"impulses at {burns} times: --json has the quantiles of each"
-    elif burns:
-        yield burn_table(scenario, curves)
+        times = len(scenario.impulse_steps or ())
+    if times > MAX_IMPULSE_ROWS:
+        yield f"impulses at {times} times: --json has the quantiles of each"
+    elif times:
+        yield impulse_table(scenario, curves)
 
     counts = SetCounts()
     for curve in curves:
@@ -319,42 +319,42 @@ def _heading(scenario: Scenario) -> str:
     return "curve" if is_of_paper(scenario) else "noise"
 
 
-def burns_key(scenario: Scenario, results: Results) -> dict[str, list[dict[str, float | None]]]:
-    """Return the key `burns` of a curve in JSON; no key without a schedule of impulses.
+def impulses_key(scenario: Scenario, results: Results) -> dict[str, list[dict[str, float | None]]]:
+    """Return the key `impulses` of a curve in JSON; no key without a schedule of impulses.
 
-    Each burn has its time, quantiles of its size, and its share of all impulses of all runs, None
-    without any impulse.
+    Each impulse has its time, quantiles of its size, and its share of all impulses of all runs,
+    None without any impulse.
     """
     if results.burns_m_s is None:
         return {}
     whole = float(results.burns_m_s.sum())
-    burns = []
+    impulses = []
 
     for step, sizes in zip(scenario.impulse_steps or [], results.burns_m_s.T, strict=True):
-        burn: dict[str, float | None] = {
+        impulse: dict[str, float | None] = {
             "before_arrival_s": scenario.nominal_arrival_s - step * scenario.set_model.step_s
         }
-        burn |= zip(LEVELS, shown_quantiles(sizes, [*LEVELS.values()]), strict=True)
-        burn["share"] = float(sizes.sum()) / whole if whole > 0.0 else None
-        burns.append(burn)
+        impulse |= zip(LEVELS, shown_quantiles(sizes, [*LEVELS.values()]), strict=True)
+        impulse["share"] = float(sizes.sum()) / whole if whole > 0.0 else None
+        impulses.append(impulse)
 
-    return {"burns": burns}
+    return {"impulses": impulses}
 
 
-def burn_table(scenario: Scenario, curves: Sequence[Curve]) -> Table:
-    """Return the table of the burns of all curves."""
-    titles = ("burn, s before arrival", "p50, m/s", "p99, m/s", "share of impulse, %")
+def impulse_table(scenario: Scenario, curves: Sequence[Curve]) -> Table:
+    """Return the table of the impulses of a schedule, of all curves."""
+    titles = ("impulse, s before arrival", "p50, m/s", "p99, m/s", "share of impulse, %")
     table = number_table(_heading(scenario), *titles, left=1)
     for curve in curves:
         case = case_title(curve.noise, curve.range_sensor)
         if is_of_paper(scenario):
             case = f"{curve.number} {case}"
-        for burn in burns_key(scenario, curve.results).get("burns", []):
-            share = burn["share"]
+        for impulse in impulses_key(scenario, curve.results).get("impulses", []):
+            share = impulse["share"]
             table.add_row(
                 case,
-                f"{burn['before_arrival_s']:g}",
-                *(number(burn[key]) for key in LEVELS),
+                f"{impulse['before_arrival_s']:g}",
+                *(number(impulse[key]) for key in LEVELS),
                 number(None if share is None else 100.0 * share),
             )
 
