@@ -51,28 +51,30 @@ class Body(Checked):
     def __post_init__(self) -> None:
         super().__post_init__()
         if (self.radius_m is None) == (self.semi_axes_m is None):
-            given = "neither" if self.radius_m is None else "both"
+            given = "neither"
+            if self.radius_m is not None:
+                given = "both; in a copy of a built-in file, delete the line of radius_m"
             raise ValueError(
-                f"body must have radius_m, of a sphere, or semi_axes_m, of an ellipse: got {given}"
+                f"Body: set either radius_m (sphere) or semi_axes_m (ellipse): got {given}"
             )
         axes = self.semi_axes_m
         if axes is not None and (len(axes) != 2 or axes[0] < axes[1]):
             raise ValueError(
-                "body.semi_axes_m must be two numbers, the longer semi-axis first: got "
+                "Body: semi_axes_m must be two numbers, the longer semi-axis first: got "
                 f"{list(axes)!r}"
             )
         if axes is None and self.axis_angle_rad is not None:
             raise ValueError(
-                "body.axis_angle_rad is the direction of an ellipse: set semi_axes_m, or leave it "
-                "out"
+                "Body: axis_angle_rad is the direction of an ellipse: set semi_axes_m, or leave "
+                "axis_angle_rad out"
             )
         if self.aim_m is None:
             return
         if len(self.aim_m) != 2:
-            raise ValueError(f"body.aim_m must be two numbers: got {list(self.aim_m)!r}")
+            raise ValueError(f"Body: aim_m must be two numbers: got {list(self.aim_m)!r}")
         if not self.inscribed_m > 0.0:
             raise ValueError(
-                f"body.aim_m must be inside the body for all its possible directions: got "
+                f"Body: aim_m must be inside the body for all its possible directions: got "
                 f"{list(self.aim_m)!r}"
             )
 

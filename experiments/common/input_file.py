@@ -363,7 +363,7 @@ class _Reading:
         else:
             text = details["msg"].removeprefix("Value error, ")
             text = text.replace("Input should be", "must be")
-            text = re.sub(r"^[A-Z]\w+: ", "", text)  # the name of a class
+            text = self._in_degrees(re.sub(r"^[A-Z]\w+: ", "", text))  # the name of a class
 
         name, _, rest = text.partition(" ")
         written = self._written.get((*path, name))
@@ -375,6 +375,14 @@ class _Reading:
             text = f"number {int(path[-1]) + 1} {text}"
             path = path[:-1]
         self._faults.setdefault(path, text)
+
+    def _in_degrees(self, text: str) -> str:
+        """Return a message with the keys of angles in degrees, unless the file has them in rad."""
+        written = {key for key, _ in self._written.values()}
+        for name in re.findall(r"\w+_angle_rad\b", text):
+            if name not in written:
+                text = text.replace(name, f"{name.removesuffix('_rad')}_deg")
+        return text
 
     def _line(self, path: KeyPath, text: str) -> str:
         """Return a fault with its key as written and its value.

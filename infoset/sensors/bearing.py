@@ -378,11 +378,17 @@ class Camera(BearingSensor):
                 "Camera: phase_angle_rad and sun_angle_rad must both be set, or neither: "
                 f"{missing} is missing"
             )
-        if self.phase_angle_rad is None and not self.phase_correction:
-            raise ValueError(
-                "Camera: phase_correction = false needs phase_angle_rad and sun_angle_rad, from "
-                "which the offset follows: set them, or leave phase_correction out"
-            )
+        if self.phase_angle_rad is not None:
+            return
+        for name, is_set in (
+            ("phase_correction", not self.phase_correction),
+            ("brightness", self.brightness is not Brightness.MEAN),
+        ):
+            if is_set:
+                raise ValueError(
+                    f"Camera: {name} needs phase_angle_rad and sun_angle_rad, from which the "
+                    f"offset follows: set them, or leave {name} out"
+                )
 
     @property
     def constant_error_rad(self) -> float:

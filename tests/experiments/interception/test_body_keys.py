@@ -50,7 +50,20 @@ def test_ellipse_has_its_lines_and_columns(infoset: Command, own: Path) -> None:
 
 def test_aim_point_outside_is_refused_with_its_key(infoset: Command, own: Path) -> None:
     message = infoset.refused("experiment", own, "--set", "body.aim_m=[40, 0]")
-    assert "body.aim_m must be inside the body for all its possible directions" in message
+    assert "body: aim_m must be inside the body for all its possible directions" in message
+
+
+def test_messages_name_the_keys_of_the_file(infoset: Command) -> None:
+    asked = ("scenarios", "check", "haiv-2013", "--set")
+    assert ": body: set either radius_m (sphere) or semi_axes_m (ellipse): got both" in (
+        infoset.refused(*asked, "body.semi_axes_m=[60, 38]")
+    )
+    assert ": body: axis_angle_deg is the direction of an ellipse" in (
+        infoset.refused(*asked, "body.axis_angle_deg=10")
+    )
+    assert ": body: axis_angle_rad is the direction of an ellipse" in (
+        infoset.refused(*asked, "body.axis_angle_rad=0.1")
+    )
 
 
 def test_bound_excludes_a_hit_only_outside_the_body(infoset: Command, own: Path) -> None:

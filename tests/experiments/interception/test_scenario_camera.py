@@ -89,8 +89,19 @@ def test_measurements_after_the_last_impulse_are_warned_of() -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"camera__phase_angle_deg": "60"}, "sun_angle_rad is missing"),
-        ({"camera__phase_correction": "false"}, "needs phase_angle_rad and sun_angle_rad"),
+        (
+            {"camera__phase_angle_deg": "60"},
+            "camera: phase_angle_deg and sun_angle_deg must both be set, .* sun_angle_deg is miss",
+        ),
+        (
+            {"camera__phase_angle_rad": "1"},
+            "camera: phase_angle_rad and sun_angle_deg must both be set, .* sun_angle_deg is miss",
+        ),
+        (
+            {"camera__phase_correction": "false"},
+            "camera: phase_correction needs phase_angle_deg and sun_angle_deg",
+        ),
+        ({"camera__brightness": "lambert"}, "camera: brightness needs phase_angle_deg and sun_ang"),
         (
             {"camera__phase_angle_deg": "60", "camera__sun_angle_deg": "90"},
             "needs the radius of the body",

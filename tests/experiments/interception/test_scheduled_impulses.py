@@ -53,10 +53,8 @@ def test_impulses_are_columns_of_the_results() -> None:
     assert without.burns_m_s is None
     assert join([without, without]).take(np.array([1])).burns_m_s is None
     idle = simulate(load_scenario("asteroid-1997", [*SETTINGS, "thruster.budget_m_s=0.0"]), 2)
-    assert [impulse["share"] for impulse in impulses_key(scenario, idle)["impulses"]] == [
-        None,
-        None,
-    ]
+    of_idle = impulses_key(scenario, idle)["impulses"]
+    assert [impulse["share"] for impulse in of_idle] == [None, None]
 
 
 def test_many_impulses_are_only_in_json(infoset: Command) -> None:
