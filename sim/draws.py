@@ -140,7 +140,7 @@ def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
     tie = np.broadcast_to(0.0, (len(axes), len(runs), steps))
     if scenario.noise is NoiseKind.GAME and scenario.tie is TieRule.RANDOM:
         tie = lateral(TIE)
-    thruster = scenario.thruster
+    thruster = scenario.engine
     camera = scenario.bearing_sensor
     turned = None
     if camera.misalignment_rad > 0.0:
@@ -277,7 +277,7 @@ def max_number_of_steps(scenario: Scenario) -> int:
     box = scenario.dispersion
     slowest = -box.vx_m_s[1]
     model = scenario.set_model
-    model = with_gravity(model, scenario.sun, max_impulses_m_s(model, scenario.thruster))
+    model = with_gravity(model, scenario.sun, max_impulses_m_s(model, scenario.engine))
     speed_change = min(model.gravity_speed_change, MAX_SPEED_CHANGE)
     longer = max(MIN_SLOWDOWN, 1.0 / (1.0 - speed_change))
     return math.ceil(longer * box.x_m[1] / (slowest * model.step_s)) + 2

@@ -283,7 +283,7 @@ class Engagements:
             step_s=self.scenario.set_model.step_s,
             predicted_miss=miss,
             budget_left_m_s=impulses.budget_left_m_s.copy(),
-            thruster=self.scenario.thruster,
+            thruster=self.scenario.engine,
             closing_speed_m_s=self.scenario.set_model.closing_speed_m_s,
             measured=instruments.latest,
             last_impulse_m_s=impulses.last_m_s.copy(),
@@ -301,7 +301,7 @@ class Engagements:
         """Return the executed impulses."""
         size = self._draws.execution
         direction = self._draws.pointing
-        return self.scenario.thruster.executed(
+        return self.scenario.engine.executed(
             impulse,
             None if size is None else size[:, self.step],
             None if direction is None else direction[:, self.step],

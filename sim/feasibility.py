@@ -57,7 +57,7 @@ def feasibility(scenario: Scenario) -> Feasibility | None:
     A start is beyond an engine that corrects less than its miss minus the radius of the body.
     """
     model = scenario.set_model
-    thruster = scenario.thruster
+    thruster = scenario.engine
     arrival_s = scenario.nominal_arrival_s
     if arrival_s > MAX_STEPS * model.step_s:
         return None

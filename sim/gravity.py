@@ -20,7 +20,7 @@ above the change by gravity in the 1997 scenario, and far above rounding errors.
 
 def on_board_model(scenario: Scenario) -> SetModel:
     """Return the set model of a scenario with the bounds of gravity and of the engine's errors."""
-    thruster = scenario.thruster
+    thruster = scenario.engine
     model = replace(
         scenario.set_model,
         execution_error_relative=thruster.execution_error_relative,

@@ -43,7 +43,7 @@ class ImpulseQueue:
 
     def __init__(self, scenario: Scenario, lateral: tuple[int, int]) -> None:
         batch = lateral[1]
-        thruster = scenario.thruster
+        thruster = scenario.engine
         self._thruster = thruster
         self._step_s = scenario.set_model.step_s
         self.lead_s = thruster.delay_steps * self._step_s

@@ -131,7 +131,7 @@ class DecisionLog:
         with the authority, and the possible misses have the radius of the disc around their
         rectangle.
         """
-        thruster = self._scenario.thruster
+        thruster = self._scenario.engine
         number = len(self._steps)
         steps = np.array(self._steps, dtype=np.int64) + thruster.delay_steps
         times_s: Floats = self._scenario.fitted_step_s * steps.astype(np.float64)
@@ -165,7 +165,7 @@ class DecisionLog:
         effects_m = np.zeros((len(steps) + 1, *lateral_miss_m.shape))
         effects_m[:-1] = self._executed_m_s[np.minimum(steps, len(self._executed_m_s) - 1)]
         sizes = modulus(effects_m[:-1].swapaxes(0, 1))
-        middles_s = times_s[:, None] + 0.5 * self._scenario.thruster.burn_s(sizes)
+        middles_s = times_s[:, None] + 0.5 * self._scenario.engine.burn_s(sizes)
         effects_m[:-1] *= np.maximum(arrival_s - middles_s, 0.0)[:, None]
         return np.asarray(np.cumsum(effects_m[::-1], axis=0)[::-1] + lateral_miss_m)
 
@@ -175,7 +175,7 @@ class DecisionLog:
         The modulus of M_i less the authority does not decrease with i: an impulse changes both by
         at most its own share.
         """
-        thruster = self._scenario.thruster
+        thruster = self._scenario.engine
         radius_m = self._scenario.radius_m or 0.0
         corrects_m = partial(max_correctable_m, times_s, thruster, arrival_s)
         decisions = np.arange(len(times_s))[:, None]

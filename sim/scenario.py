@@ -240,13 +240,13 @@ class Scenario:
     def __post_init__(self) -> None:
         check_fields(self)
         self._check_body()
-        object.__setattr__(self, "thruster", self.thruster.limited_to(self.fitted_step_s))
         for sensor in self.sensors.values():
             check_period(sensor, self.step_s)
         self._check_axes()
         self._check_covariance()
-        # Properties that raise ValueError: if the thruster can give no impulse, and if the closing
-        # speed is too uncertain.
+        # Properties that raise ValueError: if a burn may be longer than a step, if the thruster can
+        # give no impulse, and if the closing speed is too uncertain.
+        _ = self.engine
         _ = self.impulse_steps
         self.set_model.check_start("dispersion", self.dispersion)
         if self.information_set.is_guaranteed:
@@ -273,7 +273,7 @@ class Scenario:
 
     def _check_last_burn(self) -> None:
         """Check that the last burn ends before the earliest possible arrival."""
-        longest_s = self.thruster.longest_burn_s
+        longest_s = self.engine.longest_burn_s
         if longest_s == 0.0:
             return
         step_s = self.fitted_step_s
@@ -475,6 +475,17 @@ class Scenario:
         if self.camera is None or self.camera.drift_time_s is None:
             return 0.1 * self.nominal_arrival_s
         return self.camera.drift_time_s
+
+    @cached_property
+    def engine(self) -> Thruster:
+        """The thruster with its maximum impulse: without a value, that of a burn of one step.
+
+        Raises
+        ------
+        ValueError
+            If the maximum impulse is given, and its burn may be longer than a step.
+        """
+        return self.thruster.limited_to(self.fitted_step_s)
 
     @property
     def impulse_steps(self) -> Sequence[int] | None:

@@ -60,7 +60,7 @@ def schedule(scenario: Scenario) -> Schedule | None:
     last_step = steps_between(arrival_s, 0.0, step_s)
     steps = scenario.impulse_steps
     if steps is None:
-        steps = range(scenario.thruster.delay_steps, last_step + 1)
+        steps = range(scenario.engine.delay_steps, last_step + 1)
     images_s = _before_s(scenario, [*images_until(scenario, last_step)][::-1])
     impulses_s = _before_s(scenario, [step for step in steps if step <= last_step])
 
@@ -98,7 +98,7 @@ def image_times_s(scenario: Scenario) -> list[float]:
     else:
         last_step = int(max(steps))
 
-    last_decision = last_step - scenario.thruster.delay_steps
+    last_decision = last_step - scenario.engine.delay_steps
     images = [*images_until(scenario, last_decision)][::-1]
     return [*_before_s(scenario, images)]
 

@@ -48,7 +48,7 @@ class TrueFlight:
             draws.position_m,
             draws.velocity_m_s,
             scenario.sun,
-            scenario.thruster.acceleration_m_s2,
+            scenario.engine.acceleration_m_s2,
         )
         self._step_s = scenario.set_model.step_s
         self._aim_m = scenario.set_model.lateral_aim_m[:, None]

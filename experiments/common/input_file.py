@@ -44,7 +44,7 @@ from infoset.experiments.common.built_in_files import (
 )
 from infoset.experiments.common.errors import InputError, nearest, shown
 from infoset.experiments.common.units import quantity_and_unit, si_factor, units_like
-from infoset.limits import LONGEST_DESCRIPTION, plain_number
+from infoset.limits import LONGEST_DESCRIPTION, MAXIMUM, plain_number
 from infoset.sim.storage.codec import adapter
 
 ENDS = ("min", "max")
@@ -612,7 +612,7 @@ def _lines(value: Any, prefix: str) -> Iterator[str]:
     tables = []
     for name, field in fields_of(value.__class__).items():
         inner = plain_number(getattr(value, name))
-        if inner is None or inner == ():
+        if inner in (None, (), MAXIMUM):  # a value or a limit that is not set
             continue
         path = f"{prefix}{name}"
         if field.table is None:

@@ -167,7 +167,7 @@ def _facts(record: Record, kept: Sequence[int]) -> dict[str, object]:
         "range_error_relative": range_sensor and range_sensor.relative_error,
         "rate_error_rad_s": rate_sensor and rate_sensor.error_rad_s,
         "wrong_image_proved_s": _proved_s(record),
-        "max_impulse_m_s": scenario.thruster.max_impulse_m_s,
+        "max_impulse_m_s": scenario.engine.max_impulse_m_s,
         "budget_m_s": scenario.thruster.budget_m_s,
         "radius_m": scenario.radius_m,
     }

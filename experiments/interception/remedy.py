@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from infoset.experiments.common.input_file import changed
 from infoset.experiments.interception.runs.shared import Progress, simulate_all
 from infoset.experiments.interception.study import percent
+from infoset.limits import MAXIMUM
 from infoset.sim import HitEstimate, MissCause, Results, Scenario
 from infoset.sim.parallel import Task
 from infoset.sim.results import join
@@ -157,7 +158,12 @@ def _values(scenario: Scenario, key: str) -> dict[str, float]:
     names = [name]
     if key == SCALE:
         names = [each for each in owner if "error" in each]
-    return {f"{table}.{each}": owner[each] for each in names if owner.get(each)}
+    # A maximum impulse of `MAXIMUM` is not set: it follows from the thrust and the step.
+    return {
+        f"{table}.{each}": owner[each]
+        for each in names
+        if owner.get(each) not in (None, 0.0, MAXIMUM)
+    }
 
 
 def _search(

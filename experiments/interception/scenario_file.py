@@ -396,7 +396,7 @@ def _arrivals_line(scenario: Scenario, times: Schedule) -> str:
 
 def _burn_lines(scenario: Scenario) -> list[str]:
     """Return a line about the duration of burns, and whether they may be taken for impulses."""
-    engine = scenario.thruster
+    engine = scenario.engine
     times = schedule(scenario)
     if engine.acceleration_m_s2 is None or times is None:
         return []

@@ -409,7 +409,7 @@ def miss_text(missed: Mapping[str, Any], runs: int, scenario: Scenario) -> str:
     if not count:
         return ""
 
-    thruster = scenario.thruster
+    thruster = scenario.engine
     reasons = {
         MissCause.ENGINE: (
             "by the engine (it corrects {corrected_m}, the starts need up to {needed_m})"

@@ -67,7 +67,7 @@ def why_no_value(scenario: Scenario) -> tuple[str, ...]:
     The budget is missing here: whether it binds follows from the computation of the reserve.
     """
     model = scenario.set_model
-    thruster = scenario.thruster
+    thruster = scenario.engine
     box = model.bounds
     min_m_s, max_m_s = box.vx_m_s
     failed = {
@@ -109,7 +109,7 @@ def value_reserve(scenario: Scenario, lower: LowerBound) -> ValueReserve | str:
     images and G classes, C(G, 2q).
     """
     course = _course(scenario)
-    minimum_m_s = scenario.thruster.min_impulse_m_s
+    minimum_m_s = scenario.engine.min_impulse_m_s
     # Each case adds one effect to the one before it.
     cases = (
         _Case(is_small=True, minimum_m_s=0.0, threshold_m=0.0),
@@ -120,7 +120,7 @@ def value_reserve(scenario: Scenario, lower: LowerBound) -> ValueReserve | str:
     misses_m, impulses_m_s = zip(
         *(_guarantee(scenario, course, case) for case in cases), strict=True
     )
-    if max(impulses_m_s) > scenario.thruster.budget_m_s:
+    if max(impulses_m_s) > scenario.engine.budget_m_s:
         return f"budget below the {max(impulses_m_s):.3g} m/s that symmetric-miss may need"
     return ValueReserve(*np.diff([lower.bound_m, *misses_m]).tolist())
 
@@ -232,7 +232,7 @@ def _half_widths_m(model: SetModel, nearest_m: float, measured: Flags) -> Floats
 def _guarantee(scenario: Scenario, course: _Course, case: _Case) -> tuple[float, float]:
     """Return the maximum miss of `symmetric-miss`, m, and the maximum sum of its impulses, m/s."""
     model = scenario.set_model
-    maximum_m_s = scenario.thruster.max_impulse_m_s
+    maximum_m_s = scenario.engine.max_impulse_m_s
     e = model.closing_speed_m_s
     decides = course.may_decide & (course.range_m >= case.threshold_m)
     to_go_s = course.range_m / e

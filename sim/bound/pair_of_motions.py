@@ -318,7 +318,7 @@ class PairApproach:
         arms_s = np.concatenate([self.motion.arrival_s - given_s, np.zeros(len(sizes))])
         from_each = np.correlate(arms_s, sizes)
         given = np.round(given_s / scenario.set_model.step_s)
-        decided = given - scenario.thruster.delay_steps
+        decided = given - scenario.engine.delay_steps
         return from_each[np.searchsorted(decided, np.arange(self.steps + 1))]
 
     def _correction(
@@ -461,7 +461,7 @@ class PairApproach:
         disturbance = math.hypot(*(planar.disturbance_m_s2 for planar in self._models))
         step_s = scenario.set_model.step_s
         return gravity_reserve(
-            self.motion, difference, reach_m, disturbance, scenario.sun, scenario.thruster, step_s
+            self.motion, difference, reach_m, disturbance, scenario.sun, scenario.engine, step_s
         )
 
     def _by_manoeuvre(self, acceleration_m_s2: Floats) -> Floats:
@@ -625,7 +625,7 @@ def later_impulses(
 
     The earliest impulse is the first one.
     """
-    thruster = scenario.thruster
+    thruster = scenario.engine
     step_s = scenario.set_model.step_s
     steps = scenario.impulse_steps
     if steps is None:

@@ -11,7 +11,9 @@ import pytest
 
 from infoset.arrays import Floats
 from infoset.experiments import load_scenario
+from infoset.experiments.common.input_file import read_text, to_toml
 from infoset.guidance import NoiseKind, Thruster
+from infoset.limits import MAXIMUM
 from infoset.sim import Results, Scenario, Sun, lower_bound, simulate
 from infoset.sim.bound.game_value import why_no_value
 from infoset.sim.draws import draw
@@ -141,6 +143,26 @@ def test_random_scenarios_with_burns_keep_the_guarantee(
         total += soundness.fly_random_batch(number, rate_sensor, seed=3, burns=True)
     assert total == soundness.Count(total.engagements, refused=total.refused)
     assert total.engagements > total.refused
+
+
+def test_maximum_impulse_that_is_not_given_follows_the_thrust_and_the_step(
+    mission: Scenario,
+) -> None:
+    """F D / m, divided by one and the error of size, after any change of the scenario."""
+    engine = replace(mission.thruster, max_impulse_m_s=MAXIMUM, **THRUST)
+    scenario = replace(mission, thruster=engine)
+    assert mission.camera is not None
+    shorter = {"step_s": 45.0, "camera": replace(mission.camera, period_s=45.0)}
+    cases = {
+        0.02 * 90.0: scenario,
+        0.02 * 45.0: replace(scenario, **shorter),
+        0.04 * 90.0: replace(scenario, thruster=replace(scenario.thruster, thrust_N=20.0)),
+        0.02 * 89.82: replace(scenario, nominal_range_m=0.998 * scenario.nominal_range_m),
+    }
+    for most_m_s, changed in cases.items():
+        with_error_m_s = most_m_s / (1.0 + engine.execution_error_relative)
+        assert changed.engine.max_impulse_m_s == pytest.approx(with_error_m_s, rel=1e-9)
+    assert read_text(Scenario, to_toml(scenario), "copy") == scenario
 
 
 def test_mirrored_flights_have_mirrored_burns(mission: Scenario) -> None:

@@ -228,7 +228,7 @@ def _draw_impulse(axes: Axes, trace: Trace, clock: Clock, impulse_m_s: float) ->
     `impulse_m_s` is the greatest impulse of all records, on which the limits of the axes depend.
     """
     record, axis = trace
-    maximum = record.scenario.thruster.max_impulse_m_s
+    maximum = record.scenario.engine.max_impulse_m_s
     times = clock.at(record)
     axes.axhline(0.0, **_ZERO)
     label = f"maximum impulse, {maximum:g} m/s"
