@@ -19,7 +19,14 @@ above the change by gravity in the 1997 scenario, and far above rounding errors.
 
 
 def on_board_model(scenario: Scenario) -> SetModel:
-    """Return the set model of a scenario with the bounds of gravity and of the engine's errors."""
+    """Return the set model of a scenario with the bounds of gravity and of the engine's errors.
+
+    Raises
+    ------
+    ValueError
+        If gravity has no bound, or makes the earliest arrival so early that the last burn may not
+        end before it.
+    """
     thruster = scenario.engine
     model = replace(
         scenario.set_model,
@@ -27,7 +34,9 @@ def on_board_model(scenario: Scenario) -> SetModel:
         pointing_error_rad=thruster.pointing_error_rad,
         burn_acceleration_m_s2=thruster.acceleration_m_s2,
     )
-    return with_gravity(model, scenario.sun, max_impulses_m_s(model, thruster))
+    model = with_gravity(model, scenario.sun, max_impulses_m_s(model, thruster))
+    scenario.check_last_burn(model)
+    return model
 
 
 def max_impulses_m_s(model: SetModel, thruster: Thruster) -> float:

@@ -252,7 +252,7 @@ class Scenario:
         if self.information_set.is_guaranteed:
             _ = self.set_model.label_limits_m
         self._check_lengths()
-        self._check_last_burn()
+        self.check_last_burn(self.set_model)
         self._check_wrong_ranges()
         if self.information_set.wrong_images and self.rate_sensor is not None:
             raise ValueError(
@@ -271,14 +271,22 @@ class Scenario:
                     "and vy_m_s: set them, or leave the value out"
                 )
 
-    def _check_last_burn(self) -> None:
-        """Check that the last burn ends before the earliest possible arrival."""
+    def check_last_burn(self, model: SetModel) -> None:
+        """Check that the last burn ends before the earliest possible arrival in a set model.
+
+        With gravity the arrival may be earlier (`infoset.sim.gravity.on_board_model`).
+
+        Raises
+        ------
+        ValueError
+            If it may end later.
+        """
         longest_s = self.engine.longest_burn_s
         if longest_s == 0.0:
             return
         step_s = self.fitted_step_s
         steps = self.impulse_steps
-        first_arrival_s = self.set_model.label_limits_m[0] / self.closing_speed_m_s
+        first_arrival_s = model.label_limits_m[0] / self.closing_speed_m_s
         last_step = math.floor((first_arrival_s - longest_s) / step_s)
         if steps is not None and steps[-1] <= last_step:
             return

@@ -18,6 +18,7 @@ from infoset.sim import Results, Scenario, Sun, lower_bound, simulate
 from infoset.sim.bound.game_value import why_no_value
 from infoset.sim.draws import draw
 from infoset.sim.engagement import Engagements
+from infoset.sim.gravity import on_board_model
 from infoset.sim.kepler import KeplerMotion
 
 HAS_BENCHMARKS = importlib.util.find_spec("benchmarks") is not None
@@ -191,6 +192,31 @@ def test_the_last_burn_ends_before_the_earliest_arrival(mission: Scenario) -> No
         replace(mission, thruster=late)
     with pytest.raises(ValueError, match=r"may last 86\.7 s: write at least 180: got None"):
         replace(mission, thruster=replace(late, last_impulse_s=None))
+
+
+def test_the_earliest_arrival_is_that_with_gravity(mission: Scenario) -> None:
+    """A burn that ends between the earliest arrivals with and without gravity is refused before
+    the first step.
+    """
+    scenario = replace(burning(mission), sun=SUN)
+    step_s = scenario.fitted_step_s
+    models = (scenario.set_model, on_board_model(scenario))
+    free_s, pulled_s = (
+        model.label_limits_m[0] / scenario.closing_speed_m_s - scenario.nominal_arrival_s
+        for model in models
+    )
+    assert pulled_s < free_s
+
+    # The last impulse is one step before the nominal arrival, or the start of this step.
+    longest_s = step_s + 0.5 * (free_s + pulled_s)
+    most_m_s = 0.02 * longest_s / (1.0 + scenario.thruster.execution_error_relative)
+    engine = replace(
+        scenario.thruster, impulses_s=(), last_impulse_s=step_s, max_impulse_m_s=most_m_s
+    )
+    late = replace(scenario, thruster=engine)
+    with pytest.raises(ValueError, match=r"thruster\.last_impulse_s: the last burn must end"):
+        simulate(late, 1)
+    simulate(replace(late, sun=None), 1)
 
 
 def test_the_causes_of_misses_know_that_a_burn_acts_later(mission: Scenario) -> None:
