@@ -317,7 +317,7 @@ class Scenario:
         """Check the number of steps, the distance of the Sun and the radius of the body."""
         farthest_m = self.dispersion.x_m[1]
         slowest_m_s = -self.dispersion.vx_m_s[1]
-        if farthest_m > MAX_STEPS * (1.0 + STEPS_ROUNDING) * slowest_m_s * self.step_s:
+        if farthest_m > MAX_STEPS * (1.0 + STEPS_ROUNDING) * slowest_m_s * self.fitted_step_s:
             raise ValueError(
                 f"step_s must be long enough for at most {MAX_STEPS} steps from {farthest_m:g} m "
                 f"at {slowest_m_s:g} m/s: got {self.step_s!r}"

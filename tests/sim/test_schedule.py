@@ -173,6 +173,22 @@ def test_step_is_the_asked_one_without_times_or_with_a_whole_number_of_steps(
     assert changed(whole, {}, cut_off).set_model.step_s == 0.5
 
 
+def test_number_of_steps_is_limited_with_the_step_of_the_flight(brief: Scenario) -> None:
+    """100 000 asked steps are enough; steps that fit the nominal arrival are shorter."""
+    longest_s = brief.dispersion.x_m[1] / -brief.dispersion.vx_m_s[1]
+    asked_s = longest_s / 99_999.8
+    sensor = replace(brief.set_model.angle_sensor, period_s=asked_s)
+    many = replace(
+        brief,
+        step_s=asked_s,
+        angle_sensor=sensor,
+        range_sensor=None,
+        nominal_range_m=99_999.6 * asked_s * brief.closing_speed_m_s,
+    )
+    with pytest.raises(ValueError, match="step_s must be long enough for at most 100000 steps"):
+        replace(many, thruster=replace(many.thruster, last_impulse_s=2.0))
+
+
 def test_impulses_every_asked_step_are_every_step(brief: Scenario) -> None:
     """Flights have 20 steps of 0.5125 s, longer than the period."""
     longer = replace(brief, nominal_range_m=10.25 * brief.closing_speed_m_s)
