@@ -82,7 +82,7 @@ def with_room(rings: Floats, floats: int) -> Floats:
 
 
 def copy_of_rings(rings: Floats, size: int) -> Floats:
-    """Return a copy of the rings with `size` floats."""
+    """Return a copy of the rings with `size` floats, not fewer than are in use."""
     taken = int(rings[TAKEN])
     copy = np.empty(size)
     copy[:taken] = rings[:taken]
@@ -96,7 +96,7 @@ def working_room() -> Floats:
 
 @pasted
 def view_of(chains: Chains, n: int, label: float) -> SectionView:
-    """Return the view of a section by its number."""
+    """Return the view of section number `n`; the chains do not contain its label, m."""
     records = chains.records
     return SectionView(
         records[np.uint64(2 * n)], records[np.uint64(2 * n + 1)], chains.rings, label
@@ -111,7 +111,7 @@ def room_of(section: SectionView) -> int:
 
 @inlined
 def room_for(vertices: int, room: int) -> int:
-    """Room for `vertices` vertices, a power of two and at least `room`."""
+    """Room for `vertices` vertices, a power of two and at least `room`, which is one too."""
     while room < vertices:
         room *= 2
     return room
@@ -129,6 +129,8 @@ def floats_of(room: int) -> int:
 def widen_rings(section: SectionView, room: int) -> None:
     """Move both chains of a section to new rings of `room` vertices, a power of two, after the
     rings in use.
+
+    `with_room` must have made room for them. The old rings are not used again.
     """
     rings = section.rings
     for chain in (section.right, section.left):
@@ -166,7 +168,7 @@ def copy_section(chains: Chains, n: int, to_chains: Chains, to_n: int) -> None:
     """
     section = view_of(chains, n, 0.0)
     to = view_of(to_chains, to_n, 0.0)
-    # Neither old vertices nor their room need to be copied if the rings are widened.
+    # The target is emptied first: `widen_rings` would copy its old vertices.
     number_vertices(to.right, ZERO)
     number_vertices(to.left, ZERO)
     wanted = room_for(min(count_of(section) + ROOM_AHEAD, CAPACITY), room_of(to))

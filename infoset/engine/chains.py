@@ -46,8 +46,8 @@ exceed it is enlarged to `REDUCED` vertices."""
 MAX_ADDED = 4
 """Maximum number of vertices that one step adds: two at each of its two turns."""
 REDUCED = 160
-"""Number of vertices to which a section of CAPACITY vertices is reduced. Chosen: 24 steps pass
-before the next reduction."""
+"""Maximum number of vertices of a section after a reduction (`is_crowded`). Chosen: at least 24
+steps pass before the next one."""
 ZERO, ONE, TWO = constants(3)
 FORWARD = ONE
 BACKWARD = -ONE
@@ -212,11 +212,13 @@ def hand_over(
     same: tuple[float, float],
     tau: float,
 ) -> None:
-    """Move the vertices of a chain after its highest one to the front of the other chain.
+    """Move the vertices of a chain after its highest one to the front of the other chain, which
+    gets a copy of the highest one too if that is above its first vertex.
 
-    `sign` is 1 if the giver is the right chain, else -1. `between` is the origin of the giver
-    relative to the origin of the taker: V, m and height. `same` are the rounding errors of a
-    difference of V, and of the difference of the heights of the origins.
+    `sign` is 1 if the giver is the right chain, else -1: then the lowest vertex counts as the
+    highest. `between` is the origin of the giver relative to the origin of the taker: V, m and
+    height. `same` are the rounding errors of a difference of V, and of the difference of the
+    heights of the origins.
 
     A decreasing time to go raises the right side, so only vertices whose predecessor is on the
     outer side are moved. Without a turn of the level, heights along it are equal to within
@@ -319,6 +321,9 @@ def heights(section: SectionView, tau: float) -> tuple[float, float]:
 def cut_end(chain: Chain, rings: Floats, way: int, up: float, tau: float, level: float) -> int:
     """Remove the part of a chain above a level, and add a vertex at the intersection; return the
     number of this vertex, which is the new end.
+
+    A chain that is not above the level is unchanged. Of a chain that is above it as a whole, only
+    the other end is left, moved to the level with its V.
 
     `way` is the direction from the end that is cut: FORWARD from the first vertex, BACKWARD from
     the last one. With `up` = 1 greater z is removed, with -1 lesser z. `level` is `up` times the
@@ -480,8 +485,8 @@ def margin_in(section: SectionView, tau: float, v: float, z: float) -> float:
     last = vertex_from(right, rings, right.begin, tau, v, z)
 
     # The edge between the chains: a start rounded to absolute coordinates may be beyond the state
-    # in a section that is thinner than this rounding. It is used for the distance only, which keeps
-    # the last digit of published margins.
+    # in a section that is thinner than this rounding. The rounded start is used for the distance
+    # only, which keeps the last digit of published margins.
     nearest, _ = polygon.pass_edge(np.inf, FALSE, rounded, last, 0.0, 0.0)
     _, inside = polygon.pass_edge(np.inf, FALSE, end, last, 0.0, 0.0)
 
@@ -533,8 +538,8 @@ def reduce_outward(section: SectionView, tau: float, points: Floats) -> None:
 
     An edge is removed by extending its neighbours to their intersection; the edge that adds the
     minimum area is removed first. Vertices that are not convex because of rounding are removed
-    before. If no edge can be removed, three sides of a box around the chain replace it. The peak
-    of the chain is not known afterwards (`find_peak`).
+    before. If too few edges can be removed, three sides of a box around the chain replace it. The
+    peak of the chain is not known afterwards (`find_peak`).
 
     `points` is a working array (`working_room`): its first CAPACITY + 2 rows hold the chain, and
     the others, at least 2 CAPACITY, the tree of `drop_inner_edges`.
@@ -571,8 +576,9 @@ def cut_misses(
 ) -> tuple[bool, float]:
     """Intersect a section with the band of predicted misses lower <= m <= upper.
 
-    Return whether it is not empty, and the overlap in m, as `cut` does. This band is not parallel
-    to the level, so that it may cut any edge: the chains are computed anew. O(vertices). `points`
+    Return whether it is not empty, and the overlap in m, as `cut` does; an empty intersection
+    leaves the section unchanged. This band is not parallel to the level, so that it may cut any
+    edge: the chains are computed anew, and their peaks are not known then. O(vertices). `points`
     is a working array of CAPACITY + 2 vertices.
     """
     right, left, rings, _ = section
@@ -602,7 +608,9 @@ def cut_misses(
 def write_chain(
     chain: Chain, rings: Floats, points: Floats, count: int, first: int, last: int
 ) -> None:
-    """Write the vertices of a polygon from one to another, counter-clockwise, as a chain."""
+    """Write the vertices of a polygon from `first` to `last`, both included, counter-clockwise, as
+    a chain; one vertex if they are equal.
+    """
     length = (last - first) % count + 1
     for i in range(length):
         at = (first + i) % count

@@ -9,9 +9,9 @@ from infoset.arrays import Floats
 from infoset.engine.workspace import Records
 
 CERTAIN = 1e-13
-"""Labels count as infeasible if their overlap is certainly less than minus this number times the
-label: the rounding error of an overlap is a few ulp of the terms of a height, which are less than
-the label."""
+"""Labels count as infeasible if their overlap is certainly less than minus this number, 450 ulp,
+times the greatest of them: the rounding error of an overlap is a few ulp of the terms of a height,
+which are less than the label."""
 
 
 @allocation_free

@@ -41,13 +41,14 @@ is then at most 0.1 % greater than the exact maximum. Chosen: with 1.004 Phi of 
 seconds is up to 0.2 % greater, in 0.7 of the time; with 1.00025 it takes 1.2 times the time
 (measured)."""
 MAX_DIVIDED = 400
-"""Maximum number of pieces that are divided. If more are needed, Phi is a greater bound:
-docs/measured/guarantee.md has medians of Phi for 100 and 400 pieces. A piece takes 0.1 to 0.4 ms.
+"""Maximum number of pieces that are divided, for each set of an engagement. If more are needed,
+Phi is a greater bound: docs/measured/guarantee.md has medians of Phi for 100 and 400 pieces. A
+piece takes 0.1 to 0.4 ms.
 """
 GROUPS = 3000
-"""Labels that leave within this part of a flight are bounded together, if they need several steps:
-a flight of 10 000 steps has a Phi that is 2 % greater (docs/measured/performance.md). Chosen: it
-limits the time of long flights.
+"""Labels that leave within 1/GROUPS of a flight are bounded together, from 2 GROUPS steps on; in a
+shorter flight those of each step are. A flight of 10 000 steps has a Phi that is 2 % greater
+(docs/measured/performance.md). Chosen: it limits the time of long flights.
 """
 MISS_ROUNDING = 4.0 * chains.EPSILON
 """Rounding error of a miss, relative to the maximum label: of x at the closest approach, also if z
@@ -61,7 +62,7 @@ class Leaving(NamedTuple):
     Parameters
     ----------
     near, far : ndarray, shape (W, B)
-        Limits of the labels, m; the lower one is greater if none leaves.
+        Limits of the labels, m; `near` is greater than `far` if none leaves.
     known : ndarray, shape (W, B)
         A feasible label between them, m; minus infinity if none is known.
     events, elapsed : ndarray of int, shape (W,)
@@ -78,7 +79,7 @@ class Leaving(NamedTuple):
 @pasted
 def list_leaving(leaving: Leaving, b: int, past: Past, pieces: Records, count: int) -> int:
     """Add the labels of a set that leave in each step as one piece, whose bound is infinite, to
-    `count` pieces; return the new count.
+    `count` pieces; return the new count. The events of the set must be selected.
     """
     for step in range(leaving.events.shape[0]):
         if leaving.near[step, b] > leaving.far[step, b]:
@@ -118,9 +119,11 @@ def divide(
     pieces: Records,
     count: int,
 ) -> tuple[int, float]:
-    """Replace piece `i` of `count` pieces by its parts, with their bounds.
+    """Replace piece `i` of `count` pieces by its parts, with their bounds; by nothing if no label
+    of it is feasible.
 
     Return the new count, and the maximum miss of an exact section so far; it was `reached` before.
+    The events of the set of the piece must be selected.
     """
     near = pieces[i].near
     far = pieces[i].far
@@ -153,9 +156,10 @@ def bound_all(
 ) -> None:
     """Write Phi of each engagement without the error of the speed, m, into `phi`.
 
-    It is minus infinity where no feasible label has left. A new piece has an infinite bound; the
-    first division of each is not counted in `MAX_DIVIDED`. `pieces` has room for all pieces of an
-    engagement, which has the same number of sets as all others.
+    It is minus infinity where no feasible label has left; with rates, none that is feasible with
+    the bands of its window. A new piece has an infinite bound; the first division of each is not
+    counted in `MAX_DIVIDED`. `pieces` has room for all pieces of an engagement, which has the same
+    number of sets as all others.
     """
     members = leaving.near.shape[1] // phi.shape[0]
     for engagement in range(phi.shape[0]):
@@ -211,8 +215,8 @@ class GuaranteedMiss:
     ) -> None:
         """Note that the feasible labels from `lower` to `upper`, shape (B,), m, leave in this step.
 
-        Labels that leave during the following steps of a group are noted too, so that their number
-        of windows does not grow with the number of steps.
+        Labels that leave during the following steps of a group are noted too, so that the number of
+        windows does not grow with the number of steps.
         """
         lower = np.maximum(lower, self._bounded_below)
         active = active & (lower <= upper) & (lower < self._min_label(history.elapsed + 1))
@@ -234,10 +238,11 @@ class GuaranteedMiss:
         self._leaving.append(Leaving(near, far, known, events, elapsed))
 
     def bound(self, laws: Laws, history: History) -> tuple[Floats, Flags]:
-        """Return Phi so far, m, and whether a label has left, for each engagement.
+        """Return Phi so far, m, and whether a feasible label has left, for each engagement; Phi is
+        zero if none has.
 
         The labels that have left are replayed from the start; the impulses that followed act on
-        them. The time is linear in the number of events and in the number of the steps in which
+        them. The time is linear in the number of events times the number of the steps in which
         labels leave.
         """
         engagements = len(self._bounded_below) // self._members

@@ -51,7 +51,8 @@ class LastSight(NamedTuple):
     steps : int
         Steps since the measurement.
     fired : float
-        Sum of the magnitudes of all impulses, m/s.
+        Sum over all impulses of the size along the axis and of the error by the direction of the
+        engine, m/s.
     """
 
     known: bool
@@ -78,8 +79,8 @@ class History:
         Fields of the last sight of each axis and engagement after the first `seen` events, for
         measured rates.
     seen : int
-        Number of events before the latest measured rate. They are final: `retract` removes only the
-        latest measurement.
+        Number of events up to the latest measured rate, including it. The sight after them is
+        final: `retract` removes only the latest measurement, and a rate is no sight.
     """
 
     def __init__(self, channels: int, batch: int) -> None:

@@ -23,8 +23,9 @@ LABEL_RESOLUTION = 1e-13
 """Accuracy of the ends of the feasible labels, relative to the labels: some 500 ulp, so that
 evaluations differ; 1 um of range in the scenario of 1997."""
 COARSE = 1.0 / 64.0
-"""Accuracy of an end in a window for Phi, relative to the feasible labels there: bounds hold up to
-the infeasible label. Chosen: a piece that decides Phi is divided, and its ends with it.
+"""With rates, accuracy of an end in a window for Phi, relative to the length of the feasible labels
+found so far: bounds hold up to the infeasible label. Chosen: a piece that decides Phi is divided,
+and its ends with it.
 Phi of flights of ten seconds is the same from 1/256 to 1/4 (measured).
 """
 NARROWEST = 1e-15
@@ -55,7 +56,7 @@ class FeasibleLabels(NamedTuple):
 @allocation_free
 def share_to_zero(infeasible_overlap: float, feasible_overlap: float, minimum: float) -> float:
     """Return where the line through the overlaps at two labels is zero, as a share of the distance
-    from the first label; it keeps a share of `minimum` away from both.
+    from the infeasible label; it keeps a share of `minimum`, at most 0.5, away from both.
 
     The share is 0.5 if the line does not increase.
     """
@@ -74,8 +75,8 @@ def locate_end(
     The section at the feasible label is stored in `row` of the workspace. The overlap at the event
     that makes the section empty is a concave function of the label, so that the Illinois variant of
     regula falsi converges fast: if one end stays twice in a row, half of its overlap is used. If
-    four evaluations have not narrowed the bracket to an eighth, because that event changes with the
-    label, one bisection follows.
+    three evaluations have not narrowed the bracket to an eighth, because that event changes with
+    the label, the fourth one is a bisection.
     """
     run(feasible, past)
     keep_feasible(past, row)
@@ -150,8 +151,9 @@ def search_bracket(past: Past) -> bool:
 
     Return whether the middle label is feasible now. If not, no feasible label was found, and
     `room.unproved` is set unless it is proved that there is none. The larger half of the bracket is
-    evaluated at its middle. The search ends if the bracket is as narrow as `NARROWEST`, or if no
-    label in it can be feasible. The latter is a proof, and so is a bracket of one label.
+    evaluated at its middle. The search ends if the bracket is as narrow as `NARROWEST`, after
+    `MAX_EVALUATIONS`, or if no label in it can be feasible. The last is a proof, and so is a
+    bracket of one label.
     """
     bracket = past.room.bracket
     four = past.room.four
@@ -189,7 +191,7 @@ def search_bracket(past: Past) -> bool:
 def order_bracket(past: Past) -> None:
     """Make the middle label of the bracket in the workspace the one that empties last.
 
-    If it is an outer label, the bracket becomes this label and the middle one.
+    If it is an outer label, the bracket becomes this label, twice, and the middle one.
     """
     bracket = past.room.bracket
     for end in (FIRST, LAST):

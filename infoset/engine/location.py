@@ -50,7 +50,8 @@ class KnownLabels(NamedTuple):
     some_feasible : bool
         Whether a label is known to be feasible.
     lowest_feasible, highest_feasible : int
-        Indices of the lowest and the highest feasible label; zero if none is known.
+        Indices of the lowest and the highest feasible label; zero, the index of the lower limit,
+        also if none is known.
     """
 
     last: int
@@ -94,7 +95,7 @@ def list_known_labels(
 @pasted
 def check_limits(labels: KnownLabels, past: Past) -> KnownLabels:
     """Replay the limits of the search where no infeasible label separates them from the feasible
-    ones.
+    ones, and where no label is known to be feasible.
 
     The sections at feasible limits are in the rows `LOWER` and `UPPER` of the workspace afterwards.
     """
@@ -117,7 +118,11 @@ def check_limits(labels: KnownLabels, past: Past) -> KnownLabels:
 
 @allocation_free
 def bracket_latest(last: int, past: Past) -> None:
-    """Write the bracket of the known label that empties last: this label and its neighbours."""
+    """Write the bracket of the known label that empties last: this label and its neighbours.
+
+    Of equal labels it is the first. A limit of the search is its own neighbour on the outer side.
+    All known labels are infeasible, and the limits are replayed.
+    """
     known = past.room.known
     bracket = past.room.bracket
     best = 0
@@ -133,8 +138,8 @@ def bracket_latest(last: int, past: Past) -> None:
 def bracket_found(label: float, last: int, past: Past) -> None:
     """Write the bracket of a feasible label between known labels: this label and its neighbours.
 
-    The sections at feasible neighbours, which are limits, are in the rows `LOWER` and `UPPER` of
-    the workspace afterwards.
+    The neighbours are replayed. The sections at feasible ones, which then count as limits of the
+    search, are in the rows `LOWER` and `UPPER` of the workspace afterwards.
     """
     known = past.room.known
     below = known[0].label
@@ -204,9 +209,10 @@ def fill_slot(
     b: int, s: int, number: int, labels: FeasibleLabels, sections: Sections, past: Past
 ) -> int:
     """Write the section of label `s` of a grid of `number` to its slot; return the number of
-    vertices that it may gain.
+    vertices that it may gain, `CAPACITY` if the label is infeasible.
 
-    The sections at the ends are in the rows `LOWER` and `UPPER` of the workspace.
+    A grid of one label is the middle of the feasible labels. The sections at the ends are in the
+    rows `LOWER` and `UPPER` of the workspace.
     """
     slot = sections.slots[b, s]
     row = LAST_REPLAY
@@ -253,10 +259,10 @@ def refine_all(
     labels, ends included.
 
     Return the number of vertices that every new section may gain. If no label is feasible, the
-    engagement has no feasible section afterwards; `sections.unproved` is then whether that is not
-    proved. The limits of the labels, each of shape (B,), are narrowed to infeasible labels, except
-    where other labels may be feasible beyond them: with rates, and with an error bound that rises
-    with range in the paper's model.
+    engagement has no feasible section afterwards, and keeps its labels. `sections.unproved` is set,
+    never reset, if a section was reduced or the search proves nothing. The limits of the labels,
+    each of shape (B,), are narrowed to infeasible labels, except where other labels may be feasible
+    beyond them: with rates, and with an error bound that rises with range in the paper's model.
     """
     spare = CAPACITY
     slots = sections.slots

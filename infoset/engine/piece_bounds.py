@@ -59,8 +59,8 @@ PIECES = LABELS + 1
 and one more on each side goes on to an infeasible label."""
 NEAREST_OUTSIDE = 0.005
 """Minimum distance of a label below the others, in their spacing: a nearer one amplifies the
-rounding errors of supports 200 times. Chosen: Phi of flights of ten seconds is the same from
-0.00125 to 0.08 (measured)."""
+rounding errors of supports more than 200 times. Chosen: Phi of flights of ten seconds is the same
+from 0.00125 to 0.08 (measured)."""
 SLACK = 1e-9
 """Relative enlargement of a bound of Phi, for the rounding errors of supports and of lines through
 them, which are far smaller."""
@@ -85,7 +85,7 @@ class Outlines(NamedTuple):
     ----------
     labels : ndarray, shape (MAX_LABELS,)
         The labels, m, in increasing order.
-    points : ndarray, shape (C, MAX_LABELS, `chain_storage.CAPACITY`, 2)
+    points : ndarray, shape (C, MAX_LABELS, `chains.CAPACITY`, 2)
         Vertices (V, z) of their sections along each axis.
     counts : ndarray of int, shape (C, MAX_LABELS)
         Numbers of vertices.
@@ -168,11 +168,12 @@ def later_impulses(
     near: float, far: float, side: float, past: Past, law: SectionLaw
 ) -> tuple[float, float]:
     """Return a lower bound of the sum of side kappa_j x_j/e in (10) over the impulses after a
-    history.
+    history; `side` is 1 or -1.
 
     It is a linear function of the labels from `near` to `far`: its value at the middle, m, and its
     slope. The events that follow the history are in the workspace. An impulse at which only a part
-    of the labels has arrived is bounded by its extremes.
+    of the labels has arrived is bounded by its extremes: zero, and its product at `far`. One at
+    which all have arrived counts nothing.
     """
     e = law.closing_speed
     elapsed = past.log.elapsed
@@ -235,7 +236,8 @@ def max_exact_miss(replayed: PieceLabels, reached: float, past: Past, outlines: 
 
     With rates (`past.errors`) these sections are those of the window, which are too large. If they
     exceed `reached`, the label of their maximum is replayed alone: its sections overwrite those of
-    label 0 of `outlines`, and its miss is returned, or 0 if it is infeasible alone.
+    label 0 of `outlines`, so that `bound_pieces` must come before, and its miss is returned, or 0
+    if it is infeasible alone.
     """
     worst = ZERO
     miss = 0.0
@@ -298,8 +300,8 @@ def feasible_part(known: float, past: Past) -> FeasibleLabels:
 
 @allocation_free
 def replay_labels(feasible: FeasibleLabels, past: Past, outlines: Outlines) -> PieceLabels:
-    """Write the sections of equally spaced feasible labels, and of one more on each side without
-    rates.
+    """Write the sections of equally spaced feasible labels, and without rates of one more beyond
+    each end that is a limit of the piece, if it is feasible.
 
     The sections at the ends are in the workspace. A single label is written if the interval is as
     short as the resolution. The bands of rates are convex only on the window, so that no label
@@ -349,7 +351,7 @@ def bound_pieces(
     count.
 
     The first piece ends at the first feasible label, and the last one begins at the last feasible
-    label.
+    label; both are left out where this label is a limit of the divided piece.
     """
     number, inner, outer = replayed
     if number < 3:
@@ -378,8 +380,8 @@ def bound_pieces(
 def write_supports(channel: int, begin: int, end: int, tau: float, outlines: Outlines) -> None:
     """Write the supports of the labels from number `begin` to before `end` along one axis.
 
-    They replace those along the last axis. `channel` is the axis, and `tau` the time to go, s: the
-    predicted miss is z + V tau.
+    They replace those along the axis before. `channel` is the axis, and `tau` the time to go, s:
+    the predicted miss is z + V tau.
     """
     supports = outlines.supports
     for k in range(begin, end):
@@ -404,8 +406,9 @@ def turning_of(
     """Return how the predicted miss in a fixed direction changes with the label in a piece.
 
     Without rates, by (12): with the middle c of the piece, z + V x/e = (z + V x_c/e) + V (x -
-    x_c)/e, and the V of the second term lies within its extrapolated bounds V_c +- rho. With rates
-    by (13), in the coordinates of the middle of the window.
+    x_c)/e, and the V of the second term lies within its extrapolated bounds V_c +- rho, from the
+    supports along the axis of `law`, which must be in `outlines`. With rates by (13), in the
+    coordinates of the middle of the window.
     """
     e = law.closing_speed
     if past.errors is not None:
@@ -431,7 +434,7 @@ def bound_piece(
 
     The support of the sections in a fixed direction is a concave function of the label, but the
     direction of z + V x/e turns with the label, see `turning_of`. Of the `number` replayed labels,
-    `first` are below the piece.
+    `first` are at most `near`, and the others at least `far`.
     """
     labels = outlines.labels[:number]
     supports = outlines.supports[:, :number]
@@ -469,6 +472,6 @@ def margin_of(outlines: Outlines, width: float, past: Past) -> float:
         count = outlines.counts[channel, 0]
         tau = time_to_go(label, past.log.elapsed, law)
         size = abs(support(points, count, tau, 1.0)) + abs(support(points, count, -tau, -1.0))
-        # A range below 1 m would make the margin infinite.
+        # A range of zero would make the margin infinite.
         margin += size * (SLACK + width / max(tau * law.closing_speed, 1.0))
     return margin

@@ -53,7 +53,8 @@ class Stretch(NamedTuple):
     Parameters
     ----------
     began : int
-        Step of the last cut, or `IN_BURN` between a burn and the prediction after it.
+        Step after the last event that was applied by itself, such as a cut; the first step if there
+        is none, `IN_BURN` between a burn and the prediction after it.
     bounds, moments : float
         Sum of the bounds of changes of V, m/s, and of bound times time, m.
     turned, impulses : float
@@ -77,7 +78,10 @@ def new_stretch(began: int) -> Stretch:
 def stretch_after(
     stretch: Stretch, event: AxisEvent, fastest: float, elapsed: int, law: SectionLaw
 ) -> Stretch:
-    """Return a stretch after one more event; `fastest` bounds abs(V), see `Window`."""
+    """Return a stretch after one more event; `fastest` bounds abs(V), see `Window`.
+
+    `elapsed` is the step after the event.
+    """
     began, bounds, moments, turned, impulses = stretch
     time = law.step * (elapsed - began)
     bound = 0.0
@@ -123,7 +127,8 @@ def apply_stretch(
     of V at both ends.
 
     By Lemma 9a, two segments along the levels of both ends contain the segments of all changes of V
-    between them. `points` is a working array.
+    between them. All of them are added at once if the stretch begins at this step. Nothing is done
+    between a burn and the prediction after it. `points` is a working array.
     """
     if stretch.began == IN_BURN:
         return
@@ -171,7 +176,9 @@ def replay_rates(
     """Replay a history with rates, see `replay`, and note the measurements that cut the section.
 
     `errors` are the error bounds of the measured rates, rad/s. The section is in the coordinates of
-    the middle of its window; `drifts` of the workspace receives its displacement (13).
+    the middle of its window; `drifts` of the workspace receives its displacement (13), unless it
+    becomes empty. A replay that goes on from `done` must be of a single label without thinning:
+    neither the window nor the stretch is in `done`.
     """
     values = past.room.values
     overlaps = past.room.overlaps[law.channel]

@@ -95,9 +95,10 @@ def replay(
     """Compute the section at any label along one axis: apply the events after those `done`, up to
     number `until`.
 
-    Return the number of the event that makes the section empty, or NEVER_EMPTIED, and the events
-    done. The workspace receives the section, in row `LAST_REPLAY` of the axis, and the overlaps
-    with the bands of the measurements up to the one that makes it empty.
+    Return the number of the event that makes the section empty, and `done` as it was; or
+    NEVER_EMPTIED, and the events done now. The workspace receives the section, in row `LAST_REPLAY`
+    of the axis, and the overlaps with the bands of the measurements up to the one that makes it
+    empty.
 
     `errors` are the error bounds of the measured rates. They are an argument because the compiler
     omits `replay_rates`, which is most of the code, only if an argument is None.

@@ -50,32 +50,38 @@ class SectionLaw(NamedTuple):
     label_min, label_max : float
         Limits of the labels of a true state, m.
     z_min, z_max, vz_min, vz_max, vx_min, vx_max : float
-        Box of initial states, m and m/s; the guaranteed model enlarges it by the error of the
-        scale.
+        Box of initial states, m and m/s; the guaranteed model enlarges z and V_z by the error of
+        the scale.
     rectangle : bool
         Whether the initial set is the paper's rectangle in (omega, alpha). Otherwise it is the box.
     linear_band : bool
         Whether the band of an angle is made linear in the range, because the exact one is not
-        concave: a camera, or in the guaranteed model an error bound that rises with the range.
+        concave: a camera with a centroid error or an offset, or in the guaranteed model an error
+        bound that rises with the range.
     other_error_at_zero_range, other_error_slope : float
         Error bound of the angle of the other axis; zero in a plane.
     pointing_along, pointing_across : float
         Error of an impulse by the engine's direction, as shares of its component along the axis and
         of its modulus.
+    burn_time : float
+        Duration of a burn per m/s of its impulse, s; zero if impulses are instantaneous.
+    early_along, early_across, late_along, late_across : float
+        Error bounds (15a) of a burn at the levels of its start and of its end, as shares of its
+        component along the axis and of its modulus; zero in the paper's model.
     channel, other : int
         Number of this axis and of the other one in arrays with an axis of channels; `other` is -1
         in a plane.
     centroid_error : float
-        Part of the error bound of both angles that falls with the range x: centroid_error / x, m.
+        Part of the error bound of the angle that falls with the range x: centroid_error / x, m.
     min_range : float
         Minimum range of a label in the set, m.
     other_centroid_error : float
         `centroid_error` of the angle of the other axis.
     shift, shift_error : float
-        Distance of the measured point from the centre along the axis, and the bound of its change
+        Measured point minus the centre along the axis, and the bound of the change of this length
         by the scale, m: o and |o| eta / (1 - eta) of (21').
     farthest_shift : float
-        Maximum distance of the measured point from the centre along both axes, m.
+        Maximum of |shift| + shift_error of both axes, m.
     misalignment : float
         Bound of the difference of the slopes that the camera sees from the true ones.
     aim, aim_error : float
@@ -189,8 +195,9 @@ def _with_burns(law: SectionLaw, model: SetModel, psi: float) -> SectionLaw:
 
 
 class MissChange(NamedTuple):
-    """Changes of predicted misses by an impulse, m, to be subtracted: the least and the greatest
-    one for all errors of the engine, of the shape of the times to go.
+    """Changes of predicted misses by an impulse, m, to be subtracted: the least one from the upper
+    miss and the greatest one from the lower miss, for all errors of the engine. They have the shape
+    of the times to go.
     """
 
     least: Floats
@@ -259,7 +266,7 @@ def _law(model: SetModel) -> SectionLaw:
     aim = float(model.lateral_aim_m[0])
     if guaranteed:
         # Gravity changes the scale 1/(1 + eta), and thereby V where z is not zero. The rounding
-        # term keeps coordinates that are known exactly inside the set.
+        # terms keep coordinates that are known exactly inside the set.
         offset = max(abs(z) for z in box.z_m)
         speed = max(abs(v) for v in box.vz_m_s)
         rate = model.closing_speed_m_s / min_label

@@ -103,16 +103,18 @@ def steepest_angles(
     range.
 
     The solution s of Assumption 5 for both axes, with the distances (14). `alpha` and `across` are
-    the measured angles of this axis and of the other one. The distance is at most x/(cos(own)
-    cos(other)). If one of the angles is unbounded, the first is pi/2 and the second zero.
+    the measured angles of this axis and of the other one. `range_m` must be the range of the
+    farthest label: the range of the nearest one follows from it. The distance is at most
+    x/(cos(own) cos(other)). If one of the angles is unbounded, the first result is pi/2 and the
+    second zero.
 
     The bound of a camera is largest at the minimum distance, which the nearest label has, and so is
-    the angle between the centre and a point beside it that the images show. A misaligned camera
-    shows other slopes. Another
-    error bound that grows with the distance r grows with the angles: in a plane r = x/cos(alpha),
-    in space r is at most x/(cos(alpha_y) cos(alpha_z)). The maximum angles are the minimum solution
-    of s = |alpha_m| + a + h(r(s)). Three fixed-point iterations approach it from below; a fourth
-    step of the length of the third passes it if the right-hand side does not exceed s there.
+    the angle between the centre and a point beside it that the images show. The slopes that a
+    misaligned camera shows differ by its misalignment. An error bound that grows with the distance
+    r grows with the angles: in a plane r = x/cos(alpha), in space r is at most x/(cos(alpha_y)
+    cos(alpha_z)). The maximum angles are the minimum solution of s = |alpha_m| + a + h(r(s)). Three
+    fixed-point iterations approach it from below; a fourth step of the length of the third passes
+    it if the right-hand side does not exceed s there.
     """
     growth = max(law.error_slope, 0.0) * range_m
     other_growth = max(law.other_error_slope, 0.0) * range_m
@@ -160,8 +162,9 @@ def slope_band(
     By (8) they are the tangents of alpha -+ b(x), where b(x) is the error bound of the label (Lemma
     1, part 4); infinite beyond a right angle, and lower > upper (an empty band) where b < 0. The
     paper's model takes the angles in place of their tangents. `law.linear_band` takes
-    `linear_slope_band`: in the guaranteed model the wider band (21), in the paper's model alpha -+
-    b(x) as here. Only (21) uses `across` and `travelled`.
+    `linear_slope_band`: in the guaranteed model the wider band (21), in the paper's model alpha -
+    o/x -+ b(x) with the centroid error and the offset o of a camera. Only (21) uses `across` and
+    `travelled`.
 
     `alpha` and `across` are the angles of this axis and of the other one, rad. `travelled` is the
     decrease of the range since the start, m, the same for all labels.
@@ -328,8 +331,8 @@ def across_of(values: Floats, i: int, law: SectionLaw) -> float:
 
 @inlined
 def widen_section(section: SectionView, elapsed: int, law: SectionLaw) -> None:
-    """Enlarge a section by the error bound b of an angle: by e b in V, or x b in the predicted
-    miss.
+    """Enlarge a section to both sides by the error bound b of an angle: by e b in V, or x b in the
+    predicted miss. The range x must be positive.
     """
     x = range_of(section.label, elapsed, law)
     bound = law.error_at_zero_range + law.error_slope * x + law.centroid_error / x
@@ -364,8 +367,9 @@ def burn_section(
 
     By Lemma 11a, V becomes V - k, the predicted miss m becomes m - k (tau - t/2) with the duration
     t, and the errors are in the sum of two segments, along the levels of the start and of the end
-    of the burn. Afterwards the level is that of the end, which is not after the next step. z is
-    that of the motion after the burn, continued to the time of its start.
+    of the burn. Afterwards the level is that of the end, which is not after the next step; without
+    errors of burns, as in the paper's model, it stays that of the start. z is that of the motion
+    after the burn, continued to the time of its start.
     """
     burn = burn_of(impulse, across, law)
     end = tau - burn.duration
@@ -379,7 +383,8 @@ def burn_section(
 
 @inlined
 def predict_section(section: SectionView, elapsed: int, law: SectionLaw) -> None:
-    """Move a section to step `elapsed`: turn the level and add the segment of the disturbance.
+    """Move a section by one step, to step `elapsed`: turn the level and add the segment of the
+    disturbance.
 
     By Lemma 3, the segment is nu times the step in V, with both halves of adjacent steps; it is
     made 8 ulp longer.
@@ -401,7 +406,7 @@ def move_section(
     law: SectionLaw,
     points: Floats,
 ) -> bool:
-    """Apply an event to a section that is not a measurement: a prediction, an impulse or an
+    """Apply an event that is not a measurement to a section: a prediction, an impulse or an
     enlargement. Return whether the section was reduced.
 
     `elapsed` is the number of predictions before the event. `points` is a working array.

@@ -181,7 +181,9 @@ def mark_empty(slot: Slot, channel: int, event: int, overlap: float) -> int:
 
 @allocation_free
 def list_rows(channel: int, event: int, measured: Flags, wanted: int, sections: Sections) -> int:
-    """List the sections of an axis that `step_all` changes; return their number."""
+    """Write the sections of an axis that `step_all` moves, cuts or summarises to `rows`; return
+    their number.
+    """
     used = sections.used
     rows = sections.rows
     behind = sections.behind
@@ -213,10 +215,11 @@ def step_all(
     """Predict, cut and summarise the feasible sections in one pass; return the number of labels
     that became empty.
 
-    Sections that are behind are moved to the present step `elapsed`. The sections of engagements
-    that are `measured`, shape (B,), are cut by angles `alpha`, shape (C, B), rad, and summarised.
-    `event` is the number of the measurement, `NO_EVENT` without one. `wanted` is `MOVED`,
-    `SUMMARISED` or `WITH_HEIGHTS`: the results that are brought up to date for all engagements.
+    Sections that are behind are moved by one step, to the present step `elapsed`. The sections of
+    engagements that are `measured`, shape (B,), are cut by angles `alpha`, shape (C, B), rad, and
+    summarised. `event` is the number of the measurement, `NO_EVENT` without one. `wanted` is
+    `MOVED`, `SUMMARISED` or `WITH_HEIGHTS`: the results that are brought up to date for all
+    engagements.
     """
     newly_emptied = 0
     slots = sections.slots
@@ -262,7 +265,7 @@ def step_all(
 @entry
 def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, laws: Laws) -> None:
     """Shift the feasible sections of the active engagements and their summaries by impulses of
-    shape (C, B).
+    shape (C, B). No section may be behind.
     """
     slots = sections.slots
     used = sections.used
@@ -300,10 +303,11 @@ def make_room_all(
 ) -> tuple[int, int]:
     """Compute the room that the feasible sections need; with `widen`, enlarge their rings.
 
-    Every section must be able to gain `added` vertices. Return the number of floats by which the
-    rings are too small, for which memory must be allocated, and the number of vertices that every
-    section may gain. It is less than `MAX_ADDED` if a section must be reduced first; with `widen`,
-    the sections of the active engagements are reduced. `points` is a working array.
+    Every section must be able to gain `added` vertices, up to `CAPACITY`. Return the number of
+    floats by which the rings are too small, for which memory must be allocated before a call with
+    `widen`, and the number of vertices that every section may gain now. With rings that are large
+    enough it is less than `MAX_ADDED` only if a section must be reduced first; with `widen`, the
+    sections of the active engagements are reduced. `points` is a working array.
     """
     slots = sections.slots
     used = sections.used
@@ -339,9 +343,9 @@ def widest_all(elapsed: int, sections: Sections, laws: Laws, exists: Flags, ends
 
     `ends`, shape (C, B, 2, 4), has for the lower and the upper end the predicted miss, m, and
     alpha, rad, omega, rad/s, and range, m, of a state that reaches it; it is not written for
-    engagements without a feasible section. An extreme is usually reached on a whole edge. The
-    lowest point is taken for the upper end and the highest for the lower end, so that a mirrored
-    engagement gives exactly mirrored results.
+    engagements without a feasible section. The summaries must be up to date. An extreme is usually
+    reached on a whole edge. The lowest point is taken for the upper end and the highest for the
+    lower end, so that a mirrored engagement gives exactly mirrored results.
     """
     slots = sections.slots
     used = sections.used
@@ -386,7 +390,8 @@ def extreme_angles_all(elapsed: int, sections: Sections, laws: Laws, extremes: F
     """Write the minimum and the maximum alpha of the feasible sections along each axis, rad, and
     their ranges, m.
 
-    `extremes`, shape (4, C, B), is not written for engagements without a feasible section.
+    `extremes`, shape (4, C, B), is not written for engagements without a feasible section. The
+    columns of z of the summaries must be up to date.
     """
     slots = sections.slots
     used = sections.used
@@ -415,10 +420,10 @@ def extreme_angles_all(elapsed: int, sections: Sections, laws: Laws, extremes: F
 def keep_labels_all(
     active: Flags, minimum: Floats, maximum: Floats, sections: Sections, removed: Flags
 ) -> int:
-    """Remove the feasible sections with labels outside limits of shape (B,), m; return their
-    number.
+    """Remove the feasible sections of the active engagements with labels outside limits of shape
+    (B,), m; return their number. A label equal to a limit stays.
 
-    `removed`, shape (B, S), receives the mask of the removed ones.
+    `removed`, shape (B, S), all false before, receives the mask of the removed ones.
     """
     number = 0
     for b in range(len(sections.used)):

@@ -110,7 +110,9 @@ def new_window(near: float, far: float, law: SectionLaw) -> Window:
 
 @inlined
 def window_after(window: Window, event: AxisEvent, elapsed: int, law: SectionLaw) -> Window:
-    """Return a window after one more event; `elapsed` is the number of predictions up to it."""
+    """Return a window after one more event; `elapsed` is the number of predictions up to it, and
+    counts a prediction itself.
+    """
     near, far, turned, loose, fastest, most = window
     tau = max(time_to_go(far, elapsed, law), 0.0)
     size = abs(event.value)
@@ -139,6 +141,7 @@ def nearly_tangent(angle: float, up: float, law: SectionLaw) -> float:
     at least for `up` = -1.
 
     The tangent of a positive angle a is at least a + a^3/3, and up to 0.5 rad at most a + 0.4 a^3.
+    In the paper's model the slope is the angle itself.
     """
     if not law.exact_angles:
         return angle
@@ -158,7 +161,8 @@ def measure_in_window(
 
     Return whether the section is not empty, the overlap, m, see `chains.cut`, and whether the band
     cuts a part; if not, the overlap is a lower bound. `angles` are the angles of this axis and of
-    the other one, rad. The band is (13b), in the form with the smaller last term.
+    the other one, rad. The band is (13b), in the form with the smaller last term. `section.label`
+    is the middle of the window.
     """
     e = law.closing_speed
     half = half_time(window, law)
@@ -207,9 +211,10 @@ def rate_band(
 ) -> tuple[float, float]:
     """Return the bounds (13a) of the section of a label in a window, m, for a measured rate.
 
-    `widest` is a bound of 1/cos(alpha)^2. The half-width error x^2/e is a convex function of the
-    label: its chord replaces it in the bound that needs a concave function, so that the lower bound
-    is convex and the upper one concave.
+    `widest` is a bound of 1/cos(alpha)^2, which is at least 1: it multiplies the bounds that it
+    moves outward. x^2/e is a convex function of the label. In a negative lower and in a positive
+    upper bound its chord over the window replaces it, so that the lower bound is convex and the
+    upper one concave.
     """
     x = range_of(label, elapsed, law)
     near = range_of(window.near, elapsed, law)
@@ -230,7 +235,7 @@ def rate_band(
 @allocation_free
 def max_slope(elapsed: int, sight: LastSight, window: Window, law: SectionLaw) -> float:
     """Return a bound of the true |z/x| in a window, from the last angle, or from the initial box
-    without one, and the motion since.
+    without one, and the motion since; infinity if a label of the window has arrived since.
     """
     e = law.closing_speed
     travelled = law.closing_speed * (law.step * elapsed)
@@ -272,7 +277,8 @@ def measure_rate_section(
     omega x^2 / e.
 
     Return whether the section is not empty, the overlap in metres of predicted miss, and whether
-    the band cuts a part. `points` is a working array.
+    the band cuts a part; if not, the overlap is a lower bound. `section.label` is the middle of the
+    window. `points` is a working array.
     """
     middle = section.label
     tau = time_to_go(middle, elapsed, law)

@@ -62,8 +62,9 @@ class SetState:
     pass over the memory does both; a query therefore may write the sections, but changes no result.
 
     `members` sets in a row belong to one engagement; usually it is 1. A set that becomes empty is
-    recovered only if no other one of its engagement lives: a set lives while it tracks, or if a
-    label of it has passed below the threshold. If another one lives and the emptiness is not
+    recovered only if no other one of its engagement lives: a set lives unless its status is EMPTY,
+    that is, while it tracks, if a label of it has passed below the threshold, or if it is stopped.
+    If another one lives and the emptiness is not
     proved, the set leaves the image out that made it empty, up to `MAX_LEFT_OUT` images.
 
     Attributes
@@ -81,7 +82,8 @@ class SetState:
     some_left : ndarray of bool, shape (B,)
         Whether some label has passed below the range threshold.
     lost_step : ndarray of int, shape (B,)
-        Step at which the set first became empty; -1 if it never did.
+        Step at which the set first became empty with no label below the threshold; -1 if it never
+        did.
     lost_label : ndarray, shape (B,)
         Label closest to feasibility at that step, m.
     phi : GuaranteedMiss or None
@@ -135,7 +137,7 @@ class SetState:
 
     @property
     def law(self) -> SectionLaw:
-        """Constants that all axes have in common, as the constants of one axis."""
+        """Constants of the last axis, for those that all axes have in common."""
         return self.laws[-1]
 
     @property
@@ -320,6 +322,7 @@ class SetState:
         """
         empty = self._refine_if_few(active)
         is_below_threshold = empty & self.some_left
+        # First, so that an empty set does not count as living below.
         self.status[empty] = SetStatus.EMPTY.value
         self.status[is_below_threshold] = SetStatus.REFUTED.value
         lost = empty & ~is_below_threshold
@@ -345,7 +348,7 @@ class SetState:
         return lost
 
     def _engagement_lives(self) -> Flags:
-        """Whether a set of the same engagement lives, shape (B,)."""
+        """Whether a set of the same engagement, or the set itself, lives, shape (B,)."""
         lives = self.status != SetStatus.EMPTY.value
         of_engagement = lives.reshape(-1, self._members).any(axis=1)
         return np.repeat(of_engagement, self._members)
@@ -359,7 +362,11 @@ class SetState:
         return few
 
     def _nearest_to_feasible(self, b: int, event: int | None, lower: float, upper: float) -> float:
-        """Label, m, whose section was closest to the band of a measurement that emptied the set."""
+        """Label, m, whose section was closest to the band of a measurement that emptied the set.
+
+        If no stored section was emptied by it, or for a range, it is the middle of the limits of
+        the labels now, moved into the limits before the measurement, `lower` and `upper`.
+        """
         slots = self.sections.slots[b, : self.sections.used[b]]
         emptied_now = slots["emptied_at"] == event
         if event is not None and emptied_now.any():
@@ -371,12 +378,14 @@ class SetState:
         """Discard the measurement that made sets empty, and enlarge the last consistent sets. The
         arguments are explained in `_handle_emptied`.
         """
+        # First, because the replays of `_discard` apply it.
         self.history.record(WIDENING, applies=empty)
         self._discard(empty, event, lower, upper)
 
     def _discard(self, empty: Flags, event: int | None, lower: Floats, upper: Floats) -> None:
-        """Discard the measurement that made sets empty: restore the last consistent sets and
-        predict them. The arguments are explained in `_handle_emptied`.
+        """Discard the measurement that made sets empty: compute the sets without it, by replay. A
+        set without a feasible label is empty again. The arguments are explained in
+        `_handle_emptied`.
         """
         if event is not None:
             self.history.retract(event, empty)
@@ -410,7 +419,7 @@ class SetState:
 
     def replace(self, row: int, source: int, applies: Flags) -> bool:
         """Replace the set of engagement `row` by the set of other measurements of engagement
-        `source`, computed by replay; return whether it is not empty, or else end it.
+        `source`, computed by replay; return whether it is not empty. An empty one is ended.
 
         `applies`, shape (events,), says which events of the history apply. The new set must be a
         part of the set of `source`, whose limits of the labels it takes over. No label of either
@@ -424,7 +433,7 @@ class SetState:
         self.status[row] = SetStatus.TRACKING.value
         self.lost_step[row] = -1
 
-        # The stored labels became empty with other measurements: the search does not know them.
+        # The stored labels became empty with other measurements: the search must not use them.
         self.sections.slots["feasible"][row] = False
         self.sections.used[row] = 0
         self.sections.unproved[row] = False
@@ -495,6 +504,7 @@ class SetState:
         min_label = self.min_label_next
         computes_phi = self.computes_phi
         if self.phi is not None:
+            # Before the lower limits are raised: the labels between have not left yet.
             limits = (self.lower_label, self.upper_label)
             self.phi.leave(computes_phi, *limits, self.sections, self.history)
         if self.model.is_guaranteed:
@@ -537,7 +547,7 @@ class SetState:
         )
 
     def _make_room(self, active: Flags) -> None:
-        """Give each feasible section room for the vertices that one step adds.
+        """Give each feasible section room for the vertices that one step adds, before the step.
 
         Only the active engagements change, but the others may use their room later without another
         count.

@@ -42,9 +42,10 @@ def search_window(near: float, far: float, past: Past) -> bool:
 
 @allocation_free
 def take_window(past: Past, count: int) -> tuple[float, float]:
-    """Remove the window whose labels empty last from `count` windows; return its limits, m.
+    """Remove the window whose labels empty last from `count` windows, at least one; return its
+    limits, m.
 
-    The last window takes its place.
+    The last window takes its place: `count` - 1 are left.
     """
     windows = past.room.windows
     best = 0
@@ -61,11 +62,14 @@ def take_window(past: Past, count: int) -> tuple[float, float]:
 def search_windows(
     lower: float, upper: float, past: Past, errors: Floats | None
 ) -> tuple[bool, float]:
-    """Find a feasible label from `lower` to `upper`; return whether there is one, and the label, m.
+    """Find a feasible label from `lower` to `upper`; return whether one was found, and the label,
+    m.
 
     A window without feasible labels under its convex bands is discarded. The others are halved
     until they are as narrow as `NARROWEST`, beginning with the window in which an evaluated label
-    empties last with its own bands. `past` has the window of a single label.
+    empties last with its own bands. Windows as narrow as that, and those left after
+    `MAX_HALVED_WINDOWS`, may still contain feasible labels. `past` has the window of a single
+    label.
 
     Without rates no search is necessary. `errors` are the error bounds of the measured rates, an
     argument as in `replay`.

@@ -48,12 +48,13 @@ class Workspace(NamedTuple):
         The sections in the rows `LAST_REPLAY`, `LOWER` and `UPPER` along each axis. Replays write
         the first one, `keep_section` the others.
     overlaps : ndarray, shape (C, E)
-        Overlap of section and band at each measurement, m, in the last replay. Replays write them.
+        Overlap of section and band at each measurement that was applied, m, in the last replay.
+        Replays write them, up to the measurement that makes the section empty.
     feasible_overlaps : ndarray, shape (C, E)
         The overlaps in the last replay of a feasible label that `keep_feasible` has kept.
     drifts : ndarray, shape (C, 2)
-        With rates: `turned` and the room of (13), m/s and m, of the window of the last replay of a
-        feasible label. `replay_rates` writes them.
+        With rates: `turned` and the room of (13), m/s and m, of the window of the last replay in
+        which the section of the axis is not empty at the end. `replay_rates` writes them.
     points : ndarray, shape (n, 2)
         Vertices of a section.
     cuts : ndarray of bool, shape (E,)
@@ -106,11 +107,12 @@ class Past(NamedTuple):
     room : Workspace
         Working arrays, with the events of the engagement that `select` has chosen.
     nearest, farthest : float
-        With rates, the window of labels, m, on which sections are convex. The empty window, from
-        infinity to minus infinity, makes the window of each label the label itself.
+        For Phi, the labels of the piece, m. With rates they are also the window of labels on which
+        sections are convex; the empty window, from infinity to minus infinity, makes the window of
+        each label the label itself.
     thinned : bool
-        With rates, whether replays leave out the measurements that have not cut the section of a
-        label so far.
+        With rates, whether replays leave out the measurements that have not cut the section of any
+        single label so far, `cuts` of the workspace.
     """
 
     log: EventLog
@@ -162,7 +164,9 @@ def past_of(history: History, laws: Laws, slots: int = 1) -> Past:
 
 @allocation_free
 def select(past: Past, b: int) -> None:
-    """Copy the events of an engagement to the contiguous arrays that replays read."""
+    """Copy the events of an engagement to the contiguous arrays that replays read, and reset `cuts`
+    and `unproved`.
+    """
     log = past.log
     values = past.room.values
     applies = past.room.applies
