@@ -19,7 +19,8 @@ A flight has at most 1e5 steps, and a subtraction and a division round their num
 def fitted_step_s(arrival_s: float, step_s: float) -> float:
     """Return the step, s, that is nearest to an asked one and divides the time to the arrival.
 
-    It differs from the asked step by at most 1/(2N - 1) of it, with the number N of steps.
+    It differs from the asked step by at most 1/(2N) of the asked one, with the number N of steps;
+    an asked step of more than twice the time to the arrival becomes this time.
 
     Parameters
     ----------
@@ -36,7 +37,7 @@ def steps_between(start_s: float, time_s: float, step_s: float) -> int:
     """Return the number of steps from a time to the step nearest to another time.
 
     If two steps are equally near, it is the earlier one. No step is at or after the nominal
-    arrival. The number is negative if the nearest step is before the start.
+    arrival. The number is negative if the nearest step is before `start_s`.
 
     Parameters
     ----------

@@ -107,8 +107,8 @@ class CoveredSetView(InformationSetView):
     def suspected_steps(self, engagement: int = 0) -> list[int]:
         """Return the steps of the images at least one of which is wrong.
 
-        They are the images before the last refutation that some member without one leaves out.
-        There are none before a wrong image is proved, and if all members are refuted.
+        They are the images until the last refutation that some member leaves out that is not
+        refuted. There are none before a wrong image is proved, and if all members are refuted.
         """
         self._need_engagement(engagement)
         return self._suspects.steps(engagement, self._state)
@@ -262,8 +262,8 @@ class CoveredSetView(InformationSetView):
 class CoveredSet(CoveredSetView, InformationSet):
     """Information sets of a batch of engagements in which at most q images of a flight are wrong.
 
-    It has the methods of `InformationSet`. A member that becomes empty before a label of it has
-    left is refuted, and stays empty if another one lives, which tracks or has labels that have
+    It has the methods of `InformationSet`. A member that is proved to be empty before a label of it
+    has left is refuted, and stays empty if another one lives, which tracks or has labels that have
     left. For q = 1 the others are then split into members that leave out as few images as possible,
     see `Suspects`. If none lives, more than q images are wrong, and the members that became empty
     last recover as an `InformationSet` does.

@@ -76,7 +76,7 @@ class InformationSet(InformationSetView):
         Returns
         -------
         phi_m : ndarray, shape (B,)
-            m; zero while no label has passed below the range threshold.
+            m; zero while no feasible label has passed below the range threshold.
         exists : ndarray of bool, shape (B,)
             Whether the bound is valid: some label has passed below the threshold, the model is
             guaranteed, and the data never contradicted it.
@@ -131,8 +131,8 @@ class InformationSet(InformationSetView):
 
         Notes
         -----
-        A range measurement narrows the interval of labels and leaves the polygons of the others
-        unchanged.
+        A range measurement narrows the interval of labels and leaves the polygons of the labels in
+        it unchanged.
         """
         PART.need("relative_error", relative_error)
         WHOLE.need("wrong_measurements", wrong_measurements)
@@ -204,7 +204,11 @@ class InformationSet(InformationSetView):
         return self._state.drop_below_threshold()
 
     def sections_are_leaving(self) -> bool:
-        """Return whether `drop_below_threshold` would remove a stored section now."""
+        """Return whether the range of a feasible section will be below the threshold after the next
+        step.
+
+        Then `drop_below_threshold` removes sections, except where the set is stopped.
+        """
         state = self._state
         min_label = state.min_label_next
         if state.min_label >= min_label:
@@ -214,8 +218,8 @@ class InformationSet(InformationSetView):
     def predict(self) -> None:
         """Predict the set over one step, for all disturbances within the bound.
 
-        The exact set of disturbances is a thin lens in (V, z). As in the paper, it is replaced by
-        the segment between its ends.
+        The exact set of disturbances is a thin lens in (V, z). The paper's model replaces it by the
+        segment between its ends, the guaranteed model by a parallelogram that contains it.
         """
         self._state.predict()
 
@@ -228,5 +232,5 @@ class InformationSet(InformationSetView):
         return np.ascontiguousarray(real_array(name, value, (len(self.axes), self.batch)))
 
     def _where(self, where: ArrayLike) -> Flags:
-        """Return a mask of engagements, shape (B,)."""
+        """Return a mask of engagements, shape (B,), or () for all of them."""
         return flags("where", where, (self.batch,))

@@ -65,8 +65,8 @@ class Kernels:
     def entry(self, function: F) -> F:
         """Compile a kernel that allocates no array, nor does anything it calls.
 
-        Its machine code is stored on disk. Without Numba's atomic reference counts, which may cost
-        more than the work.
+        Its machine code is stored on disk. It has no atomic reference counts of Numba, which may
+        cost more than the work.
         """
         return self._stored(function, _nrt=False)
 

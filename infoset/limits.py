@@ -57,7 +57,8 @@ class Limits(_Rule):
     Parameters
     ----------
     above, minimum, below, maximum : float or None
-        Ends of the interval; `above` and `below` are excluded. None is no limit but `MAXIMUM`.
+        Ends of the interval; `above` and `below` are excluded. None is no limit but `MAXIMUM`. With
+        `above` = 0 a number must be at least `MINIMUM`.
     whole : bool
         Whether the number must be an integer; `MAXIMUM` does not apply to integers.
     """
@@ -290,7 +291,7 @@ def real_array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
 
 
 def flags(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Flags:
-    """Return flags as an array of a shape, or a single flag for all elements.
+    """Return flags as an array of a shape, or a single flag for all elements as one of shape ().
 
     A TypeError is raised if they are masked or not of the type bool, a ValueError if the shape is
     different.

@@ -76,8 +76,8 @@ class InitialSet(Enum):
 class Recovery(Enum):
     """Treatment of a set that a measurement leaves empty, because it contradicts the model.
 
-    WIDENED ignores the measurement and enlarges the last consistent set by a disturbance. NONE
-    leaves the set empty, as in the published procedure.
+    WIDENED ignores the measurement and enlarges the last consistent set, predicted to the present
+    step, by the error bound of an angle. NONE leaves the set empty, as in the published procedure.
     """
 
     WIDENED = "widened"
@@ -148,8 +148,8 @@ class StateBox:
     def farthest_m(self) -> float:
         """Maximum distance until x = 0, m.
 
-        Without impulses the distance is a convex function of time: it is largest at the start or at
-        the end.
+        Without impulses and accelerations the distance is a convex function of time: it is largest
+        at the start or at the end.
         """
         max_range = self.x_m[1]
         max_duration = max_range / -self.vx_m_s[1]
@@ -414,9 +414,10 @@ class SetModel(SetSettings):
         )
 
     def check_start(self, name: str, box: StateBox) -> None:
-        """Refuse starts below the range threshold, or without a positive error bound.
+        """Refuse starts at or below the range threshold, or without a positive error bound.
 
-        The error bound is the bound of the angle at the maximum distance. `name` is the name of the
+        The error bound is the bound of the angle at the maximum distance, the smaller one of both
+        axes. `name` is the name of the
         box, for the message.
 
         Raises
@@ -483,7 +484,7 @@ class SetModel(SetSettings):
     def min_range_m(self) -> float:
         """Minimum range of a hypothesis, m.
 
-        It is the threshold, and more than the rounding error of zero.
+        It is the threshold, but at least `MIN_RANGE` of the maximum label.
         """
         return max(self.range_threshold_m, MIN_RANGE * self.label_limits_m[1])
 

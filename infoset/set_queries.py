@@ -102,14 +102,16 @@ class SetQueries:
 
     @property
     def inconsistent(self) -> Flags:
-        """Whether each set became empty at some step, shape (B,): the data contradict the model."""
+        """Whether each set became empty before a label of it had left, shape (B,): the data
+        contradict the model.
+        """
         return np.asarray(self._state.lost_step >= 0)
 
     @property
     def inconsistency(self) -> tuple[MaskedIntegers, MaskedFloats]:
         """First step at which each set became empty, and its label closest to the data, m.
 
-        Both are masked for sets that never became empty.
+        Both are masked for sets that are not `inconsistent`.
         """
         never = ~self.inconsistent
         return (
@@ -126,7 +128,7 @@ class SetQueries:
 
     @property
     def labels_m(self) -> Floats:
-        """Labels of all stored sections, m, shape (B, S)."""
+        """Labels of all stored sections, feasible or not, m, shape (B, S)."""
         labels = self._state.labels.view()
         labels.flags.writeable = False
         return labels
@@ -241,11 +243,11 @@ class SetQueries:
         Returns
         -------
         Section
-            Its polygon is empty if the data exclude the label.
+            Its polygons are empty if the data exclude the label.
 
         Notes
         -----
-        About 30 ns per event of the history.
+        About 30 ns per event of the history and axis if no rate was measured.
         """
         NUMBER.need("label_m", label_m)
         self._need_engagement(engagement)

@@ -186,6 +186,9 @@ class Suspects:
     ) -> dict[int, tuple[int, ...]]:
         """Give each member of `halves` the set without its half of the `images` that the member in
         row `divided` leaves out. Return those whose set is not empty.
+
+        The member in row `divided` may be the last one of `halves`: the others are computed from
+        its set before.
         """
         left_out = state.history.applies[: state.history.events, divided].copy()
         nonempty = {}

@@ -54,7 +54,7 @@ class Detection:
 
 @dataclass(frozen=True, eq=False)
 class Cover:
-    """The members of a cover: R sets for each run, an ordinary set if no measurement is wrong.
+    """The members of a cover: R sets for each run, one ordinary set if no measurement is wrong.
 
     Arrays of all sets have an axis B R, the members of a run one after the other.
 
@@ -128,8 +128,8 @@ class Cover:
     def last_emptied(self, steps: Integers, excess: Floats) -> NDArray[np.intp]:
         """Return the set of each run that became empty last, with the least excess, shape (B,).
 
-        It is a set that is not empty if there is one. `steps`, shape (B R,), are the steps at which
-        the sets became empty, -1 for a set that is not empty.
+        It is a set that is not empty if there is one; of equal sets it is the first. `steps`, shape
+        (B R,), are the steps at which the sets became empty, -1 for a set that is not empty.
         """
         emptied = self._emptied(steps)
         is_last = emptied == emptied.max(axis=1, keepdims=True)
@@ -148,5 +148,5 @@ class Cover:
         )
 
     def _emptied(self, steps: Integers) -> Integers:
-        """Return the steps at which the members became empty, shape (B, R)."""
+        """Return the steps at which the members became empty, shape (B, R); `_NEVER` if not."""
         return np.asarray(np.where(steps < 0, _NEVER, steps).reshape(-1, self.members))

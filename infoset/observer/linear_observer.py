@@ -58,7 +58,7 @@ class LinearObserver:
     max_facets : int or None, optional
         Maximum number of facets of a polytope after a measurement, at least 2n; it then has at most
         700 vertices. None keeps the sets exact; a set of more than 5000 vertices is then an
-        ArithmeticError. Not used for more than four states.
+        ArithmeticError. Not used for two and for more than four states.
     window : int or None, optional
         Number of steps of the linear programs of five and more states. None is the whole record:
         bounds are then exact, and their time grows with the record. Not used for fewer states.
@@ -290,11 +290,15 @@ class LinearObserver:
             self._empty.excess[lost] = excess[lost].max(axis=1)
 
     def _note(self, event: Motion | Strips) -> None:
-        """Keep a step or a measurement, of sets that may be reduced, for their exact widths."""
+        """Keep a step or a measurement, of sets that may be reduced, for their exact widths.
+
+        A record of more than `MAX_RECORD` is discarded as a whole.
+        """
         self._count += 1
         if self._may_be_reduced and self._count <= MAX_RECORD:
             self._events.append(event)
         else:
+            # A new list: earlier estimates keep the old one.
             self._events = []
 
     def estimate(self) -> Estimate:
@@ -335,7 +339,7 @@ class LinearObserver:
         )
 
     def _located(self) -> _Emptied:
-        """Return where each set became empty."""
+        """Return where each set became empty; of windows it is computed and noted first."""
         empty = self._empty
         if isinstance(self._sets, Windows):
             for number in np.flatnonzero(empty.step == -1):
@@ -397,7 +401,8 @@ class LinearObserver:
         Parameters
         ----------
         estimates : sequence of Estimate
-            Estimates of successive steps, as `run` returns them.
+            Estimates of successive steps, as `run` returns them. The last one is returned
+            unchanged.
         inputs : array_like, shape (N, p) or (N, B, p), optional
             u after each of them; the last one is not used.
 
@@ -500,7 +505,7 @@ class _Noise:
         """Return the strips of C x = y - v for groups of runs.
 
         The same outputs are measured in the runs of a group; others are NaN. A strip with NaN ends
-        does not exist.
+        does not exist. For a polytope, runs without any measured output are in no group.
         """
         if self.polytope is None:
             strips = Strips(matrix, y - self.half, y + self.half, np.abs(y) + self.half)

@@ -73,7 +73,7 @@ class Stage:
 
     @cached_property
     def sizes(self) -> Floats:
-        """Maximum coordinates of the prior, shape (n,)."""
+        """Maximum sizes of the coordinates of the prior, shape (n,)."""
         return sizes_of(self.prior)
 
     def with_strips(
@@ -171,7 +171,9 @@ class Program:
         self._states = len(stages[0].sizes)
 
     def bound(self, direction: Floats) -> float:
-        """Return an upper bound of direction . x; inf if the solver finds none."""
+        """Return an upper bound of direction . x; inf if the solver finds none, also if there is no
+        motion.
+        """
         lines = self._lines
         goal = np.zeros(len(lines.limits))
         cost = direction @ lines.state.matrix
@@ -188,7 +190,7 @@ class Program:
         return self._sum(direction, -length * optimum.eqlin.marginals)
 
     def is_infeasible(self) -> bool:
-        """Whether no motion agrees with the strips, proved by multipliers.
+        """Whether no motion agrees with the strips, proved by multipliers; False if not proved.
 
         They are the multipliers of the program of the least enlargements of the strips.
         """
@@ -250,7 +252,7 @@ class Program:
     def _parts_of_motion(self, motion: Motion, sizes: Floats, costate: Floats) -> list[float]:
         """Return p . s, the height of W along p, and their rounding, for the costate p.
 
-        `sizes` are the maximum coordinates of the state before the motion.
+        `sizes` are the maximum sizes of the coordinates of the state before the motion.
         """
         terms = motion.sums_of_terms(sizes)
         rounding = SUM_SLACK + (self._states + _count(motion.disturbance)) * EPSILON
@@ -263,7 +265,8 @@ class Program:
     def _multipliers(self, marginals: Floats) -> list[Floats]:
         """Return the multipliers of the strips of each stage, shape (r,), from the marginals.
 
-        The marginals are multipliers of the rows of the program.
+        The marginals are multipliers of the rows of the program. Strips that are not in the program
+        get zero.
         """
         multipliers = []
         start = 0
@@ -323,7 +326,7 @@ class _Builder:
         return added
 
     def renamed(self, state: _State, sizes: Floats) -> _State:
-        """Return a state whose coordinates are unknowns, in units of its `sizes`."""
+        """Return a state whose coordinates are unknowns, in units of its `sizes`, 1 for a zero."""
         units = np.where(sizes > 0.0, sizes, 1.0)
         first = self.add_unknowns(len(units), -np.inf, np.inf)
         self._equations.add(-state.matrix / units[:, None], state.first)

@@ -210,7 +210,7 @@ class RunPolytope:
 
     @property
     def sizes(self) -> Floats:
-        """Maximum coordinates, shape (n,)."""
+        """Maximum sizes of the coordinates, shape (n,); zero for the empty set."""
         return np.asarray(np.abs(self.polytope.vertices).max(axis=0, initial=0.0))
 
     def solid(self, sizes: Floats) -> RunPolytope:
@@ -301,7 +301,8 @@ class RunPolytope:
         return found.limited(), excess
 
     def _excess(self, normals: Floats, lower: Floats, upper: Floats) -> Floats:
-        """Return the distance of the first strip that leaves no state from the set before it.
+        """Return the distance of the first strip that leaves no state from the set before it, which
+        the strips before have cut.
 
         The result has the shape (r,), with 0 for the other strips.
         """
@@ -402,7 +403,7 @@ class Polytopes:
 
 
 def polygon_of(shape: Set) -> ConvexPolygons:
-    """Return a set of two coordinates as polygons."""
+    """Return a set of two coordinates as polygons; of polygons a batch stays a batch."""
     if isinstance(shape, ConvexPolygons):
         return shape
     if isinstance(shape, Polytope):
@@ -420,7 +421,7 @@ def polytope_of(shape: Set) -> Polytope:
 
 
 def sizes_of(shape: Set) -> Floats:
-    """Return the maximum coordinates of a set, shape (n,), or bounds of them."""
+    """Return the maximum sizes of the coordinates of a set, shape (n,), or bounds of them."""
     if isinstance(shape, Zonotope):
         return np.asarray(np.abs(shape.centre) + np.abs(shape.generators).sum(axis=0))
     return np.asarray(np.abs(shape.vertices).reshape(-1, shape.vertices.shape[-1]).max(axis=0))

@@ -71,7 +71,7 @@ class Strips(NamedTuple):
 
 @inlined
 def reach(points: Points, count: int) -> tuple[float, float]:
-    """Maximum sizes of both coordinates of the vertices."""
+    """Maximum sizes of both coordinates of the vertices; zero without vertices."""
     x = y = 0.0
     for i in range(count):
         x = max(x, abs(points[i, 0]))
@@ -182,8 +182,9 @@ def enlarge(
 
     The lowest, rightmost, highest and leftmost vertices divide the boundary into four parts, and
     each part moves by one corner of the box. A dividing vertex moves so that both of its edges move
-    far enough, by at most five boxes; at a sharp tip it becomes two vertices. The division at
-    extremes is correct for edges of a few ulp with a wrong direction.
+    far enough, by at most five half-widths; at a sharp tip it becomes one vertex for each part that
+    meets there, two to four. The division at extremes is correct for edges of a few ulp with a
+    wrong direction.
     """
     ends = extremes(points, count)
     low = ends[0]
@@ -223,7 +224,7 @@ def enlarge(
 
 @inlined
 def extremes(points: Points, count: int) -> tuple[int, int, int, int]:
-    """Numbers of the lowest, rightmost, highest and leftmost vertices."""
+    """Numbers of the lowest, rightmost, highest and leftmost vertices; of equal ones the first."""
     low = right = high = left = 0
     for i in range(1, count):
         x = points[i, 0]
@@ -414,7 +415,9 @@ def cut_to_preimage(sets: Batch, later: Batch, matrix: Floats, out: Batch) -> No
 
 @inlined
 def normal_of_side(points: Points, count: int, i: int) -> tuple[float, float]:
-    """Outward normal of side i of a polygon; for i from -4 to -1, a direction along an axis."""
+    """Outward normal of side i of a counter-clockwise polygon, as long as the side; for i from -4
+    to -1, a direction along an axis.
+    """
     if i == -4:
         return 0.0, -1.0
     if i == -3:

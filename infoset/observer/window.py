@@ -96,7 +96,7 @@ class Window:
     def support(self, direction: Floats) -> float:
         """Return an upper bound of direction . x; -inf for the empty set.
 
-        A linear program is solved the first time.
+        A linear program is solved the first time, and before it the one of `is_empty`.
         """
         if self.is_empty:
             return -np.inf
@@ -168,7 +168,7 @@ class Window:
     def located(self) -> Contradiction | None:
         """Return the first strip after which no state is possible; None if the set is not empty.
 
-        It is found by bisection, with a linear program for each step.
+        It is found by bisection, with a linear program for each division.
         """
         if self.contradiction is not None or not self.is_empty:
             return self.contradiction
@@ -204,8 +204,8 @@ class Window:
 def exact_hull(initial: Set, record: Sequence[Motion | Strips], run: int, step: int) -> Floats:
     """Return the minimum and the maximum of each state of a `run` at a `step`, shape (2, n).
 
-    Linear programs over the whole record. All bounds are NaN if no state is possible, and so are
-    bounds that the solver does not find.
+    Linear programs over the whole record, which begins at step 0. All bounds are NaN if no state is
+    possible, and so are bounds that the solver does not find.
     """
     window = Window.of(initial, None)
     for event in record:

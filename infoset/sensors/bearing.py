@@ -111,9 +111,7 @@ class BearingSensor(Sensor):
 
     @property
     def shift_m(self) -> float:
-        """Distance of the measured point from the centre that the set subtracts, m; in space along
-        z.
-        """
+        """Measured point minus the centre, a length that the set subtracts, m; in space along z."""
         return 0.0
 
     @property
@@ -403,7 +401,8 @@ class Camera(BearingSensor):
     def error_bound(self, range_m: RangeOrRanges) -> RangeOrRanges:
         """Return the maximum size of the error at a range (m), rad.
 
-        It does not increase at distances below the centroid error, where c/d is greater than 1 rad.
+        It does not increase at distances d below the centroid error c, where c/d is greater than 1
+        rad.
         """
         distance: RangeOrRanges = np.maximum(range_m, self.centroid_error_m or 1.0)
         return self.constant_error_rad + self.centroid_error_m / distance
@@ -423,14 +422,15 @@ class Camera(BearingSensor):
     def with_drift(
         self, sight: Geometry, error: Floats, drift: Floats, *, is_whole: bool
     ) -> Floats:
-        """Return the error without or with the centroid part, in units of its bound.
+        """Return the error with the drift, in units of its bound.
 
         Parameters
         ----------
         error, drift : ndarray, shape (..., B)
-            Errors of the other part and of the drift, in units of their bounds, within [-1, 1].
+            Errors of the part without the drift and of the drift, in units of their bounds, within
+            [-1, 1].
         is_whole : bool
-            Whether `error` has the centroid part.
+            Whether `error`, and the result with it, has the centroid part.
         """
         bound = self.bound(sight) if is_whole else self.constant_error_rad
         share = self.drift_rad / bound
@@ -469,9 +469,7 @@ class OffsetCamera(Camera):
 
     @property
     def shift_m(self) -> float:
-        """Distance of the measured point from the centre that the set subtracts, m; in space along
-        z.
-        """
+        """Measured point minus the centre, a length that the set subtracts, m; in space along z."""
         return self.offset_m[-1] if self.phase_correction else 0.0
 
     @property

@@ -49,8 +49,7 @@ def offset_share(phase_rad: float, law: Brightness) -> float:
     -----
     k = int f mu cos(b) sin(l) dO / int f mu dO over the lit and visible part of the sphere, with
     the longitude l from the line of sight toward the Sun, the latitude b, mu = cos(b) cos(l) and
-    mu0 = cos(b) cos(l - phi); f is mu0, mu0 / (mu0 + mu) or the indicator weighted by 1 / mu of
-    a binary image.
+    mu0 = cos(b) cos(l - phi); f is mu0, mu0 / (mu0 + mu), or 1 for a binary image.
     """
     if phase_rad == 0.0:
         return 0.0

@@ -71,8 +71,9 @@ def jitter(
 
     A Gaussian error has no bound. In N images of two angles there are 2 N new errors, 2 N of the
     drift and 2 constant ones: 4 (2 N + 1) Q(k) = 1 - confidence for k standard deviations, where Q
-    is the tail of a Gaussian. A flight leaves the assumptions with at most this probability. The
-    set on board uses the bounds only, and neither the spectrum nor the time constant.
+    is the tail of a Gaussian. A flight leaves the assumptions with a probability of at most 1 -
+    confidence. The set on board uses the bounds only, and neither the spectrum nor the time
+    constant.
     """
     if not 0.0 < exposure_s < period_s < flight_s:
         raise ValueError(
@@ -107,7 +108,7 @@ def jitter(
 
 
 def _integral(density: Callable[[float], float], first_hz: float, last_hz: float) -> float:
-    """Return the integral of a spectrum between two frequencies, over their logarithm."""
+    """Return the integral of a spectrum between two positive frequencies, over their logarithm."""
 
     def by_logarithm(logarithm: float) -> float:
         frequency_hz = math.exp(logarithm)

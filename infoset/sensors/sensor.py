@@ -52,7 +52,10 @@ class Geometry(Protocol):
 
 
 def along_x_m(alpha_rad: Floats, range_m: Floats) -> Floats:
-    """Return the part of distances along x, m, from line-of-sight angles, shape (C, B), rad."""
+    """Return the part of distances along x, m, from line-of-sight angles, shape (C, B), rad.
+
+    It is negative behind x = 0, where an angle is beyond a right one.
+    """
     slope = np.tan(alpha_rad)
     distance_per_x = np.sqrt(1.0 + (slope * slope).sum(axis=0))
     return np.asarray(np.copysign(range_m / distance_per_x, np.cos(alpha_rad[0])))
