@@ -25,8 +25,8 @@ class MissCause(Enum):
     """
 
     ENGINE = "engine"
-    """No critical decision: the miss without impulses is more than all impulses, with any budget,
-    can correct.
+    """No critical decision: the miss without impulses exceeds the radius of the body by more than
+    all impulses, with any budget, can correct.
     """
     BUDGET = "budget"
     """With more budget, a hit would have been possible at the start, or after the critical
@@ -34,7 +34,8 @@ class MissCause(Enum):
     """
     KNOWLEDGE = "knowledge"
     """At the critical decision no impulse was right for all possible misses, and at the last
-    decision these were still wider than the body."""
+    decision these were still wider than the body. Also if there is no critical decision, and
+    neither the engine nor the budget is the cause: then the set was empty at the decisions."""
     SATURATED = "saturated"
     """At the critical decision no impulse was right for all possible misses, but at the last one
     these were narrow: the miss was known too late."""
@@ -105,7 +106,8 @@ class DecisionLog:
         self._steps: list[int] = []
         self._tracking = np.zeros((steps, lateral[1]), dtype=bool)
         self._budget_m_s = np.zeros((steps, lateral[1]))
-        # The last row stays zero: it stands for the time after the last decision.
+        # The last row of both stays zero: there is no decision after the last one, and an impulse
+        # whose delay ends after the last step is not executed.
         self._ends_m = np.zeros((steps + 1, 2, *lateral))
         self._executed_m_s = np.zeros((steps + 1, *lateral))
 
@@ -242,8 +244,12 @@ def count_causes(
 
 
 def max_of_cause(causes: NDArray[np.object_], values_m: Floats, cause: MissCause) -> float | None:
-    """Return the maximum of a column over the misses of a cause; None without such misses."""
-    return max(values_m[causes == cause.value].tolist(), default=None)
+    """Return the maximum of a column over the misses of a cause.
+
+    Unknown values are NaN, and do not count. None without a known value.
+    """
+    of_cause = values_m[causes == cause.value]
+    return max(of_cause[~np.isnan(of_cause)].tolist(), default=None)
 
 
 def _unknown_m(flights: _AtDecisions, rows: Integers) -> Floats:

@@ -11,7 +11,7 @@ import numpy as np
 from infoset.arrays import Floats
 from infoset.covered_set import CoveredSetView
 from infoset.information_set import InformationSetView
-from infoset.limits import Checked, Limits, NotNegative
+from infoset.limits import NOT_NEGATIVE, Checked, Limits
 from infoset.sensors import Sensor
 from infoset.sensors.sensor import Geometry
 
@@ -35,17 +35,18 @@ class WrongImages(Checked):
     Parameters
     ----------
     number : int
-        Number of wrong images of each flight.
+        Number of wrong images of each flight; all images, if there are fewer.
     size : tuple of float
         Minimum and maximum error of a wrong image in units of its bound: the logarithm is uniform,
         and the sign of each axis random.
     when_s : tuple of float, or None
-        Interval of the times before the nominal arrival, s; None is the whole flight.
+        Minimum and maximum time of a wrong image before the nominal arrival, s, both included; None
+        is the whole flight.
     """
 
     number: Annotated[int, _NUMBER]
     size: Annotated[tuple[float, float], _SIZE] = (2.0, 100.0)
-    when_s: tuple[NotNegative, NotNegative] | None = None
+    when_s: Annotated[tuple[float, float], NOT_NEGATIVE] | None = None
 
 
 @dataclass(frozen=True)
@@ -58,12 +59,13 @@ class WrongRanges(WrongImages):
     Parameters
     ----------
     number : int
-        Number of wrong ranges of each flight.
+        Number of wrong ranges of each flight; all ranges, if there are fewer.
     size : tuple of float
         Minimum and maximum error of a wrong range in units of its bound: the logarithm is uniform,
         and the sign random. A negative range becomes zero.
     when_s : tuple of float, or None
-        Interval of the times before the nominal arrival, s; None is the whole flight.
+        Minimum and maximum time of a wrong range before the nominal arrival, s, both included; None
+        is the whole flight.
     """
 
 

@@ -17,6 +17,7 @@ from infoset.guidance import NoiseKind, Situation, Strategy, Thruster, make_stra
 from infoset.sim import Body, MissCause, Results, Scenario, simulate
 from infoset.sim.draws import draw
 from infoset.sim.engagement import Step
+from infoset.sim.miss_cause import max_of_cause
 from tests.space import in_space
 
 ENGINE, BUDGET, KNOWLEDGE, SATURATED, GUIDANCE = MissCause
@@ -253,3 +254,18 @@ def test_causes_equal_an_independent_computation(brief: Scenario) -> None:
         differ += sum(found is not want for found, want in zip(results.causes, wanted, strict=True))
     assert min(counted[cause] for cause in MissCause) > 20
     assert (counted, differ) == (expected, 0)
+
+
+@pytest.mark.parametrize(
+    ("values_m", "maximum"),
+    [
+        ([np.nan, 3.0, 4.0, 9.0], 4.0),
+        ([5.0, np.nan, 3.0, 9.0], 5.0),
+        ([np.nan, np.nan, np.nan, 9.0], None),
+    ],
+)
+def test_unknown_values_do_not_count_in_the_maximum_of_a_cause(
+    values_m: list[float], maximum: float | None
+) -> None:
+    causes = np.array(["knowledge", "knowledge", "knowledge", "engine"], dtype=object)
+    assert max_of_cause(causes, np.array(values_m), MissCause.KNOWLEDGE) == maximum

@@ -150,6 +150,14 @@ def test_wrong_images_are_images_in_the_interval_of_times() -> None:
     assert (np.abs(errors[:, changed]) <= 4.0).all()
 
 
+@pytest.mark.parametrize("when_s", [(100.0, 2.0), (-5.0, 2.0)])
+def test_reversed_and_negative_times_of_wrong_images_are_refused(
+    when_s: tuple[float, float],
+) -> None:
+    with pytest.raises(ValueError, match="when_s"):
+        WrongImages(3, when_s=when_s)
+
+
 def test_wrong_images_of_a_run_do_not_depend_on_the_batch() -> None:
     scenario = scenario_of("asteroid-1997", 1, 2, NoiseKind.RANDOM)
     together = draw(scenario, [0, 1, 2], 0).wrong
