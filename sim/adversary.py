@@ -70,7 +70,10 @@ class Objective(Enum):
 
 
 class NothingCountsError(ValueError):
-    """In every engagement of a search the set became empty, or the miss was not finite."""
+    """No engagement of a search counts.
+
+    In each the miss was not finite, or with `keep_set` the set became empty.
+    """
 
 
 @dataclass(frozen=True)
@@ -187,7 +190,8 @@ def find_worst(
     TypeError, ValueError
         If the budget or the number of threads is not an integer from 1, or the seed not one from 0.
     NothingCountsError
-        If in every simulated engagement the set became empty, or the miss was not finite.
+        If in every simulated engagement the miss was not finite, or with `keep_set` the set became
+        empty.
 
     Notes
     -----
@@ -362,7 +366,11 @@ class _AdversarySearch:
         return valued, int(results.set_emptied.sum())
 
     def _select(self, plans: Plans, young: bool) -> None:
-        """Update the elite and the history with new flights."""
+        """Update the elite and the history with new flights.
+
+        The elite is in descending order of value. Of plans with equal values one remains, so that
+        at most one plan that does not count is among them.
+        """
         rivals = plans if self.elite is None else self.elite.join(plans)
         kept: list[int] = []
         of_lineage: Counter[int] = Counter()
@@ -410,6 +418,9 @@ def start_of(scenario: Scenario, start: Floats) -> dict[str, float]:
 def _in_chunks(
     plans: Plans, constructions: Constructions | None
 ) -> list[tuple[Plans, Constructions | None]]:
-    """Split plans into equal parts of at most `CHUNK`."""
+    """Split at least one plan into as few parts of at most `CHUNK` plans as possible.
+
+    The sizes of the parts differ by at most one.
+    """
     parts = np.array_split(np.arange(len(plans)), -(-len(plans) // CHUNK))
     return [(plans.take(part), constructions and constructions.take(part)) for part in parts]

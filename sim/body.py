@@ -131,8 +131,8 @@ class Body(Checked):
     def inscribed_m(self) -> float:
         """Radius of the largest circle around the aim point that is certainly inside the body, m.
 
-        A miss of at most this radius hits, whatever the direction of the ellipse is. It is not
-        positive if the aim point can be outside.
+        A miss of at most this radius hits: at `axis_angle_rad`, or for all directions if that is
+        None. It is zero if the aim point can be on the edge, and negative if it can be outside.
         """
         longer_m, shorter_m = self.axes_m
         if self.aim_m is None:
@@ -145,6 +145,8 @@ class Body(Checked):
 
     def contains(self, lateral_m: Floats, axis_angle_rad: ArrayLike | None) -> Flags:
         """Return whether points of the plane across the approach are inside the silhouette.
+
+        Points of the edge are inside.
 
         Parameters
         ----------
@@ -187,7 +189,8 @@ def _turned(points_m: Floats, angle_rad: ArrayLike) -> Floats:
 def _distance_to_edge(along_m: float, across_m: float, longer_m: float, shorter_m: float) -> float:
     """Return the distance of a point of the first quadrant from an ellipse; negative outside.
 
-    `along_m` and `across_m` are its coordinates along the longer and the shorter axis.
+    `along_m` and `across_m`, zero or positive, are the coordinates of the point along the longer
+    and the shorter axis of the ellipse, `longer_m` and `shorter_m` its semi-axes.
 
     Notes
     -----

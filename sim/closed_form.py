@@ -136,9 +136,9 @@ def _limiting_images_s(scenario: Scenario) -> Floats:
 
 
 def _images_and_speeds_m(scenario: Scenario, images_s: Floats) -> float:
-    """Return the distance of the two motions of `worst_shift_m` at the arrival, m.
+    """Return half the distance at the arrival of two motions as in `worst_shift_m`, m.
 
-    In space it is the distance across both axes.
+    `images_s` limit their difference. In space it is half the distance across both axes.
     """
     model = scenario.set_model
     misses_m = []
@@ -151,8 +151,9 @@ def _images_and_speeds_m(scenario: Scenario, images_s: Floats) -> float:
 def worst_shift_m(scenario: Scenario) -> Floats | None:
     """Return the shift of the measured position across x by game noise, m, shape (C, steps).
 
-    The steps are from t = 0 to the last image. None without a cut-off or times of impulses, or with
-    fewer than two images until the last decision.
+    The steps are from t = 0 to the last image until the last decision. None without a cut-off or
+    times of impulses, or with fewer than two such images. All these images count, also if some may
+    be wrong.
 
     Two motions with the same images differ by at most 2 b along an axis at each image, with the
     error bound b, m. Let this difference be 2 b0 at the last image before the last decision, and 2

@@ -15,7 +15,9 @@ Rows = tuple[tuple[float, ...], ...]
 CORRELATION_ROUNDING = 1e-6
 """Differences of correlations that are rounding: files have about seven digits."""
 DIGITS = 12
-"""Digits of the correlations of `covariance_of`: more than files have, and fewer than rounding."""
+"""Decimals of the correlations of `covariance_of`: more than files have, and fewer than the 16 of a
+float, the last of which are rounding errors.
+"""
 SAMPLE = 2000
 """Starts that estimate the share within a box: a share of 1 % has a standard error of 0.2 %."""
 
@@ -102,7 +104,11 @@ class Covariance:
 
     @cached_property
     def correlation(self) -> Floats:
-        """Correlations, shape (n, n); a component that is exactly known has zeros and one."""
+        """Correlations, shape (n, n).
+
+        A component whose variance in `matrix_m2` is zero has zeros and one: its covariances there,
+        which can only be zero, are not used.
+        """
         if self.matrix_m2:
             inverse = np.divide(1.0, self.sigma, out=np.zeros(self.size), where=self.sigma > 0.0)
             exact = np.diag(np.where(self.sigma > 0.0, 0.0, 1.0))
@@ -132,18 +138,19 @@ class Covariance:
         return self.sigma[:, None] * lower
 
     def share_within(self, half: Floats) -> float:
-        """Return the share of normal values from -`half` to `half`, shape (n,).
+        """Return the share of normal states with all components from -`half` to `half`.
 
-        It is estimated by a fixed sample.
+        `half` has the shape (n,), and both ends count. The share is estimated by a fixed sample.
         """
         sample = np.random.default_rng(0).standard_normal((SAMPLE, self.size)) @ self.root.T
         return float((np.abs(sample) <= half).all(axis=1).mean())
 
 
 def covariance_of(matrix: Floats) -> Covariance:
-    """Return a covariance matrix as standard deviations and rounded correlations.
+    """Return a covariance matrix in space, shape (6, 6), as deviations and rounded correlations.
 
-    The correlations are the lower triangle.
+    The correlations are the lower triangle. A matrix that is symmetric up to rounding is made
+    symmetric.
     """
     symmetric = 0.5 * (matrix + matrix.T)
     given = Covariance(matrix_m2=tuple(map(tuple, symmetric.tolist())))

@@ -1,4 +1,4 @@
-"""The first image in which a body is bright enough, from its magnitude."""
+"""The distance from which a camera sees a body, by the magnitude of the body."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ class Magnitude(Checked):
     def distance_m(self, sun_distance_m: float) -> float:
         """Return the distance of the camera at which the body has the limiting magnitude, m.
 
-        `sun_distance_m` is the distance of the body from the Sun. It is that of V = H + 5 log10(r
-        d) + q(phase), with both distances in au.
+        `sun_distance_m` is the distance r of the body from the Sun. The distance d of the camera
+        follows from V = H + 5 log10(r d) + q(phase), with V = `limit`, and r and d in au.
         """
         fainter = self.limit - self.absolute - phase_magnitude(self.phase_deg)
         product_au2 = math.pow(10.0, 0.2 * fainter)

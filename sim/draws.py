@@ -77,7 +77,8 @@ class Draws:
     redraws : ndarray of int, shape (B,), or None
         Normal starts outside the dispersion that were drawn again; None for uniform starts.
     axis_angle_rad : ndarray, shape (B,), or None
-        Directions of the ellipse of the body, uniform; None where it is known, or not drawn.
+        Directions of the ellipse of the body, rad, uniform in [0, pi); None if the direction is
+        known, or the body is no ellipse.
     """
 
     position_m: Floats
@@ -119,7 +120,10 @@ class Starts(NamedTuple):
 
 
 def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
-    """Return the random numbers of some runs, which depend on the seed and the run only."""
+    """Return the random numbers of some runs.
+
+    In a scenario they depend on the seed and the run only, not on the other runs.
+    """
     steps = max_number_of_steps(scenario)
     axes = scenario.set_model.axes
     starts = draw_starts(scenario, runs, seed)
@@ -272,7 +276,8 @@ def max_number_of_steps(scenario: Scenario) -> int:
 
     The time at the lowest closing speed is increased by the share of this speed that gravity can
     take away, at least by 1 %. Two steps are added for flights of few steps, whose 1 % is less than
-    a step.
+    a step. If gravity can take away more than `MAX_SPEED_CHANGE`, a flight may end before its
+    closest approach.
     """
     box = scenario.dispersion
     slowest = -box.vx_m_s[1]

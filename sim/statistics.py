@@ -96,7 +96,10 @@ def shows(size: int, level: float) -> bool:
 
 
 def shown_quantiles(sample: Floats, levels: Sequence[float]) -> list[float | None]:
-    """Return quantiles of a sample that is not empty; None for those that it does not show."""
+    """Return quantiles of a sample that is not empty; None for those that it does not show.
+
+    The levels are in [0, 1].
+    """
     values = np.quantile(sample, levels).tolist()
     return [
         value if shows(len(sample), level) else None
@@ -148,6 +151,8 @@ def estimate_quantiles(
 
     Raises
     ------
+    TypeError
+        If the sample or the confidence is not real numbers.
     ValueError
         If the sample is empty or not finite, or a level or the confidence is out of its range.
 
@@ -180,7 +185,8 @@ def estimate_quantiles(
 def order_statistics(size: int, level: float, confidence: float) -> tuple[int, int]:
     """Return the ranks, from 1, of the two values of a sample that enclose the quantile of a level.
 
-    A rank below 1 or above `size` means that no value bounds that side.
+    They enclose the true quantile with at least the probability `confidence`. A rank below 1 or
+    above `size` means that no value bounds that side.
     """
     from scipy.stats import binom  # slow to load, and few commands need it
 

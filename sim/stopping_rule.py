@@ -16,7 +16,8 @@ from infoset.sim.statistics import estimate_quantiles, level_name, number_text
 QUANTITIES = ("miss_m", "impulse_m_s", "guaranteed_miss_m")
 """Columns of results whose quantiles are estimated."""
 DIGITS = r"[0-9]{1,20}(?:\.[0-9]{1,25})?(?:[eE][+-]?[0-9]{1,3})?"
-"""A number as text: any that `number_text` writes, and of limited length."""
+"""A number as text, without a sign and of limited length: any finite one from zero on that
+`number_text` writes."""
 _RULE = re.compile(
     rf"\s*(?P<quantity>\w+)\s+p(?P<percent>{DIGITS})\s+ci\s*<\s*(?P<width>{DIGITS})\s*"
 )
@@ -107,7 +108,10 @@ class StoppingRule(Checked):
         return np.asarray(column.to_numpy(np.float64, na_value=np.nan))
 
     def met_by(self, sample: Floats) -> bool:
-        """Return whether the interval of a sample is narrow enough."""
+        """Return whether the interval of a finite sample is narrower than the width.
+
+        It is not if the sample is empty, or too small to bound both sides.
+        """
         if not sample.size:
             return False
         (estimate,) = estimate_quantiles(sample, [self.quantile.level], self.confidence)

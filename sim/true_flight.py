@@ -75,7 +75,8 @@ class TrueFlight:
         """Simulate one step, and detect the closest approaches and the arrivals within it.
 
         `sight` is the geometry before the impulse of the step, and `noise_side` is the side to
-        which the noise shifts the true state: a worst-case target accelerates to that side.
+        which the noise shifts the true state: a worst-case target accelerates to that side. Where
+        it is zero, and if it is None, the target accelerates to the side of its predicted miss.
         """
         target_m_s2 = self._acceleration_m_s2(step, sight, impulse_m_s, noise_side)
         passage = self._motion.advance(self._step_s, target_m_s2)
@@ -123,9 +124,10 @@ class TrueFlight:
     def _distance_from_aim_m(self, lateral_m: Floats) -> Floats:
         """Return the minimum distances from the aim point, m, from those of the centre.
 
-        The motion is straight between the two approaches, which are metres apart. At that of the
-        centre r . v = 0, which gives x; the square of the distance of r + a is that of the centre's
-        approach less the part along v.
+        The motion is straight between the two approaches, which are metres apart. At the approach
+        of the centre r . v = 0, which gives x. The minimum distance of the aim point has the square
+        |r + a|^2 - (a . v)^2 / v^2. The present velocity is used in place of the velocity v of the
+        approach.
         """
         velocity = self._motion.velocity_m_s.T
         x_m = -(lateral_m * velocity[:-1]).sum(axis=0) / velocity[-1]
@@ -137,8 +139,9 @@ class TrueFlight:
     def _acceleration_m_s2(
         self, step: int, sight: Sight, impulse_m_s: Floats, noise_side: Floats | None
     ) -> Floats | None:
-        """Return the accelerations of the targets over a step; None for targets that keep theirs,
-        which is zero at the start.
+        """Return the accelerations of the targets over a step, m/s^2, shape (C, B).
+
+        None without a target that manoeuvres: the motion keeps its acceleration, which is zero.
         """
         if self._target_m_s2 is not None:
             return np.asarray(self._target_m_s2[:, :, step])
