@@ -42,10 +42,11 @@ class Plans:
     sides : ndarray, shape (n, axes, steps)
         Sign of the target's acceleration.
     lineage, changes : ndarray of int, shape (n,)
-        Index of the first plan from which a plan was derived, and number of changes since then.
+        Index of the first plan from which a plan was derived, and number of plans from that one to
+        this, each with up to `MAX_CHANGES` changes of the one before.
     value : ndarray, shape (n,)
-        Value that the search maximises, m; -inf if the engagement does not count, or before it is
-        simulated.
+        Value that the search maximises, m; -inf if the engagement does not count. Before it is
+        simulated, a first plan has -inf and another one the value of the plan before it.
     """
 
     start: Floats
@@ -118,7 +119,10 @@ class _ConstructedNoise(GameNoise):
 
     @property
     def truth_side(self) -> Floats:
-        """Side to which the shift moves the true state, shape (B,) or (C, B); 0 for no shift."""
+        """Side to which the shift moves the true state, shape (B,) or (C, B); 0 for no shift.
+
+        If the target keeps its side, it is that side instead of `shift_side`.
+        """
         if self.target_side is None:
             return self.shift_side
         return np.where(self.shift_side == 0.0, 0.0, self.target_side)
@@ -203,7 +207,10 @@ class Planner:
             self._changes.append(self._turn_target)
 
     def first(self, count: int) -> tuple[Plans, Constructions]:
-        """Return first plans, in equal numbers for each construction, and their constructions."""
+        """Return first plans and their constructions.
+
+        The numbers of plans of the constructions differ by at most one.
+        """
         makers = [
             *(_Maker(f"game noise, tie {tie.value}", tie, self._coins) for tie in TieRule),
             _Maker("extremes kept in random order", None, self._coins),
@@ -257,7 +264,10 @@ class Planner:
         return Constructions(choices, np.full(count, tie is None), np.full(count, side))
 
     def children(self, elite: Plans, count: int) -> Plans:
-        """Return changed plans of the elite; plans with a greater miss are chosen more often."""
+        """Return changed copies of plans of the elite, which is in descending order of value.
+
+        Plans with a greater value are chosen more often.
+        """
         ranks = np.floor(len(elite) * self._random.random(count) ** 2).astype(np.int64)
         plans = elite.take(ranks)
         for i in range(count):
@@ -268,8 +278,9 @@ class Planner:
         return plans
 
     def _starts(self, count: int) -> Floats:
-        """Return starts in B x D; in a quarter of them, some coordinates are at an end of their
-        interval.
+        """Return starts in B x D.
+
+        In half of them, each coordinate is at an end of its interval with the probability one half.
         """
         share = self._random.random((count, len(self._lower)))
         at_end = (self._random.random(share.shape) < 0.5) & (self._random.random((count, 1)) < 0.5)
@@ -317,7 +328,11 @@ class Planner:
         plans.errors[i, ANGLE, self._some_axes(), self._span(plans, i)] *= -1.0
 
     def _move_switch(self, plans: Plans, i: int) -> None:
-        """Move one switching time by a few steps; for both axes, one of the first axis."""
+        """Move one switching time by one to four steps; without a switch, change nothing.
+
+        If both axes are chosen, the switch is one of the first axis, and the errors of both change
+        their sign in these steps.
+        """
         errors = plans.errors[i, ANGLE, self._some_axes()]
         signs = np.sign(errors[0, : self._last_step(plans, i) + 1])
         switches = np.flatnonzero(np.diff(signs))
@@ -331,14 +346,14 @@ class Planner:
             errors[:, max(0, begin - by) : begin] *= -1.0
 
     def _give_block(self, plans: Plans, i: int) -> None:
-        """Set the errors of a block."""
+        """Set the errors of all sensors in a block, to one value for each sensor and axis."""
         values = [-1.0, 0.0, 1.0, self._random.uniform(-1.0, 1.0)]
         plans.errors[i, ..., self._span(plans, i)] = self._random.choice(
             values, (len(self.sensors), self._axes, 1)
         )
 
     def _move_error(self, plans: Plans, i: int) -> None:
-        """Change the size of the errors of a block."""
+        """Add a constant to the errors of each sensor and axis in a block, within their bounds."""
         errors = plans.errors[i, ..., self._span(plans, i)]
         deviation = 10.0 ** self._random.uniform(-2.0, 0.0)
         by = self._random.normal(0.0, deviation, (len(self.sensors), self._axes, 1))

@@ -50,9 +50,11 @@ class Approach:
     """An approach without impulses, with (y, z, x) along (T, R, S) of the B-plane across the
     velocity at its start.
 
-    It starts `start_s` after the epoch of the states, with the relative state (y, z, x) and (V_y,
-    V_z, V_x), its covariance and the attracting body, and lasts `flight_s` until the closest
-    approach at (B.T, B.R). Until then the closing speed and the direction of approach change.
+    It starts `start_s` after the epoch of the states, before it if negative, with the relative
+    state (y, z, x) and (V_y, V_z, V_x), its covariance and the attracting body, None in free space.
+    It lasts `flight_s` until the closest approach at (B.T, B.R) = `miss_m`. Until then the relative
+    speed increases by `speed_change_m_s`, and its direction changes by an angle whose sine is
+    `turn_rad`: it is small.
     """
 
     start_s: float
@@ -65,7 +67,7 @@ class Approach:
     turn_rad: float
 
     def box(self, sigmas: float) -> StateBox:
-        """Return the box of a number of standard deviations around the state."""
+        """Return the box of a number of standard deviations to each side of the state."""
         y, z, x, v_y, v_z, v_x = (
             (_rounded(mean - sigmas * sigma), _rounded(mean + sigmas * sigma))
             for mean, sigma in zip(self.state, self.covariance.sigma, strict=True)
@@ -172,7 +174,8 @@ def closest_approach_s(states: Floats, parameter_m3_s2: float) -> float:
     def radial(_time: float, state: Floats) -> float:
         return float(state[6:9] @ state[9:12])
 
-    # The event is a minimum of the distance: r . v goes from falling to rising.
+    # The event is a minimum of the distance: r . v goes from negative to positive, and from
+    # positive to negative if the integration is backward.
     radial.terminal = True  # type: ignore[attr-defined]
     radial.direction = np.sign(horizon_s)  # type: ignore[attr-defined]
     time_s = 0.0

@@ -25,16 +25,17 @@ from infoset.sim.undecided_cells import UndecidedCells
 from infoset.sim.versions import versions
 
 FEWEST_CHUNKS = 256
-"""Minimum number of chunks of a large campaign: a hundred workers have a few each, and a killed
-process loses less than 1 % of the runs.
+"""Number of chunks above which they are made longer, by whole batches: a large campaign then has
+129 to 256 chunks, and more where `MAX_CHUNK` limits their length. So each of a hundred workers has
+one, and a killed process loses less than 1 % of the runs.
 """
 MAX_CHUNK = 4096
-"""Maximum number of engagements per chunk. Chosen; results do not depend on it: a campaign of a
-million runs has some 250 files.
+"""Limit of the engagements per chunk by default, of which whole batches are taken, 4000. Chosen;
+results do not depend on it: a campaign of a million runs has some 250 files.
 """
 FEWEST_A_CELL = 50
-"""Minimum number of engagements per chunk of a sweep, so that files are few. Chosen; results do not
-depend on it.
+"""Minimum number of engagements per chunk of a sweep by default, so that files are few. Chosen;
+results do not depend on it.
 """
 
 
@@ -104,8 +105,8 @@ class Campaign:
     Raises
     ------
     TypeError, ValueError
-        If a number is out of its range, the noise is not a `CampaignNoise`, or the axes and the
-        cells do not fit together.
+        If a number is out of its range, the noise is no `CampaignNoise` and neither has the method
+        `measure` nor can be called, or the axes and the cells do not fit together.
     """
 
     scenario: Scenario
@@ -260,7 +261,8 @@ class Campaign:
         """Return the engagements per file: one or more batches of the engine.
 
         Small chunks limit the work that is lost if a process stops. Large chunks limit the number
-        of files. Chunks of a sweep are not larger than a cell, because cells may be extended later.
+        of files. Chunks of a sweep are not larger than the minimum number of runs of a cell or
+        `FEWEST_A_CELL`, because cells may be extended later.
         """
         batches = -(-self._max_runs // (FEWEST_CHUNKS * ENGAGEMENTS_AT_ONCE))
         size = max(1, min(batches, MAX_CHUNK // ENGAGEMENTS_AT_ONCE)) * ENGAGEMENTS_AT_ONCE
@@ -275,6 +277,9 @@ class Campaign:
     ) -> None:
         """Simulate and store the chunks that the folder lacks; with a rule, those of undecided
         cells, until the rule stops the campaign.
+
+        If the rule has stopped cells in an earlier session (`cell_runs`), only missing files of the
+        runs before that are simulated.
         """
         cells = None
         store = folder.write

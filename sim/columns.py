@@ -107,8 +107,8 @@ def fields_of(owner: Any, table: Mapping[str, Sequence[Cell]]) -> dict[str, Any]
     """Return the arguments of a dataclass from its columns by name: the inverse of `values_of`.
 
     Optional columns may be missing. A ValueError is raised if another column is missing or unknown,
-    if the columns differ in length, if a value is not of the column's kind, or if one component of
-    several is unknown in some runs.
+    if a column is not declared, if the columns differ in length, if a value is not of the column's
+    kind or beyond `MAXIMUM`, or if one component of several is unknown in some runs.
     """
     declared = columns_of(owner)
     _check_table(table, declared)

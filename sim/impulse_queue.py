@@ -36,7 +36,8 @@ class ImpulseQueue:
     budget_left_m_s : ndarray, shape (B,)
         Budget without the impulses that are decided.
     is_spent : ndarray of bool, shape (B,)
-        Engagements whose strategy commanded an impulse with less than the minimum impulse left.
+        Engagements whose strategy commanded an impulse of at least the minimum impulse with a
+        smaller budget left; none if the minimum impulse is zero.
     last_m_s : ndarray, shape (C, B)
         Impulses given in the last step.
     """
@@ -111,6 +112,9 @@ class ImpulseQueue:
     def give(self, step: int, flying: Flags) -> Floats:
         """Return the impulses that are due in a step, m/s; zero after the closest approach if the
         engine has a delay.
+
+        It is called once in each step, after `decide`. `flying` are the engagements before their
+        closest approach.
         """
         due = self._waiting.pop(0)
         if self.lead_s > 0.0:
@@ -122,8 +126,10 @@ class ImpulseQueue:
         return due
 
     def is_over(self, step: int) -> Flags:
-        """Return whether no later step can give an impulse: after the last one of the schedule, or
-        without budget.
+        """Return whether no later step can give an impulse, shape (B,).
+
+        That is so from the last step of the schedule on, or with less budget than the minimum
+        impulse, and only if no decided impulse waits. It is called after `give` in the same step.
         """
         if self._last_step is not None and step >= self._last_step:
             is_over = np.ones(len(self.budget_left_m_s), dtype=bool)

@@ -33,7 +33,8 @@ class StepMeasurements(NamedTuple):
     sensors : dict of str to Sensor
         Sensors that are due, in the order in which they cut the set.
     cuts : tuple of Cut
-        Values and engagements, one for all or one each with and without the image.
+        Values and engagements: one cut for all that track, or, if images can be lost, one where the
+        image was taken and, with other sensors due, one where it was lost.
     values : mapping of str to ndarray
         Values of the sensors that measured in at least one engagement.
     """
@@ -55,9 +56,11 @@ class Instruments:
     sensors : dict of str to Sensor
         Sensors on board by name.
     latest : mapping of str to ndarray
-        Last values measured by each sensor.
+        Last values measured by each sensor. A sensor is missing before its first measurement; the
+        angle is NaN in engagements that have lost all images so far.
     seen : mapping of str to ndarray of bool
-        Engagements in which each sensor measured in this step; empty if all did.
+        Engagements in which each sensor measured in this step. Empty if no image can be lost in the
+        step: then all sensors that are due measured in all.
     """
 
     def __init__(self, scenario: Scenario, draws: Draws, noise: MeasurementNoise) -> None:
@@ -87,7 +90,10 @@ class Instruments:
         tracking: Flags,
         information: InformationSetView,
     ) -> StepMeasurements:
-        """Measure with the sensors that are due."""
+        """Measure with the sensors that are due, and update `latest` and `seen`.
+
+        Nothing is measured, and the noise is not called, if no engagement tracks.
+        """
         self.seen = {}
         due = self._due(step)
         if not due or not some(tracking):

@@ -53,7 +53,11 @@ class LabelEnds:
         return some(control_is_over > self._is_over)
 
     def fire(self, impulse_m_s: Floats, where: Flags, time_s: float) -> None:
-        """Move the labels that have left and have not arrived by impulses of shape (C, B), m/s."""
+        """Change the misses of labels whose control has ended by impulses, m/s, shape (C, B).
+
+        Impulses that were decided before can still be given then. A label whose range is zero at
+        `time_s` keeps its miss.
+        """
         if not self._engagements.size:
             return
         impulse = np.where(where, impulse_m_s, 0.0)
@@ -81,7 +85,7 @@ class LabelEnds:
         Parameters
         ----------
         left, feasible : ndarray of bool, shape (B, S)
-            Sections that leave the set now, and all sections before.
+            Sections that leave the set now, and all sections that it had before they leave.
         control_is_over : ndarray of bool, shape (B,)
             Engagements in which no further impulse can be given.
         labels_m : ndarray, shape (B, S)

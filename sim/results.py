@@ -200,6 +200,7 @@ class Results:
     def __post_init__(self) -> None:
         unknown = np.ma.getmaskarray(self.guaranteed_miss_m) | (not self.guarantees)
         within = self.miss_m <= self.guaranteed_miss_m.filled(np.inf)
+        # Without a measurement nothing has removed the true state.
         object.__setattr__(self, "truth_kept", self.truth_margin_m.filled(0.0) >= 0.0)
         object.__setattr__(self, "phi_held", np.ma.MaskedArray(within, mask=unknown))
         object.__setattr__(self, "b_plane_m", b_plane(self.lateral_miss_m, self.b_plane_t_rad))

@@ -84,8 +84,8 @@ STEPS_ROUNDING = 1e-9
 Chosen: far above the rounding of a quotient, and less than one step.
 """
 SUN_ROUNDING = 1e-9
-"""Share of the direction of the Sun along an axis that is zero: the cosine of 90 deg is 6e-17 in
-floats.
+"""Component of the direction of the Sun along an axis below which it counts as zero: the cosine of
+90 deg is 6e-17 in floats.
 """
 MIN_SHARE_WITHIN = 0.01
 """Minimum share of the starts of a covariance within the dispersion; a start is drawn again at most
@@ -120,10 +120,12 @@ class Sun(Checked):
 
 
 class Manoeuvre(Enum):
-    """How the target accelerates along z, within its bound.
+    """How the target accelerates along each lateral axis: by its full acceleration, or not.
 
-    CONSTANT keeps its sign, BANG_BANG changes it at equal intervals, RANDOM_TELEGRAPH at random
-    times; WORST_CASE has the sign of the predicted miss of the true state, and increases it.
+    NONE does not accelerate. CONSTANT keeps its sign, BANG_BANG changes it at equal intervals,
+    RANDOM_TELEGRAPH at random times; WORST_CASE has the sign of the predicted miss of the true
+    state, and increases it. With game noise that shifts the true state, WORST_CASE has the side of
+    this shift.
     """
 
     NONE = "none"

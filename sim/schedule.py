@@ -87,8 +87,9 @@ def _true_arrivals_s(scenario: Scenario) -> tuple[float, float]:
 def image_times_s(scenario: Scenario) -> list[float]:
     """Return the times of the images until the last decision, s before the nominal arrival.
 
-    They decrease. Without times of impulses the last decision is for the last step before the
-    minimum range.
+    They decrease, and an image in the step of that decision counts. Without times of impulses the
+    last decision is for the last step until the minimum range. The list is empty if there is no
+    such image.
     """
     model = scenario.set_model
     steps = scenario.impulse_steps
@@ -104,7 +105,10 @@ def image_times_s(scenario: Scenario) -> list[float]:
 
 
 def images_until(scenario: Scenario, last_step: int) -> Iterator[int]:
-    """Yield the steps with images of the line-of-sight angles until a step, the last one first."""
+    """Yield the steps with images of the line-of-sight angles, from `last_step` back to the start.
+
+    `last_step` itself counts.
+    """
     sensor = scenario.bearing_sensor
     period_steps = scenario.set_model.steps_in(sensor.period_s)
     for step in reversed(range(0, last_step + 1, period_steps)):

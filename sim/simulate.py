@@ -131,7 +131,10 @@ def broken_assumption(settings: SetSettings) -> str:
 
 
 def _level_of_user() -> int:
-    """Return the level of the first caller outside the project, for `warnings.warn` there."""
+    """Return the `stacklevel` for `warnings.warn` in the calling function.
+
+    The warning then names the line of the first caller outside the project.
+    """
     frame = inspect.currentframe()
     level = 0
     while frame is not None and frame.f_globals.get("__name__", "").startswith("infoset."):

@@ -20,8 +20,9 @@ def acceleration_m_s2(
 ) -> Floats:
     """Return the lateral acceleration of the targets of a batch over one step, m/s^2, shape (C, B).
 
-    `draws`, shape (C, B, steps), are uniform in [-1, 1]. `predicted_miss_m`, shape (C, B), is the
-    signed predicted miss z + V_z (time to go) of the true state.
+    `draws`, shape (C, B, steps), are uniform in [-1, 1]. Of `predicted_miss_m`, shape (C, B), only
+    the sign counts, zero as positive, and only for `Manoeuvre.WORST_CASE`: it is the signed
+    predicted miss of the true state, or the side to which the noise shifts this state.
     """
     first = _first_side(draws)
     if target.manoeuvre is Manoeuvre.NONE:

@@ -56,7 +56,7 @@ class CampaignFolder:
         return cls(path, read_manifest(path))
 
     def has(self, cell: int, runs: Sequence[int]) -> bool:
-        """Return whether a chunk is stored."""
+        """Return whether a chunk with exactly these runs is stored."""
         return _name(cell, runs) in self._names
 
     @property

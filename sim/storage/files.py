@@ -26,7 +26,8 @@ def replace_file(file: Path, content: bytes) -> None:
 
     The content is written to a temporary file in the same folder and flushed to the disk; then the
     file is renamed, which is atomic, and the folder is flushed so that the new name is on the disk
-    too. Raises `OSError`; the file is then unchanged.
+    too. Raises `OSError`: the file is then unchanged, or complete if only the flush of the folder
+    failed.
     """
     temporary = file.parent / f"{_TEMPORARY}{os.getpid()}-{secrets.token_hex(4)}.tmp"
     try:

@@ -71,7 +71,7 @@ class Manifest:
     require : str or None
         Requirement of a sweep in the last session; it does not change any result.
     extended : bool
-        Whether runs were ever added to a sweep, by a rule or by a greater number of runs.
+        Whether a later session of a sweep had more runs or another rule than the one before it.
     scenario : Scenario
         Scenario, in a sweep before it is varied.
     own_noise : str or None
