@@ -122,9 +122,9 @@ class TschaunerHempel(HeldMotion):
             float(anomaly) for anomaly in self.orbit.eccentric_anomaly(np.array([start_s, end_s]))
         )
 
-        times = self.orbit.time_of_eccentric(
-            even_breaks(first, last, (last - first) / self._panel_rad)
-        )
+        panels = (last - first) / self._panel_rad
+        need_panels(start_s, end_s, panels)
+        times = self.orbit.time_of_eccentric(even_breaks(first, last, panels))
         times[0] = start_s
         times[-1] = end_s
         return np.maximum.accumulate(np.minimum(times, end_s))

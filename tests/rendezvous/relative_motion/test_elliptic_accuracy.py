@@ -266,6 +266,12 @@ def test_interval_with_too_many_panels_is_refused() -> None:
         ValueError, match=r"turns by 5e\+05 rad from 2 s to 500000 s; at most 200000 rad"
     ):
         motion.segment([0.0, 2.0], [1.0, 5e5])
+    # The message has times, not anomalies.
+    slow = TschaunerHempel(EllipticOrbit(0.1, 0.5))
+    with pytest.raises(
+        ValueError, match=r"turns by 5e\+05 rad from 20 s to 5e\+06 s; at most 200000 rad"
+    ):
+        slow.breaks(20.0, 5e6)
 
 
 def test_empty_array_of_intervals_gives_empty_arrays_of_matrices() -> None:
