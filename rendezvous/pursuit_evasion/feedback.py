@@ -29,7 +29,8 @@ _OUTPUT_TIMES = 65
 within the radius is refined. A capture between two of them is not seen. Chosen: `leo-pursuit` and
 `geo-pursuit` end alike from 17 to 257, with and without errors of observation (measured)."""
 _PAST = 1.05
-"""Length of the last leg by the time to the predicted capture, to include the closest approach.
+"""Length of the last leg, if it is not a full one, relative to the time to the predicted capture:
+it includes the closest approach.
 
 Chosen: the pursuits of `_OUTPUT_TIMES` end alike from 1.0125 to 1.2 (measured).
 """
@@ -204,6 +205,9 @@ class _Pursuit:
             self._pursuer = replace(self._pursuer, start=pursuer.at(spell)[:6], mass=mass)
             self._evader = replace(self._evader, start=evader(spell), mass=evader_mass)
             self._time += spell
+            if self._steering is None and _lasts(self._evader, self._dry[1]) < spell:
+                # As its plan, see `_plan`.
+                self._evader = replace(self._evader, thrust=0.0, flow=0.0)
 
             planned = self._plan(plan, spell, self._seen(plan))
             known = plan
@@ -217,7 +221,11 @@ class _Pursuit:
         return self._end(Ended.NO_PLAN)
 
     def _plan(self, before: Node, spell: float, evader: ExtremalCraft) -> Node | None:
-        """Solve the game from the current states, from the previous plan or from scratch."""
+        """Solve the game from the current states, from the previous plan or from scratch.
+
+        `spell` is the duration of the leg that was flown. An evader whose propellant does not last
+        another such leg coasts. The result is None if there is no plan.
+        """
         if _lasts(evader, self._dry[1]) < spell:
             evader = replace(evader, thrust=0.0, flow=0.0)
         pair = Pair(self._pursuer, evader)

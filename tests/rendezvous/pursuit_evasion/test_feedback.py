@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,9 +11,11 @@ from infoset.rendezvous.pursuit_evasion import (
     Observation,
     Policy,
     Steering,
+    feedback,
     fly,
     solve,
 )
+from infoset.rendezvous.pursuit_evasion._pair import Node
 
 from .conftest import MakeGame
 
@@ -61,3 +65,30 @@ def test_delayed_and_noisy_observation_delays_the_capture(slides: MakeGame) -> N
     assert noisy.ended is Ended.CAPTURED
     assert noisy.time_s > solution.capture.time_s
     assert noisy.time_s == pytest.approx(solution.capture.time_s, rel=1e-3)
+
+
+def test_path_of_an_optimal_evader_without_propellant_is_continuous(
+    slides: MakeGame, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Formerly it thrust in a leg whose plan was to coast: its path began 2 km away."""
+    game = slides(capture_radius_m=20e3)
+    first = solve(game)
+    assert first.capture is not None
+    # Its propellant ends 2 s after the capture, thus within the last leg.
+    dry_kg = game.evader.mass_kg - game.evader.flow_kg_s * (first.capture.time_s + 2.0)
+    game = replace(game, evader=replace(game.evader, dry_mass_kg=dry_kg))
+    gaps_m = []
+    path_of_leg = feedback._Pursuit._evader_path
+
+    def recorded(
+        pursuit: feedback._Pursuit, own: Node, spell: float
+    ) -> tuple[feedback.PathNow, float]:
+        path, mass = path_of_leg(pursuit, own, spell)
+        gap = np.linalg.norm(path(0.0)[:3] - pursuit._evader.start[:3])
+        gaps_m.append(gap * first.units.length_m)
+        return path, mass
+
+    monkeypatch.setattr(feedback._Pursuit, "_evader_path", recorded)
+    fly(game, None, replan_s=1200.0, observation=Observation(300.0, 500.0, 0.05), seed=3)
+    # States of a plan agree with the start to its residual, some 1e-11 of 42 166 km.
+    assert max(gaps_m) < 0.1
