@@ -48,7 +48,7 @@ _PARTS = 4
 with the bound, to find its switching times. Two switches between neighbouring nodes, which are at
 most 0.03 rad apart, are missed; the interval with them is then halved (`_resolved`)."""
 _EXACT = 1e-11
-"""Error of the effects, relative, at which no more rounds are needed."""
+"""Error of the effects, relative, at which no more rounds are needed: a thousandth of `GAP`."""
 _MAX_ROUNDS = 12
 """Maximum number of rounds of new switching times; each round squares the error. Five were enough
 in 285 random cases."""
@@ -64,7 +64,8 @@ _FARTHEST = 1e12
 """Maximum size of the efforts, relative to the goals. Efforts grow as the reserve of the bound
 decreases, and with so small a reserve no digit of the control is exact."""
 _ROUNDED = 1e-11
-"""Decrease of the value by a Newton step, relative, below which values are no longer compared."""
+"""Predicted decrease of the value by a Newton step, relative, up to which values are not compared:
+their rounding would decide."""
 _ARMIJO = 0.1
 """Part of the decrease of the linear model that a Newton step must attain (Armijo's rule). Chosen:
 12 random arcs have the same energy from 1e-4 to 0.4 (measured)."""
@@ -75,8 +76,8 @@ roundings of the curvature."""
 _BISECTIONS = 50
 """Bisections of a switching time: its error is then below the rounding of times."""
 _RULE_TOLERANCE = 1e-12
-"""Error of the effect in an interval, relative to the effect of the bound in the arc: the sum of a
-hundred such errors is below `GAP`."""
+"""Error of the integral of the control over an interval, relative to the bound times the duration
+of the arc: the sum of a hundred such errors is below `GAP`."""
 _MAX_HALVINGS = 40
 """Maximum number of halvings of an interval: its length is then near the rounding of times."""
 _RULE_ERROR = 1e-4
@@ -190,7 +191,7 @@ class BoundedFlight:
         return self.edges_s
 
     def state(self, time_s: ArrayLike) -> Floats:
-        """Return the states, m and m/s, shape (..., 6).
+        """Return the states, m and m/s, shape (..., 6), at times from the start to the end.
 
         Gauss and Legendre's rule is applied between neighbours of all breaks and times.
         """
@@ -215,8 +216,8 @@ class BoundedOptimum(NamedTuple):
     """Minimum of the energy of all arcs.
 
     `free`, shape (f,), are the free values. For each arc, `costates` contains the costate (6,) at
-    its end, `energies` int |u|^2 dt, m^2/s^3, and `edges_s` times, s, from start to end, between
-    which its control is smooth.
+    its end, `energies` int |u|^2 dt without the weight, m^2/s^3, and `edges_s` times, s, from start
+    to end, between which its control is smooth.
     """
 
     free: Floats
@@ -281,7 +282,7 @@ def solve_bounded(arcs: Sequence[Arc], max_m_s2: float) -> BoundedOptimum:
         if judged.violation < best.violation:
             best = judged
             chosen = BoundedOptimum(judged.free, tuple(costates), judged.energies, tuple(edges))
-        # Rounds end when the errors are rounding, or no longer decrease.
+        # Rounds end when the error is rounding, or is not halved.
         if judged.violation <= _EXACT or judged.violation > 0.5 * before:
             break
         before = judged.violation
@@ -300,7 +301,8 @@ def least_bound(arcs: Sequence[Arc]) -> LeastBound:
     Krasovskii's problem of moments: sum lambda_k . e_k <= u_max sum int |s_k| dt for all costates,
     so each costate with sum L_k' lambda_k = 0 gives the lower bound sum lambda_k . d_k / sum int
     |s_k| dt. A cone program (Clarabel) with the integral as a sum finds the best costates; the
-    result is their lower bound with the exact integral.
+    result is their lower bound with the exact integral, whatever the solver found. If all d_k are
+    zero, the bound is 0 and the shares are equal.
     """
     whiteners = [arc.whitener() for arc in arcs]
     goals = [white @ arc.missing for arc, white in zip(arcs, whiteners, strict=True)]
@@ -366,7 +368,7 @@ class _Dual:
     """The negative dual as a function of a point, shape (p,).
 
     The whitened efforts y of all arcs are `basis` @ point; the basis spans the efforts with sum w_k
-    L_k' lambda_k = 0.
+    L_k' lambda_k = 0. `goals` and `slopes` are the whitened d_k and L_k, without the `weights` w_k.
     """
 
     basis: Floats
@@ -391,7 +393,10 @@ class _Dual:
         return np.split(self.basis @ point, np.cumsum([len(goal) for goal in self.goals])[:-1])
 
     def minimise(self, sampled: Sequence[_Samples], point: Floats) -> Floats:
-        """Return the point of the smallest value, by Newton's method with halved steps (Armijo)."""
+        """Return the point of the smallest value, by Newton's method with halved steps (Armijo).
+
+        It is the last point of the search also if that has not settled: `judged` finds the error.
+        """
         value, slope, curvature = self._expand(sampled, point)
         settled = _SETTLED * float(np.linalg.norm(self.basis.T @ self._weighted_goal()))
 
@@ -498,7 +503,7 @@ def _longest_goal(
     """Return efforts y that minimise the sum of int |s| dt, by a cone program.
 
     The constraints are sum y . goal = 1 and sum slopes' y = 0 over all arcs. The variables are the
-    efforts, and upper bounds of |s| at all nodes, divided by sqrt(length_s).
+    efforts, and upper bounds of |s| sqrt(length_s) at all nodes, which have no unit.
     """
     sizes = [len(goal) for goal in goals]
     length_s = max(float(samples.weights.sum()) for samples in sampled)
@@ -554,7 +559,7 @@ def _curvature(samples: _Samples, wanted: Floats, sizes: Floats, max_m_s2: float
 
 
 def _null_space(rows: Floats) -> Floats:
-    """Orthonormal columns that rows, shape (f, p), map to zero: shape (p, p - f)."""
+    """Orthonormal columns that independent rows, shape (f, p), map to zero: shape (p, p - f)."""
     if not len(rows):
         return np.eye(rows.shape[1])
     return np.asarray(qr(rows.T)[0][:, len(rows) :])
@@ -583,7 +588,7 @@ def _resolved(arc: Arc, costate: Floats, max_m_s2: float) -> Floats:
     """Ends of intervals, s, on which the rule is exact for the control of a costate.
 
     The initial intervals are parts of panels, cut where |s| = u_max. An interval is halved until
-    its halves change the effect of the control by less than `_RULE_TOLERANCE`.
+    its halves change the integral of the control by at most `_RULE_TOLERANCE`.
     """
 
     def wanted(times: Floats) -> Floats:

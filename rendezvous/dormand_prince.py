@@ -91,6 +91,7 @@ def add_slopes(weights: Floats, factor: float, slopes: Floats, count: int, total
 def error_of_step(y: Floats, y_next: Floats, ky: Floats, tolerance: float, h: float) -> float:
     """Return the error of a step in y, divided by the tolerance, which is relative and absolute.
 
+    A step is good enough below 1. `h` is the length of the step, positive also backward in time.
     Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, section II.10.
     """
     third = fifth = 0.0

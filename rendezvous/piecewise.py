@@ -18,8 +18,8 @@ ROUNDING_BELOW = 1e-7
 """Last coefficients, relative to the maximum value, that are rounding if they no longer decrease: a
 control of nearly singular matrices has as few digits."""
 _NOT_DECREASING = 0.2
-"""Ratio of the last coefficients before and after a panel is halved above which they no longer
-decrease: halving reduces resolved coefficients of degree 11 by 2^11."""
+"""Ratio of the last coefficients after a panel is halved to those before, above which they no
+longer decrease: halving reduces resolved coefficients of degree 11 by 2^11."""
 _TIME_ROUNDINGS = 64.0
 """Number of roundings of a time whose effect on the values is accepted."""
 _AT_ONCE = 2048
@@ -61,7 +61,7 @@ _DEGREE = 2 * (NODES - 1)
 _SAMPLES = 4 * _DEGREE
 """Number M of samples that bound the square: the factor is then 1.08."""
 _FACTOR = 1.0 / np.cos(0.5 * np.pi * _DEGREE / _SAMPLES)
-"""Maximum of a polynomial divided by the maximum of its samples (Ehlich and Zeller, 1964)."""
+"""Bound of the maximum of |p|, p a polynomial, by that of its samples (Ehlich and Zeller, 1964)."""
 # Matrices: the control at the nodes of its square, the coefficients of the square from them, these
 # coefficients on both halves of the panel, and the square at the samples.
 _AT_SQUARES = chebyshev.chebvander(chebyshev_points(_DEGREE + 1), NODES - 1)
@@ -152,8 +152,8 @@ def max_control(control: Callable[[Floats], Floats], breaks_s: Floats) -> float:
 
     `control` returns u, shape (k, 3), m/s^2, at k times, s. It is smooth between `breaks_s`, which
     do not decrease, and its motion turns by about a radian at most between two of them
-    (`LinearMotion.breaks`). Between short panels at late times the error is the effect of the
-    rounding of times. Raise `ValueError` if a value is not finite, or no break is later than
+    (`LinearMotion.breaks`). On short panels at late times the error is the effect of the rounding
+    of times. Raise `ValueError` if a value is not finite, or no break is later than
     another.
 
     On panels u is a polynomial of degree 11 to 1e-11 (`resolve`), and |u|^2 has degree 22. A

@@ -158,7 +158,8 @@ def orbit_fault(
 ) -> str | None:
     """Return the reason why the orbit of a state is not a closed orbit outside the planet, or None.
 
-    The orbit is not an ellipse, or its perigee is inside the planet.
+    The orbit is not an ellipse, is a fall through the centre, or its perigee is not above the
+    surface.
     """
     if not position_m.any():
         return "the position is the centre of the planet"
@@ -305,7 +306,7 @@ def _scaled_start(
 
 
 def _to_perigee(start: _Start) -> Floats:
-    """Time to the next perigee; infinite after the perigee of a parabola or a hyperbola."""
+    """Time to the next perigee; zero at it, infinite after that of a parabola or a hyperbola."""
     binding = start.binding
     outward = start.outward
     transverse_squared = start.transverse_squared

@@ -72,7 +72,8 @@ def follow(
 
     A `radius` of minus infinity follows the branch beyond the capture. `max_work` limits the
     radians of extremals propagated: the same limit on every machine. A capture that ends the branch
-    is computed to full precision. Some 20 steps a revolution, of two or three iterations each.
+    is computed to full precision; whether it is a saddle is not checked. Some 20 steps a
+    revolution, of two or three iterations each.
     """
     nodes = [first]
     step = first.duration
@@ -146,7 +147,8 @@ def polish(pair: Pair, guess: Floats, duration: float, radius: float, latest: fl
 def first_crossing(before: Node, after: Node, radius: float) -> float | None:
     """Return the time at which l first falls to a radius between two extremals, or None.
 
-    It is computed from the cubic through both.
+    It is computed from the cubic through both; `before` is above the radius. If `after` is not, and
+    the cubic has no root between them, it is the time of `after`.
     """
     step = after.duration - before.duration
     # Between its ends a cubic falls below the lower one by at most 4/27 of its slopes times the
@@ -178,7 +180,10 @@ def first_crossing(before: Node, after: Node, radius: float) -> float | None:
 
 
 def _predicted(nodes: list[Node], duration: float) -> Floats:
-    """Extrapolate (pursuer, evader, nu) by the cubic through the last two extremals and slopes."""
+    """Extrapolate (pursuer, evader, nu) by the cubic through the last two extremals and slopes.
+
+    A single extremal is extrapolated by its slope.
+    """
     node = nodes[-1]
     step = duration - node.duration
     guess = node.vector + step * node.slope

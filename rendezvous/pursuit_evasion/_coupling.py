@@ -18,10 +18,11 @@ from infoset.rendezvous.pursuit_evasion._extremal import Response, invert
 class Coupling(NamedTuple):
     """Both sides linearised at a guess, and coupled by r_E - r_P = l nu.
 
-    `inverse`, shape (3, 3), gives the change of (nu, T) or (nu, l) for an error of that equation.
-    `slope`, shape (15,), is d/dT of (pursuer, evader, nu) at l free, and `curvature`, shape (2,),
-    contains the eigenvalues of the Hessian of h_P - h_E across nu, ascending. If the equations are
-    singular, `solvable` is False, and the rest is not meaningful.
+    `inverse`, shape (3, 3), gives the change of (nu, T), if T is free, or of (nu, l) for an error
+    of that equation, with nu by its two components across. `slope`, shape (15,), is d/dT of
+    (pursuer, evader, nu) at l free, and `curvature`, shape (2,), contains the eigenvalues of the
+    Hessian of h_P - h_E across nu, ascending. If the equations are singular, `solvable` is False,
+    and the rest is not meaningful.
     """
 
     inverse: Floats
@@ -31,7 +32,7 @@ class Coupling(NamedTuple):
 
 
 class Step(NamedTuple):
-    """A change of (pursuer, evader, nu, T, l), shape (17,), and its maximum component."""
+    """A change of (pursuer, evader, nu, T, l), shape (17,), and its maximum absolute component."""
 
     change: Floats
     size: float
@@ -127,7 +128,8 @@ def newton_step(
 ) -> Step:
     """Return Newton's step of a guess, shape (17,), of (pursuer, evader, nu, T, l).
 
-    `rho`, shape (2, 6), are the corrections of the end states.
+    `rho`, shape (2, 6), are the corrections of the end states, and `inverse` is that of `couple`
+    with the same `time_free`.
     """
     gap = np.empty(3)
     turn = np.zeros(3)

@@ -83,11 +83,12 @@ def derivatives(
 ) -> None:
     """Fill the acceleration `g`, its gradient `first` and, if wanted, the gradient of `first` @ p.
 
-    `first` and `second` have shape (3, 3), and `with_second` asks for `second`. `oblateness` is mu
-    J2 R^2 / 2, the axis z: the potential is mu/r + oblateness (1/r^3 - 3 z^2/r^5). For a function f
-    of q = r . r the gradient is 2 f' r, its gradient 4 f'' r r^T + 2 f' I, and along p 8 f''' s r
-    r^T + 4 f'' (r p^T + p r^T + s I) with s = r . p. The oblate part is a power of q less z^2 times
-    a power of q; `_subtract_axial` does the latter.
+    `first` and `second` have shape (3, 3), and `with_second` asks for `second`; with oblateness it
+    is written to in any case. `oblateness` is mu J2 R^2 / 2, the axis z: the potential is mu/r +
+    oblateness (1/r^3 - 3 z^2/r^5). For a function f of q = r . r the gradient is 2 f' r, its
+    gradient 4 f'' r r^T + 2 f' I, and along p 8 f''' s r r^T + 4 f'' (r p^T + p r^T + s I) with s =
+    r . p. The oblate part is a power of q less z^2 times a power of q; `_subtract_axial` does the
+    latter.
     """
     q = r[0] * r[0] + r[1] * r[1] + r[2] * r[2]
     s = r[0] * p[0] + r[1] * p[1] + r[2] * p[2]
@@ -95,12 +96,12 @@ def derivatives(
     f = mu * np.sqrt(inverse)
     f1 = -0.5 * f * inverse
     f2 = -1.5 * f1 * inverse
-    f4 = -2.5 * f2 * inverse
+    f3 = -2.5 * f2 * inverse
     if oblateness != 0.0:
-        f3 = oblateness * inverse * np.sqrt(inverse)
-        f1 -= 1.5 * f3 * inverse
-        f2 += 3.75 * f3 * inverse * inverse
-        f4 -= 13.125 * f3 * inverse * inverse * inverse
+        oblate = oblateness * inverse * np.sqrt(inverse)
+        f1 -= 1.5 * oblate * inverse
+        f2 += 3.75 * oblate * inverse * inverse
+        f3 -= 13.125 * oblate * inverse * inverse * inverse
 
     for i in range(3):
         g[i] = 2.0 * f1 * r[i]
@@ -110,7 +111,7 @@ def derivatives(
     if with_second:
         for i in range(3):
             for j in range(3):
-                second[i, j] = 8.0 * f4 * s * r[i] * r[j] + 4.0 * f2 * (r[i] * p[j] + p[i] * r[j])
+                second[i, j] = 8.0 * f3 * s * r[i] * r[j] + 4.0 * f2 * (r[i] * p[j] + p[i] * r[j])
             second[i, i] += 4.0 * f2 * s
 
     if oblateness != 0.0:
@@ -134,7 +135,7 @@ def _subtract_axial(
     f = 3.0 * oblateness / (q * q * np.sqrt(q))
     f1 = -2.5 * f / q
     f2 = 8.75 * f / (q * q)
-    f4 = -39.375 * f / (q * q * q)
+    f3 = -39.375 * f / (q * q * q)
     along = 2.0 * f1 * s
 
     # The derivatives of f alone, times z^2.
@@ -142,7 +143,7 @@ def _subtract_axial(
         g[i] -= square * 2.0 * f1 * r[i]
         for j in range(3):
             plain = 4.0 * f2 * r[i] * r[j]
-            turned = 8.0 * f4 * s * r[i] * r[j] + 4.0 * f2 * (r[i] * p[j] + p[i] * r[j])
+            turned = 8.0 * f3 * s * r[i] * r[j] + 4.0 * f2 * (r[i] * p[j] + p[i] * r[j])
             if i == j:
                 plain += 2.0 * f1
                 turned += 4.0 * f2 * s
@@ -168,7 +169,7 @@ def _rates(s: float, y: Floats, z: Floats, parameters: _Parameters, dy: Floats, 
 
     r' = -v, v' = -(g + (T / m) u), p_r' = G p_v and p_v' = p_r, where g is the acceleration of
     gravity, G its gradient, u the direction of p_v and m the mass at the end + flow s. At the end
-    of the game p_v is zero, and u is the direction of its rate, p_r.
+    of the game p_v is zero, and u is the direction of its rate, p_r, there and beyond (s <= 0).
 
     The variations follow, with K the gradient of G p_v: dr' = -dv, dv' = -(G dr + (T / m) du),
     dp_r' = G dp_v + K dr, dp_v' = dp_r. The last column also changes the mass by one.
@@ -289,7 +290,8 @@ def flow_back(
     Either time may be the greater. `y`, shape (12,), is (position, velocity, p_r, p_v), and `z`,
     shape (12, 9), contains its derivatives; an array without rows (`NO_VARIATIONS`) means that only
     y is integrated. `craft`, shape (5,), is (mu, oblateness, thrust, mass at the end of the game,
-    mass flow). Returns False if the steps are too many or too small, or a number overflows.
+    mass flow). Returns False if the steps are too many or too small, or a number overflows; y and z
+    are then those of the last step that was accepted.
 
     The `tolerance` of a step's error, relative and absolute, applies to y alone. A step costs 12
     stages of some 0.3 us, or 0.1 us for y alone.
@@ -415,7 +417,8 @@ def respond(
 def invert(matrix: Floats, inverse: Floats) -> float:
     """Fill the inverse of a matrix, shape (n, n), and return its determinant.
 
-    The determinant is 0 if the matrix is singular or not finite. Gauss and Jordan's elimination
+    The determinant is 0 if the matrix is singular or not finite, and `inverse` then has no meaning.
+    Gauss and Jordan's elimination
     with partial pivoting; the matrix is overwritten.
     """
     count = len(matrix)

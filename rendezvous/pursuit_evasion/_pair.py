@@ -87,7 +87,10 @@ class ExtremalCraft:
     def respond(
         self, end_state: Floats, nu: Floats, plane: Floats, duration: float, tolerance: float
     ) -> Response | None:
-        """Linearise at a guess of the end state; None if it cannot be propagated."""
+        """Linearise at a guess of the end state.
+
+        It is None if the guess cannot be propagated, or the map to the start is singular.
+        """
         craft = self.kernel_craft(duration)
         response = respond(self.start, craft, end_state, nu, plane, duration, tolerance)
         return response if response.residual < math.inf else None
@@ -95,7 +98,10 @@ class ExtremalCraft:
     def correct(
         self, response: Response, end_state: Floats, nu: Floats, duration: float, tolerance: float
     ) -> Floats | None:
-        """Return Newton's correction of a guess, (6,), with the derivatives of another."""
+        """Return Newton's correction of a guess, (6,), with the derivatives of another.
+
+        It is None if the guess cannot be propagated.
+        """
         y = end_of(end_state, nu)
         craft = self.kernel_craft(duration)
         if not flow_back(y, NO_VARIATIONS, craft, 0.0, duration, tolerance):
@@ -263,10 +269,11 @@ class Pair:
     ) -> Node | None:
         """Return the extremal near a guess, shape (15,), of end states and nu.
 
-        It is None if Newton's method does not converge. If `time_free`, the distance is known and
-        the duration a guess, otherwise the reverse. The propagation has a `tolerance`, that of
-        derivatives `linear_tolerance` if it is larger; `close` is the maximum size of the last
-        correction, and `latest` the longest duration that can be propagated.
+        It is None if Newton's method does not converge, a guess cannot be propagated, or the
+        duration leaves (0, `latest`]. If `time_free`, the distance is known and the duration a
+        guess, otherwise the reverse. The propagation has a `tolerance`, that of derivatives
+        `linear_tolerance` if it is larger; `close` is the maximum size of the last correction. The
+        result may be any extremal, also one that is no saddle.
 
         Both sides are propagated with their variations, then several times without, with the same
         derivatives, while each correction is a fraction of the previous one: 0.5 ms and 0.1 ms per
@@ -326,7 +333,7 @@ class Pair:
         return _Linear(p, e, plane, time_free, coupling) if coupling.solvable else None
 
     def begin(self, latest: float, radius: float) -> Node | None:
-        """Return the extremal of a short duration, at most `latest`, or None.
+        """Return a saddle of a short duration, at most half of `latest`, or None.
 
         The guess of nu is the line of sight. Its distance is greater than the capture radius: there
         is no earlier capture.

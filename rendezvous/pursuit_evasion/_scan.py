@@ -27,9 +27,9 @@ _MAX_PARTS = 4
 `geo-pursuit` 62 are solved with 1, 73 with 4 and 81 with 16, which takes twice the time (measured).
 """
 _SHORT = 1e-7
-"""Distance by which the end of another direction may be farther along a direction although its
-extremal is the farthest: above the errors of ends, the square of `_CONVERGED` and `COARSE`. From
-2.5e-8 to 4e-7 the same directions of `geo-pursuit` are kept (measured)."""
+"""Distance by which the end of another direction may be farther along a direction that is kept:
+above the errors of ends, the square of `_CONVERGED` and `COARSE`. From 2.5e-8 to 4e-7 the same
+directions of `geo-pursuit` are kept (measured)."""
 _GAIN = 1e-6
 """Minimum gain of distance for which another branch replaces a branch: ten times `_SHORT`."""
 _LONGEST = 40.0
@@ -47,14 +47,13 @@ _CLIMBS = 4
 """Number of directions from which the distance is climbed; a distance has few maxima. Chosen: that
 of `geo-pursuit` has one, which is found with 1 to 8 (measured)."""
 _MAX_CLIMBING = 40
-"""Largest number of steps of a climb, of a tenth of a turn or more. Chosen: 10 are enough for
-`geo-pursuit` (measured)."""
+"""Largest number of steps of a climb. Chosen: 10 are enough for `geo-pursuit` (measured)."""
 _APART = 0.9
 """Cosine of the smallest angle between two starts of a climb, 26 degrees. Chosen: more than the
 distance of neighbours; the maxima of `geo-pursuit` are the same from 14 to 53 degrees (measured).
 """
 _MIN_STRIDE = 1e-4
-"""Smallest step of a climb: Newton's method converges from much farther away."""
+"""Smallest step of a climb, rad: Newton's method converges from much farther away."""
 
 
 @dataclass(frozen=True)
@@ -88,9 +87,8 @@ def scan(pair: Pair, node: Node) -> Scan:
     """Compute extremals in all directions at the duration of a known extremal.
 
     120 directions per side, each from a solved neighbour: at least 0.5 s per revolution. A
-    reachable set that is not convex has several extremals per direction. If the end of another
-    direction is farther along a direction, its extremal is not the farthest, and the direction
-    counts as not found.
+    reachable set that is not convex has several extremals per direction. A direction counts as not
+    found if the end of another one is farther along it: its extremal is then not the farthest.
     """
     grid = directions(_DIRECTIONS)
     grid = grid[np.argsort(-(grid @ node.nu))]
@@ -133,7 +131,11 @@ def directions(count: int) -> Floats:
 
 
 def _fan(side: Side, state: Floats, nu: Floats, grid: Floats, duration: float) -> dict[int, End]:
-    """Find the end states of one side for the directions of a grid, sorted from nu outward."""
+    """Find the end states of one side for directions of a grid, by their rows.
+
+    `state` is the end state along nu. The grid is sorted from nu outward, so that a direction has
+    solved neighbours when its turn comes.
+    """
     first = end_along(side, state, nu, duration)
     solved: dict[int, End] = {}
     if first is None:
@@ -155,7 +157,7 @@ def _fan(side: Side, state: Floats, nu: Floats, grid: Floats, duration: float) -
 
 
 def _turn(side: Side, seed: End, toward: Floats, duration: float) -> End | None:
-    """Turn the direction of an extremal, in steps as long as they converge."""
+    """Turn an extremal into a direction in one step or, if that fails, in four equal parts."""
     parts = 1
     while parts <= _MAX_PARTS:
         here = seed
@@ -176,7 +178,7 @@ def _turn(side: Side, seed: End, toward: Floats, duration: float) -> End | None:
 def end_along(side: Side, state: Floats, nu: Floats, duration: float) -> End | None:
     """Return the end of the extremal of one side along nu, near a guess.
 
-    It is None if Newton's method does not converge.
+    It is None if Newton's method does not converge, or the extremal has a conjugate point.
     """
     plane = across(nu)
     before = np.inf
@@ -209,7 +211,8 @@ def _climb(pair: Pair, pursuer: End, evader: End, duration: float) -> Node | Non
     """Climb h_E - h_P, whose gradient is r_E - r_P, and finish with Newton's method.
 
     A stride is an angle, rad, along the normalised gradient; a gradient below 1e-3 gives shorter
-    ones. The first stride and its factors after a rise and after a fall are chosen.
+    ones. The first stride and its factors after a rise and after a fall are chosen. The result is
+    None if no stride rises, or there are too many.
     """
     stride = 0.2
     for _ in range(_MAX_CLIMBING):

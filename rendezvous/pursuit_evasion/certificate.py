@@ -94,7 +94,7 @@ class Certificate:
     Parameters
     ----------
     residual : float
-        Error of the start states, nondimensional.
+        That of the capture: error of the start states and of r_E - r_P = R nu, nondimensional.
     hamiltonian_drift : float
         Maximum relative change of the Hamiltonian, scaled to one, along the paths.
     integrator_gap_m : float
@@ -109,16 +109,18 @@ class Certificate:
     no_earlier_capture : bool
         Whether l was followed from the start of the game and stayed above the capture radius.
     min_distance_m : float
-        Minimum distance of both paths from the planet's centre.
+        Minimum distance of both paths from the planet's centre, at some 290 times of the game.
     pursuer_alone_s : float or None
-        Earliest capture of the evader on its fixed optimal path; None if it could not be computed.
+        Earliest capture of the evader on its fixed optimal path, the capture time if there is no
+        earlier one; None if it could not be computed.
     evader_deviations : tuple of Deviation
         Deviations of the evader, with the best responses of the pursuer: each must capture until
         the capture time.
     directions_found, directions_tried : int
         Number of directions with a solution, and number of directions tried; zero without a scan.
     max_excess_m : float or None
-        Maximum distance beyond the capture radius that some direction keeps, at the capture time.
+        Maximum distance beyond the capture radius that some direction keeps, at the capture time;
+        None without a scan, or if it found no direction.
     """
 
     residual: float
@@ -193,7 +195,7 @@ class Certificate:
 
     @property
     def claims_saddle_point(self) -> bool:
-        """Whether no check failed, and a scan decided at least half of the directions.
+        """Whether no check failed, and a scan, if made, decided at least half of the directions.
 
         `undecided` lists what the checks leave open.
         """
@@ -288,7 +290,10 @@ class _Followed(NamedTuple):
 
 
 def _followed(pursuer: Side, evader: Side, radius: float, latest: float, left: float) -> _Followed:
-    """Follow the branch of two sides to its capture, or to the latest time."""
+    """Follow the branch of two sides to its capture, or to the latest time.
+
+    At a fold it changes to a branch that keeps the evader farther away, as in `solve`.
+    """
     pair = Pair(pursuer, evader)
     first = pair.begin(latest, radius)
     if first is None:
@@ -308,7 +313,7 @@ def _followed(pursuer: Side, evader: Side, radius: float, latest: float, left: f
 
 
 def _along(paths: tuple[ExtremalPath, ExtremalPath], node: Node) -> tuple[float, float]:
-    """Return the drift of the Hamiltonians, and the minimum distance from the centre.
+    """Return the drift of the Hamiltonians, and the minimum distance from the centre, both sampled.
 
     H_P and H_E are constant each. The drift is the larger one of their maximum deviations from the
     value at the end, divided by the closing speed: the sum of both is then one. The costate of the

@@ -16,12 +16,12 @@ class CertificateVerdict(Enum):
     CAPTURED = "captured"
     """The pursuer reaches the evader, at the capture time if both are optimal."""
     ESCAPES = "escapes"
-    """An evader at least as strong keeps away until the pursuer's propellant is spent, or for the
-    longest duration.
+    """The evader keeps away for the longest duration or, if its acceleration is not less than the
+    pursuer's, until the pursuer's propellant is spent.
     """
     PROPELLANT_EXHAUSTED = "propellant-exhausted"
-    """A player's propellant is spent before the capture, although the pursuer's acceleration is
-    greater.
+    """The evader's propellant is spent before the capture, or the pursuer's, although its
+    acceleration is greater.
     """
     BRANCH_NOT_CERTIFIED = "branch-not-certified"
     """The extremals are no saddle from some duration on: nothing is claimed."""
@@ -44,7 +44,9 @@ class PlayerEnd:
 
 @dataclass(frozen=True)
 class DistanceCurve:
-    """The distance l that the evader can keep at each duration T, rising, both of shape (n,).
+    """The distance l that the evader can keep at each duration T, both of shape (n,).
+
+    Durations rise; that of a change of branch occurs twice, with the distances of both branches.
 
     `min_curvature`, shape (n,), is the lesser eigenvalue of the Hessian of h_P - h_E + l across nu,
     in units of length: a saddle while it is positive.
@@ -98,7 +100,8 @@ class Capture:
 class CaptureSolution:
     """A game with its verdict; `units` are those of nondimensional values.
 
-    There is a `capture` if the verdict is `captured`. The continuation changed `branch_changes`
+    There is a `capture` if the verdict is `captured`, and also if the branch ends in one that is no
+    saddle, with the verdict `branch-not-certified`. The continuation changed `branch_changes`
     times to a branch that keeps the evader farther away. `curve` contains the distances along the
     branch, and `looked_at_s` is the longest duration that was solved; `exhausted` is the player
     without propellant at that time, pursuer or evader.

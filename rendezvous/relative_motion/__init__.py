@@ -1,8 +1,8 @@
 """Linear relative motion about an orbit: circular, elliptic, frozen, and any A(t).
 
 Motions about a reference orbit are in Hill's axes, which rotate with it: x radially outward, y
-along the motion, z along the orbit's normal, so that z = x cross y. The origin follows the
-reference orbit.
+across x in the plane of the orbit, to the side of the motion, z along the orbit's normal, so that
+z = x cross y. The origin follows the reference orbit.
 """
 
 from infoset.rendezvous.relative_motion.clohessy_wiltshire import ClohessyWiltshire

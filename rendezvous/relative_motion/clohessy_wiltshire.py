@@ -24,7 +24,7 @@ NODES, WEIGHTS = (rule.astype(np.float64) for rule in np.polynomial.legendre.leg
 
 @dataclass(frozen=True)
 class ClohessyWiltshire(LinearMotion):
-    """Relative motion about a circular orbit, whose mean motion n is `rate_rad_s`.
+    """Relative motion about a circular orbit, whose mean motion n > 0 is `rate_rad_s`.
 
     Barseghyan and Stepanyan (2008): (1.8), X[T, t], and (2.3) with corrections, in Hill's axes. A
     transition takes about 0.1 microseconds, a Gramian at most 1.
@@ -142,7 +142,7 @@ def fill_gramians(
         else:
             _close(theta, matrix)
 
-        # The terms of these two integrals cancel.
+        # Both methods lose digits in these two integrals; these forms lose none.
         half = math.sin(0.5 * theta)
         lag = angle_less_sine(theta)
         matrix[0, 1] = -3.0 * lag * lag
@@ -160,7 +160,10 @@ def fill_gramians(
 def _integrate(
     theta: float, nodes: Floats, weights: Floats, effect: Floats, matrix: Floats
 ) -> None:
-    """Add the upper triangle for unit rate, by Gauss and Legendre's rule: two entries cancel."""
+    """Add the upper triangle for unit rate, by Gauss and Legendre's rule.
+
+    The entries [0, 1] and [3, 4], in which digits are lost, are replaced by `fill_gramians`.
+    """
     half = 0.5 * theta
     for node in range(len(nodes)):
         fill_effect(half * (1.0 + nodes[node]), effect)
@@ -174,7 +177,10 @@ def _integrate(
 
 @compiled
 def _close(theta: float, matrix: Floats) -> None:
-    """Fill the upper triangle for unit rate in closed form: (2.3) with q11 and q44 corrected."""
+    """Fill the upper triangle for unit rate in closed form: (2.3) with q11 and q44 corrected.
+
+    The entries [0, 1] and [3, 4] are filled by `fill_gramians`.
+    """
     sine = math.sin(theta)
     cosine = math.cos(theta)
     sine2 = math.sin(2.0 * theta)

@@ -11,7 +11,7 @@ def hill_state(craft: Floats, origin: Floats) -> Floats:
     """Return the state of a craft in Hill's axes about another one, shape (6,), m and m/s.
 
     `craft` and `origin` are positions and velocities in inertial axes, shape (2, 3). The axes turn
-    with the radius of the origin, at the rate h / r^2 of its angular momentum h per mass.
+    with the radius of the origin, at the rate h / r^2 of its angular momentum h > 0 per mass.
     """
     position, velocity = origin
     momentum = np.cross(position, velocity)

@@ -88,7 +88,8 @@ def state_scales(durations: Floats) -> Floats:
 def even_breaks(start_s: float, end_s: float, radians: float) -> Floats:
     """Return the ends, s, of equal panels of at most one radian.
 
-    The motion turns by `radians` in all. Raise `ValueError` if there are more than 200 000 panels.
+    The motion turns by `radians` >= 0 in all. Raise `ValueError` if there are more than 200 000
+    panels.
     """
     need_panels(start_s, end_s, radians)
     return np.linspace(start_s, end_s, max(1, int(np.ceil(radians))) + 1)

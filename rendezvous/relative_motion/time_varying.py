@@ -19,8 +19,8 @@ NODES = 8
 AGREEMENT = 2e-13
 """Relative difference of two solutions at which the finer one is exact to rounding."""
 ROUNDING_BELOW = 1e-8
-"""Relative difference from which on a difference that no longer decreases is rounding, as with
-A(t) of large elements, and not slow convergence."""
+"""Relative difference up to which a difference that no longer decreases is rounding, as with A(t)
+of large elements, and not slow convergence."""
 _NOT_DECREASING = 0.1
 """Ratio of two differences above which they no longer decrease: doubled panels reduce the error by
 2^16, and the ratio is then 1.5e-5."""
