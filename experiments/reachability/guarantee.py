@@ -563,8 +563,9 @@ def flight_lines(report: GuaranteeReport) -> Iterator[str]:
     flights = report.flights
     if len(flights.distances):
         share = flights.distances.max() / report.plan.guarantee if report.plan.guarantee else 0.0
+        plan_name = _plan_name(report.rendezvous)
         yield (
-            f"{len(flights.distances)} flights of {_plan_name(report.rendezvous)}{motion}, {bounds}: "
+            f"{len(flights.distances)} flights of {plan_name}{motion}, {bounds}: "
             f"{flights.outside} outside, worst {100.0 * share:.0f} % of the guarantee"
         )
     replanned = report.replanned
