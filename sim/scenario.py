@@ -293,11 +293,20 @@ class Scenario:
         if steps is not None and steps[-1] <= last_step:
             return
         earliest_s = self.nominal_arrival_s - first_arrival_s
+        key = "last_impulse_s"
+        asked_s = self.thruster.last_impulse_s
+        if asked_s is None and self.thruster.impulses_s:
+            key = "impulses_s"
+            asked_s = self.thruster.impulses_s[-1]
+        got = repr(asked_s)
+        if asked_s is not None and steps is not None:
+            scheduled_s = self.nominal_arrival_s - steps[-1] * step_s
+            if f"{scheduled_s:.6g}" != f"{asked_s:.6g}":
+                got += f", rounded to the step at {scheduled_s:.6g} s"
         raise ValueError(
-            f"thruster.last_impulse_s: the last burn must end before the arrival, which may be "
+            f"thruster.{key}: the last burn must end before the arrival, which may be "
             f"{earliest_s:.4g} s earlier than the nominal one, and may last {longest_s:.4g} s: "
-            f"write at least {self.nominal_arrival_s - last_step * step_s:.6g}: got "
-            f"{self.thruster.last_impulse_s!r}"
+            f"write at least {self.nominal_arrival_s - last_step * step_s:.6g}: got {got}"
         )
 
     def _check_wrong_ranges(self) -> None:

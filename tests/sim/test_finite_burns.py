@@ -192,6 +192,12 @@ def test_the_last_burn_ends_before_the_earliest_arrival(mission: Scenario) -> No
         replace(mission, thruster=late)
     with pytest.raises(ValueError, match=r"may last 86\.7 s: write at least 180: got None"):
         replace(mission, thruster=replace(late, last_impulse_s=None))
+    # 130 s is nearer to 90 s, one step of 90 s, than to two.
+    rounded = replace(engine, impulses_s=(900.0, 130.0))
+    with pytest.raises(
+        ValueError, match=r"impulses_s: .* 180: got 130\.0, rounded to the step at 90 s"
+    ):
+        replace(mission, thruster=rounded)
 
 
 def test_the_earliest_arrival_is_that_with_gravity(mission: Scenario) -> None:
