@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
@@ -18,6 +19,7 @@ from infoset.experiments.common.ephemeris.frames import centre_name, frame_of_sp
 from infoset.experiments.common.ephemeris.oem import MAX_OEM_BYTES, OemSegment, read_oem
 from infoset.experiments.common.errors import InputError, input_errors, on_a_screen
 from infoset.experiments.common.input_file import read_file, read_input, to_toml
+from infoset.experiments.interception.sun_direction import SunDirection, direction_of
 from infoset.experiments.interception.trajectory import kernels
 from infoset.experiments.interception.trajectory.files import named_file
 from infoset.limits import NUMBER, Description, Line, Name, Positive, check_fields
@@ -210,6 +212,14 @@ def _scenario(
     body = None
     if target.radius_m is not None:
         body = Body(target.radius_m)
+    camera = like.camera
+    light = direction_of(found.sun)
+    if camera is not None and camera.phase_angle_rad is not None and light is not None:
+        camera = replace(
+            camera,
+            phase_angle_rad=math.radians(light.phase_deg),
+            sun_angle_rad=math.radians(light.across_deg),
+        )
     information_set = replace(
         like.information_set,
         disturbance_m_s2=target.disturbance_m_s2 or 0.0,
@@ -228,6 +238,7 @@ def _scenario(
         covariance=found.covariance,
         target=None,
         body=body,
+        camera=camera,
         information_set=information_set,
     )
 
@@ -292,7 +303,7 @@ def _text(
         *map(on_a_screen, about_states),
         f"What is not explained here has the values of {like}: replace them by yours.",
     ]
-    comments = _comments(like, sigmas)
+    comments = _comments(like, sigmas, direction_of(found.sun))
     lines = []
     for line in to_toml(scenario).replace("], [", "],\n    [").splitlines():
         comment = comments.get(line)
@@ -300,8 +311,11 @@ def _text(
     return "\n".join([*(f"# {line}" for line in head), *lines]) + "\n"
 
 
-def _comments(like: str, sigmas: float) -> dict[str, str]:
+def _comments(like: str, sigmas: float, light: SunDirection | None) -> dict[str, str]:
     """Return the comments of the tables of a scenario file."""
+    camera = f"as {like}; centroid_error_m depends on the size of the target"
+    if light is not None:
+        camera += f"; by the direction of [sun] {light}"
     comments = {f"[{part.name}]": f"as {like}" for part in fields(Scenario)}
     return comments | {
         "[sun]": (
@@ -316,7 +330,7 @@ def _comments(like: str, sigmas: float) -> dict[str, str]:
         "[covariance]": (
             "of the start, components y, z, x and their rates; lower triangle of the correlations"
         ),
-        "[camera]": f"as {like}; centroid_error_m depends on the size of the target",
+        "[camera]": camera,
         "[body]": "of --body-radius-m",
         "[information_set]": f"as {like}, but the disturbance",
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -18,6 +19,7 @@ from infoset.experiments.interception.trajectory_file import KnownTarget, scenar
 from infoset.sim.approach import propagate
 from infoset.sim.kepler import KeplerMotion
 from infoset.sim.scenario import Scenario, corners
+from tests.built_in import scenario_text
 from tests.experiments.command_line import Command
 from tests.oem_text import HEADER, covariance_block, segment
 
@@ -131,6 +133,38 @@ def test_the_built_in_example_says_where_its_numbers_come_from(infoset: Command)
         == infoset("problems", "check", "two-states")[0]
         == 0
     )
+
+
+def test_scenario_names_the_phase_angle_and_takes_it_in_place_of_another(
+    infoset: Command, tmp_path: Path
+) -> None:
+    """The angle between -r and the relative velocity, with r after ten days of 28.97 km/s on a
+    circle: (154.1, 32.4, -0.1) million km, and (2.55, 5.17, -1.58) km/s.
+    """
+    position = np.array([154.1, 32.4, -0.1])
+    velocity = np.array([2.55, 5.17, -1.58])
+    cosine = -position @ velocity / np.linalg.norm(position) / np.linalg.norm(velocity)
+    phase_deg = np.degrees(np.arccos(cosine))
+    options = ("--body-radius-m", "50", "--overwrite", "--out", "mine.toml")
+
+    assert infoset("scenarios", "from-states", "two-states", *options)[0] == 0
+    text = Path("mine.toml").read_text()
+    found = re.search(r"by the direction of \[sun\] phase_angle_deg = ([\d.]+), sun_angle", text)
+    assert found is not None
+    # The orbit is not a circle, and the velocity changes: by about a degree.
+    assert float(found[1]) == pytest.approx(phase_deg, abs=2.0)
+
+    lit = tmp_path / "lit.toml"
+    lit.write_text(
+        scenario_text("dart-2022").replace(
+            "[camera]", "[camera]\nphase_angle_deg = 60.0\nsun_angle_deg = 0.0"
+        )
+    )
+    assert infoset("scenarios", "from-states", "two-states", *options, "--like", lit)[0] == 0
+    camera = load_scenario("mine.toml").camera
+    assert camera is not None
+    assert camera.phase_angle_rad is not None
+    assert np.degrees(camera.phase_angle_rad) == pytest.approx(float(found[1]), abs=0.05)
 
 
 def test_results_have_b_t_and_b_r_where_the_reference_plane_is_known(infoset: Command) -> None:
