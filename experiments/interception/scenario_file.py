@@ -14,6 +14,7 @@ from infoset.experiments.common.options import choice
 from infoset.experiments.common.units import duration_text, length_text
 from infoset.experiments.interception.strategies import is_own
 from infoset.experiments.interception.study import percent, some_wrong_images
+from infoset.experiments.interception.sun_direction import SunDirection, direction_of
 from infoset.guidance import strategy_names
 from infoset.model import Model, SetModel
 from infoset.sensors import OffsetCamera
@@ -157,7 +158,7 @@ def scenario_warnings(scenario: Scenario) -> list[str]:
         *_dispersion_warnings(scenario),
         *_approach_warnings(scenario),
         *_angle_warnings(scenario),
-        *_brightness_warnings(scenario),
+        *_camera_warnings(scenario),
         *_target_warnings(scenario),
         *_timing_warnings(scenario),
     ]
@@ -212,17 +213,31 @@ def _angle_warnings(scenario: Scenario) -> Iterator[str]:
         )
 
 
-def _brightness_warnings(scenario: Scenario) -> Iterator[str]:
-    """Yield a line if the bound of the centroid is less than the residual of a correction."""
-    camera = scenario.bearing_sensor
-    residual = _residual(scenario)
-    if not isinstance(camera, OffsetCamera) or residual is None:
+def _camera_warnings(scenario: Scenario) -> Iterator[str]:
+    """Yield lines about a drift without an effect, the centre of brightness and the Sun."""
+    camera = scenario.camera
+    if camera is None:
         return
-    if camera.centroid_error_m < residual.total_m:
+    if camera.drift_time_s is not None and camera.drift_rad == 0.0:
+        yield "camera.drift_time_s has no effect: camera.drift_urad is 0; set it, too"
+
+    residual = _residual(scenario)
+    if residual is not None and camera.centroid_error_m < residual.total_m:
         yield (
-            f"camera.centroid_error_m, {camera.centroid_error_m:g} m, is less than the residual of "
-            f"a correction by the rule, {residual.total_m:.3g} m: if that is the real error, the "
-            "set may lose the true state"
+            f"camera.centroid_error_m, {camera.centroid_error_m:g} m, is less than "
+            f"{residual.total_m:.3g} m, the error of the centre that a correction of the centre of "
+            "brightness leaves by the rule of docs/impactors.md: with such an error the set may "
+            "lose the true state"
+        )
+
+    found = direction_of(scenario.sun)
+    if found is None or camera.phase_angle_rad is None or camera.sun_angle_rad is None:
+        return
+    of_file = SunDirection(math.degrees(camera.phase_angle_rad), math.degrees(camera.sun_angle_rad))
+    if of_file.is_far_from(found):
+        yield (
+            f"camera has {of_file}, but the direction of [sun] gives {found}: the images have "
+            "their centre of brightness on another side"
         )
 
 
@@ -275,6 +290,8 @@ def flight_facts(scenario: Scenario) -> list[str]:
     wrong_images = scenario.set_model.wrong_images
     if wrong_images:
         errors += f" and {some_wrong_images(wrong_images)}"
+    if scenario.sun is not None:
+        errors += ", without gravity"
     if possible.images_m is not None:
         lines.append(
             f"miss that the images alone leave possible, with {errors} (closed form): up to "
@@ -338,7 +355,8 @@ def brightness_lines(scenario: Scenario) -> list[str]:
         use = f"the set subtracts it and allows for centroid_error_m, {camera.centroid_error_m:g} m"
     else:
         allowed = ", ".join(
-            f"{scenario.set_model.axis(name).angle_sensor.centroid_bound_m:.3g} m" for name in axes
+            f"{name} {scenario.set_model.axis(name).angle_sensor.centroid_bound_m:.3g} m"
+            for name in axes
         )
         use = f"the set does not subtract it and allows for {allowed}"
     parts = (
@@ -407,14 +425,29 @@ def _burn_lines(scenario: Scenario) -> list[str]:
         sensor.axis(axis).error_bound(last_m) * last_m for axis in scenario.set_model.axes
     )
     wrong_m = 0.5 * engine.burn_s(engine.max_impulse_m_s) * engine.max_impulse_m_s
+    latest_s = latest_impulse_s(scenario)
     return [
         (
             f"burns: up to {duration_text(engine.longest_burn_s)}; as impulses they would be wrong "
             f"by up to {length_text(wrong_m)}, {percent(wrong_m / bound_m)} of the error of an "
             f"image at the last one (below {percent(SMALL_BURN)}, thrust_N and mass_kg may be left "
             "out)"
-        )
+        ),
+        (
+            f"latest possible last_impulse_s: {_seconds(latest_s)} s; a later burn of the maximum "
+            "impulse might not end before the earliest possible arrival"
+        ),
     ]
+
+
+def latest_impulse_s(scenario: Scenario) -> float:
+    """Return the time before the nominal arrival, s, of the last step in which every burn ends
+    before the earliest possible arrival.
+    """
+    step_s = scenario.fitted_step_s
+    first_arrival_s = on_board_model(scenario).label_limits_m[0] / scenario.closing_speed_m_s
+    last_step = math.floor((first_arrival_s - scenario.thruster.longest_burn_s) / step_s)
+    return scenario.nominal_arrival_s - last_step * step_s
 
 
 def _span(before_s: Sequence[float]) -> str:
@@ -436,6 +469,10 @@ def schedule_json(scenario: Scenario) -> dict[str, Any] | None:
     if times is None:
         return None
 
+    latest_s = None
+    if scenario.thruster.acceleration_m_s2 is not None:
+        latest_s = latest_impulse_s(scenario)
+
     def ends(before_s: Sequence[float]) -> dict[str, float | int | None]:
         if not before_s:
             return {"number": 0, "first_s": None, "last_s": None}
@@ -451,6 +488,7 @@ def schedule_json(scenario: Scenario) -> dict[str, Any] | None:
             "before_last_decision": times.images_before_last_decision,
         },
         "impulses": ends(times.impulses_s),
+        "latest_last_impulse_s": latest_s,
         "differences": times.differences,
     }
 

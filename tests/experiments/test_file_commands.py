@@ -68,6 +68,8 @@ def test_a_built_in_file_is_shown_copied_checked_and_written_again(
     expected = FACTS if noun == "scenarios" else []
     if name in ("dart-2022", "deep-impact-2005", "haiv-2013"):
         expected = [*FACTS[:-1], CAMERA_FACT, FACTS[-1]]
+    if noun == "scenarios" and value.sun is not None:
+        expected = [*expected[:-1], f"{expected[-1]}, without gravity"]
     assert [fact.partition(":")[0] for fact in facts] == expected
     found = json.loads(infoset(noun, "check", "mine.toml", "--json")[1])
     assert (found["name"], found.get("kind", SCENARIO)) == ("mine", file.kind)
@@ -118,6 +120,9 @@ def test_check_prints_the_centre_of_brightness(infoset: Command) -> None:
     ]
     uncorrected = [*options, "--set", "camera.phase_correction=false", "--json"]
     found = json.loads(infoset("scenarios", "check", "dart-2022", *uncorrected)[1])
+    lines = infoset("scenarios", "check", "dart-2022", *uncorrected[:-1])[1].splitlines()
+    (line,) = [line for line in lines if line.startswith("centre of brightness")]
+    assert line.endswith("the set does not subtract it and allows for y 10 m, z 39.2 m")
     brightness = found["centre_of_brightness"]
     assert brightness["phase_correction"] is False
     assert brightness["offset_m"] == pytest.approx([0.0, 0.389064 * 75.0], abs=1e-4)
@@ -155,6 +160,32 @@ def test_check_says_how_wrong_impulses_would_be_in_place_of_burns(infoset: Comma
         "burns: up to 86.7 s; as impulses they would be wrong by up to 72.25 m, 470.7 % of the "
         "error of an image at the last one (below 2 %, thrust_N and mass_kg may be left out)"
     )
+
+
+def test_check_prints_the_latest_last_impulse_of_burns(infoset: Command) -> None:
+    """The object arrives up to 5 s early (82750 km at 11.501 km/s), and a burn takes 86.7 s: of the
+    steps 90 s and 180 s before the arrival only the second one is early enough; with burns of
+    83 s the first one is.
+    """
+    assert pytest.approx(-4.97, abs=0.01) == 82750.0 / 11.501 - 7200.0
+    settings = ("step_s=90", "camera.period_s=90", "thruster.thrust_N=10", "thruster.mass_kg=500")
+    options = [option for setting in settings for option in ("--set", setting)]
+    found = []
+    for max_impulse_m_s in (1.7, 1.6):
+        size = ("--set", f"thruster.max_impulse_m_s={max_impulse_m_s}")
+        _, out, _ = infoset("scenarios", "check", "haiv-2013", *options, *size)
+        found += [line for line in out.splitlines() if line.startswith("latest possible last_imp")]
+    long, short = found
+    assert long == (
+        "latest possible last_impulse_s: 180 s; a later burn of the maximum impulse might not end "
+        "before the earliest possible arrival"
+    )
+    assert short.startswith("latest possible last_impulse_s: 90 s")
+
+    _, out, _ = infoset("scenarios", "check", "haiv-2013", *options, *size, "--json")
+    assert json.loads(out)["schedule"]["latest_last_impulse_s"] == pytest.approx(90.0)
+    _, out, _ = infoset("scenarios", "check", "haiv-2013", "--json")
+    assert json.loads(out)["schedule"]["latest_last_impulse_s"] is None
 
 
 def test_check_of_a_nominal_arrival_that_is_far_too_late(infoset: Command) -> None:

@@ -152,7 +152,13 @@ def test_a_centroid_error_below_the_residual_of_the_light_has_a_warning(
     ]
     scenario = read_text(Scenario, text, "file", settings)
 
-    lines = [line for line in scenario_warnings(scenario) if "residual" in line]
+    lines = [line for line in scenario_warnings(scenario) if "centre of brightness" in line]
 
     assert len(lines) == warns
     assert all("32.6 m" in line for line in lines)
+
+
+def test_drift_time_without_a_drift_has_a_warning() -> None:
+    (line,) = scenario_warnings(camera(camera__drift_time_s="6"))
+    assert line == "camera.drift_time_s has no effect: camera.drift_urad is 0; set it, too"
+    assert scenario_warnings(camera(camera__drift_time_s="6", camera__drift_urad="1")) == []
