@@ -94,8 +94,8 @@ EpochText = Annotated[
     typer.Option(
         "--epoch",
         metavar="EPOCH",
-        help="t = 0, for example 2026-03-01T12:00:00; without UTC, TAI, TT, TDB or GPS after it, "
-        "in the time scale of the files.",
+        help="Epoch of t = 0, for example 2026-03-01T12:00:00; a time scale (UTC, TAI, TT, TDB, "
+        "GPS) may follow, default: that of the files.",
     ),
 ]
 LikeProblem = Annotated[
@@ -103,7 +103,7 @@ LikeProblem = Annotated[
     typer.Option(
         "--like",
         metavar="NAME",
-        help="The problem of infoset reach, built in or a file, whose other values it takes.",
+        help="Problem of infoset reach, built in or a file, that supplies all other values.",
     ),
 ]
 CentralParameter = Annotated[
@@ -113,7 +113,8 @@ CentralParameter = Annotated[
         metavar="M3_S2",
         min=1e-6,
         max=1e21,
-        help="Of the centre, m^3/s^2; known for the Earth, the Moon, Mars and the Sun.",
+        help="Gravitational parameter of the centre, m^3/s^2. Default: that of the Earth, the "
+        "Moon, Mars or the Sun.",
     ),
 ]
 ProblemOut = Annotated[

@@ -27,7 +27,7 @@ MAX_VALUES = 1000
 SCALE = "scale"
 """Name, after the table of a sensor, of the factor of its error bounds."""
 DRIFT = "drift_rad"
-"""An error bound whose key does not say so."""
+"""Key of an error bound without `error` in its name."""
 _NUMBER = r"([+-]?(?:[0-9]{1,20}\.?[0-9]{0,20}|\.[0-9]{1,20})(?:[eE][+-]?[0-9]{1,4})?)"
 _RANGE = re.compile(rf"(log:)?\s*{_NUMBER}\s*:\s*{_NUMBER}\s*:\s*([0-9]{{1,9}})")
 
