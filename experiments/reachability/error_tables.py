@@ -96,7 +96,7 @@ class Goal:
 
 
 @dataclass(frozen=True, kw_only=True)
-class KeepOut:
+class PassiveSafetyTable:
     """If the engines fail after an impulse, the drift stays outside a ball about the target.
 
     The engines may fail after each impulse until that of `until_period`, None for the last one, and

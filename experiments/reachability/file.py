@@ -19,7 +19,7 @@ from infoset.experiments.reachability.error_tables import (
     ExecutionError,
     Goal,
     InitialError,
-    KeepOut,
+    PassiveSafetyTable,
     Sensor,
     check_starts,
 )
@@ -263,7 +263,7 @@ class Rendezvous:
     execution_error: ExecutionError | None = None
     sensor: Sensor | None = None
     goal: Goal | None = None
-    passive_safety: KeepOut | None = None
+    passive_safety: PassiveSafetyTable | None = None
     nonlinear: bool = False
 
     def __post_init__(self) -> None:
@@ -328,7 +328,7 @@ class Rendezvous:
             raise ValueError(f'{key}: needs engine = "impulses"')
         if self.passive_safety is not None and self.sight is not None:
             raise ValueError("passive_safety: needs sensor.position_error_m, not angle_error_deg")
-        if self.model is MotionModel.FROZEN and self.orbit.eccentricity > 0.0:
+        if self.is_frozen_ellipse:
             raise ValueError(f'{key}: needs model = "time-varying" on an ellipse')
         last = None if self.passive_safety is None else self.passive_safety.until_period
         if last is not None and last >= self.periods:
@@ -337,7 +337,7 @@ class Rendezvous:
             )
         self._check_keep_out(self.passive_safety)
 
-    def _check_keep_out(self, safety: KeepOut | None) -> None:
+    def _check_keep_out(self, safety: PassiveSafetyTable | None) -> None:
         """Raise `ValueError` if drifts begin inside the ball, or lead to a hold point inside it."""
         if safety is None or self.goal is None:
             return
@@ -373,6 +373,11 @@ class Rendezvous:
     def has_impulses(self) -> bool:
         """Whether a control is an impulse, in m/s; otherwise it is thrust."""
         return self.engine is Engine.IMPULSES
+
+    @property
+    def is_frozen_ellipse(self) -> bool:
+        """Whether the linear model is not that of the ellipse, which has a bound at all times."""
+        return self.model is MotionModel.FROZEN and self.orbit.eccentricity > 0.0
 
     @property
     def control_bounds(self) -> Floats:
@@ -528,8 +533,7 @@ class Rendezvous:
 
         Held thrust, and the frozen model of an ellipse, have no bound between instants.
         """
-        is_frozen = self.model is MotionModel.FROZEN and self.orbit.eccentricity > 0.0
-        if not self.has_impulses or is_frozen:
+        if not self.has_impulses or self.is_frozen_ellipse:
             return None
         drifts = self.drifts
         flight = replace(

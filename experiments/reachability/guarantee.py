@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -68,7 +69,8 @@ _NO_GAIN = 1e-5
 _NO_PLAN = (NoRobustPlanError, NoSolutionError, UnboundedCoastError)
 """Reasons why there is no plan: constraints, the solver, and no bound of nonlinear motion."""
 _RELAXED = 10.0
-"""Factor of the bounds of states that shows whether they are the conflict; chosen."""
+"""Factor of the limit of thrust and of the bounds of states that shows whether one is the conflict;
+chosen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +197,7 @@ def solve_guarantee(
         except _NO_PLAN as error:
             raise _refusal(rendezvous, error, progress) from None
         progress(0.3)
-        if not rendezvous.nonlinear and rendezvous.sight is None:
+        if _bound_refusal(rendezvous) is None:
             parts = [part.problem for part in independent_parts(problem)]
             bound = max((lower_bound(part).value for part in parts), default=0.0)
             radius = max((information_radius(part).value for part in parts), default=0.0)
@@ -250,19 +252,19 @@ def _checked_plan(
     drifts = rendezvous.drifts
     programs = itertools.count(1)
 
-    def on_program() -> None:
+    def after_program() -> None:
         # From 60 % to 90 %: how many programs there will be is not known.
         progress(0.9 - 0.3 * 0.9 ** next(programs))
 
     def solve(problem: OutputProblem) -> AffinePlan:
         if safety is None:
             found = _feedback(rendezvous, problem)
-            on_program()
+            after_program()
             return found
         keep_out = PassiveSafety(drifts, safety.keep_out_m)
 
         def safe(each: OutputProblem) -> AffinePlan:
-            return safe_plan(each, keep_out, WINDOW, on_program).plan
+            return safe_plan(each, keep_out, WINDOW, after_program).plan
 
         return _within(rendezvous, problem, safe)
 
@@ -375,6 +377,15 @@ def _within(
     return solve(problem) if limits is None else plan_within(problem, limits, solve)
 
 
+def _bound_refusal(rendezvous: Rendezvous) -> str | None:
+    """Return why there is neither a bound of all strategies nor an answer of the last control."""
+    if rendezvous.nonlinear:
+        return "only for linear motion"
+    if rendezvous.sight is not None:
+        return "only for measured positions"
+    return None
+
+
 def _answered(
     rendezvous: Rendezvous, plan: AffinePlan, bound: float | None
 ) -> tuple[float | None, str | None]:
@@ -383,10 +394,9 @@ def _answered(
     It is that of the affine plan if no strategy can guarantee less than `_NO_GAIN` below it: an
     affine reaction is one of the possible answers.
     """
-    if rendezvous.nonlinear:
-        return None, "only for linear motion"
-    if rendezvous.sight is not None:
-        return None, "only for measured positions"
+    refusal = _bound_refusal(rendezvous)
+    if refusal is not None:
+        return None, refusal
     if rendezvous.passive_safety is not None:
         # The last control, and so the drift after it, is not known before the flight.
         return None, "not with [passive_safety]"
@@ -445,17 +455,20 @@ def _conflict(rendezvous: Rendezvous, progress: Callable[[float], None]) -> Inpu
         finally:
             progress(1.0 - 0.5 ** (done + 1))
         found.append(name)
-    told = "reduce the errors, or relax several constraints"
+    advice = "reduce the errors, or relax several constraints"
     if found:
-        told = f"relax {' or '.join(found)}, or reduce the errors"
+        advice = f"relax {' or '.join(found)}, or reduce the errors"
     return InputError(
         f"{rendezvous.name}: no plan with affine feedback keeps the constraints for all errors; "
-        f"{told}"
+        f"{advice}"
     )
 
 
 def _relaxations(rendezvous: Rendezvous) -> Iterator[tuple[str, Rendezvous]]:
     """Yield the rendezvous without one of its constraints each, and the name of it."""
+    # A file refuses a larger limit that is no limit: it is not the conflict.
+    with suppress(ValueError):
+        yield _with_more_thrust(rendezvous)
     bounds = rendezvous.bounds
     for key in ("position_m", "velocity_m_s"):
         x, y, z = (_RELAXED * value for value in getattr(bounds, key))
@@ -468,6 +481,15 @@ def _relaxations(rendezvous: Rendezvous) -> Iterator[tuple[str, Rendezvous]]:
         for number in range(len(tables)):
             rest = tables[:number] + tables[number + 1 :]
             yield f"{key} #{number + 1}", replace(rendezvous, **{key: rest})
+
+
+def _with_more_thrust(rendezvous: Rendezvous) -> tuple[str, Rendezvous]:
+    """Return the key of the limit of thrust, and the rendezvous with a larger one."""
+    if rendezvous.max_impulse_m_s is not None:
+        x, y, z = (_RELAXED * value for value in rendezvous.max_impulse_m_s)
+        return "max_impulse_m_s", replace(rendezvous, max_impulse_m_s=(x, y, z))
+    larger_m_s2 = _RELAXED * rendezvous.unit_m_s2
+    return "acceleration_m_s2", replace(rendezvous, acceleration_m_s2=larger_m_s2)
 
 
 def guarantee_lines(report: GuaranteeReport) -> Iterator[str]:
@@ -493,12 +515,7 @@ def guarantee_lines(report: GuaranteeReport) -> Iterator[str]:
     )
     noun = "impulse" if rendezvous.has_impulses else "control"
     yield line(f"last {noun} re-planned", report.answered, report.refusal or "certified")
-    note = ""
-    if rendezvous.nonlinear:
-        note = "only for linear motion"
-    elif rendezvous.sight is not None:
-        note = "only for measured positions"
-    yield line("no strategy guarantees less", report.bound, note)
+    yield line("no strategy guarantees less", report.bound, _bound_refusal(rendezvous) or "")
     yield from _further_lines(report)
 
 
@@ -561,11 +578,11 @@ def flight_lines(report: GuaranteeReport) -> Iterator[str]:
     motion = " about a central body" if report.rendezvous.nonlinear else ""
     bounds = "half of them with errors at their bounds"
     flights = report.flights
+    name = _plan_name(report.rendezvous)
     if len(flights.distances):
         share = flights.distances.max() / report.plan.guarantee if report.plan.guarantee else 0.0
-        plan_name = _plan_name(report.rendezvous)
         yield (
-            f"{len(flights.distances)} flights of {plan_name}{motion}, {bounds}: "
+            f"{len(flights.distances)} flights of {name}{motion}, {bounds}: "
             f"{flights.outside} outside, worst {100.0 * share:.0f} % of the guarantee"
         )
     replanned = report.replanned
@@ -575,6 +592,6 @@ def flight_lines(report: GuaranteeReport) -> Iterator[str]:
         noun = "impulse" if report.rendezvous.has_impulses else "control"
         yield (
             f"{len(last)} flights re-planned in flight{motion}, {bounds}: {replanned.outside} "
-            f"outside, guarantee at the last {noun}: median {np.median(last):.4g}, most "
+            f"outside, guarantee at the last {noun}: median {np.median(last):.4g}, largest "
             f"{last.max():.4g} {unit}"
         )

@@ -196,10 +196,10 @@ def test_replanned_flights_keep_their_promises(infoset: Command) -> None:
     # A flight rounds its states by less than 1e-9.
     assert (np.array(replanned["distances"]) <= guarantees[:, -1] + 1e-9).all()
     assert code == 0
-    median, most = np.median(guarantees[:, -1]), guarantees[:, -1].max()
+    median, largest = np.median(guarantees[:, -1]), guarantees[:, -1].max()
     assert (
         "4 flights re-planned in flight, half of them with errors at their bounds: 0 outside, "
-        f"guarantee at the last impulse: median {median:.4g}, most {most:.4g} m"
+        f"guarantee at the last impulse: median {median:.4g}, largest {largest:.4g} m"
     ) in out
 
 
@@ -413,6 +413,38 @@ def test_conflict_names_what_to_relax(infoset: Command) -> None:
     assert err == (
         "error: approach-guaranteed: no plan with affine feedback keeps the constraints for all "
         "errors; relax keep_in #1, or reduce the errors\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "limit"),
+    [
+        ("max_impulse_m_s = 0.1 ", "max_impulse_m_s = 0.02 ", "max_impulse_m_s"),
+        (
+            'engine = "impulses"\nmax_impulse_m_s = 0.1 ',
+            "acceleration_m_s2 = 3e-5 ",
+            "acceleration_m_s2",
+        ),
+    ],
+)
+def test_conflict_with_the_limit_of_thrust_names_it(
+    infoset: Command, old: str, new: str, limit: str
+) -> None:
+    # The last position is at most 10 m from the target, which takes more thrust than this.
+    text = problem_text(ARCH)
+    assert old in text
+    text = text.replace(old, new).replace(
+        "absolute_m_s = [0.0003333333333, 0.0003333333333, 0.0]", ""
+    )
+    sides = "[[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]]"
+    text += f"[[keep_in]]\nnormals = {sides}\noffsets_m = [10, 10, 10, 10]\nfrom_period = 10\n"
+    Path("weak.toml").write_text(text)
+
+    told = infoset.refused("reach", "weak.toml")
+
+    assert told == (
+        "error: approach-guaranteed: no plan with affine feedback keeps the constraints for all "
+        f"errors; relax {limit} or keep_in #1, or reduce the errors\n"
     )
 
 
