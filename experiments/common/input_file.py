@@ -225,7 +225,7 @@ class _Reading:
         for key, value in table.items():
             name = next((name for name in known if si_factor(key, name) is not None), None)
             if name is None:
-                self._unknown((*path, key), known)
+                self._unknown((*path, key), value, known)
                 continue
             here = (*path, name)
             if name in values:
@@ -254,11 +254,12 @@ class _Reading:
             return [scaled, scaled]
         return scaled
 
-    def _unknown(self, path: KeyPath, known: Mapping[str, KeyField]) -> None:
+    def _unknown(self, path: KeyPath, value: object, known: Mapping[str, KeyField]) -> None:
         """Note a key that no field has, with the key that was probably meant.
 
         That is, in this order: the same quantity with a known unit, the nearest key of its table, a
         similar key of another table. If it is in its table, its field is not reported as missing.
+        A table that is like no other is noted with all tables that are possible there.
         One fault more than `_MAX_FAULTS` is kept: `made` then says that there are more.
         """
         if len(self._faults) > _MAX_FAULTS:
@@ -283,8 +284,11 @@ class _Reading:
                 guess = in_unit
 
         fault = "is not a known key"
+        tables = [name for name, field in known.items() if field.table is not None]
         if guess:
             fault += f"; did you mean {guess}?"
+        elif tables and _is_table(value):
+            fault += f"; the tables are {', '.join(tables)}"
         self._faults[path] = fault
 
     def set(self, values: dict[str, Any], setting: str) -> None:
@@ -449,6 +453,12 @@ def similar_key(key: str, known: Sequence[str]) -> str | None:
         if name.rsplit(".", 1)[-1] == last or si_factor(last, name.rsplit(".", 1)[-1])
     ]
     return " or ".join(alike[:3]) or nearest(key, known)
+
+
+def _is_table(value: object) -> bool:
+    """Return whether the value of a key is a table or an array of tables."""
+    first = value[0] if isinstance(value, list) and value else value
+    return isinstance(first, dict)
 
 
 def _with_wrong_unit(key: str, known: Iterable[str]) -> str | None:

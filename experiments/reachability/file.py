@@ -268,6 +268,7 @@ class Rendezvous:
 
     def __post_init__(self) -> None:
         self._check_engine()
+        self._check_times()
         check_angle(
             "period_s, in all periods,",
             self.periods * self.period_s,
@@ -368,6 +369,22 @@ class Rendezvous:
             raise ValueError("acceleration_m_s2: is missing; held thrust needs it")
         if self.max_impulse_m_s is not None:
             raise ValueError('max_impulse_m_s: needs engine = "impulses"')
+
+    def _check_times(self) -> None:
+        """Raise `ValueError` if constraints begin after the last state or control."""
+        tables: list[tuple[str, Cone | KeepIn | ControlLimits, int]] = []
+        if self.cone is not None:
+            tables.append(("cone", self.cone, self.periods))
+        for number, region in enumerate(self.keep_in, start=1):
+            tables.append((f"keep_in.#{number}", region, self.periods))
+        for number, limits in enumerate(self.control_limits, start=1):
+            tables.append((f"control_limits.#{number}", limits, self.periods - 1))
+        for name, table, last in tables:
+            if table.from_period > last:
+                raise ValueError(
+                    f"{name}.from_period: must be at most {last}, the last t with periods = "
+                    f"{self.periods}, found {table.from_period}"
+                )
 
     @property
     def has_impulses(self) -> bool:

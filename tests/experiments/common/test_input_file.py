@@ -54,7 +54,11 @@ MISTAKES = {
     "unknown table": (
         "[range_sensor]",
         "[radar]",
-        "mine.toml: radar: is not a known key",
+        (
+            "mine.toml: radar: is not a known key; the tables are sun, uncertainty, dispersion, "
+            "covariance, angle_sensor, camera, range_sensor, rate_sensor, wrong_images, "
+            "wrong_ranges, target, body, thruster, information_set"
+        ),
     ),
     "wrong unit": (
         "distance_km",

@@ -474,6 +474,30 @@ def test_options_that_do_not_fit_are_refused(
     [
         (ARCH, "[goal] ", "[gaol] ", "did you mean goal"),
         (
+            "elliptic-safe",
+            "[cone] ",
+            "[corridor] ",
+            "corridor: is not a known key; the tables are orbit, initial, bounds, cone, keep_in, ",
+        ),
+        (
+            "elliptic-safe",
+            "[cone] ",
+            "[cone]\nfrom_period = 13\n",
+            "cone.from_period: must be at most 12, the last t with periods = 12, found 13",
+        ),
+        (
+            ARCH,
+            "[sensor]",
+            "[[keep_in]]\nnormals = [[1, 0, 0]]\noffsets_m = [1]\nfrom_period = 11\n[sensor]",
+            "keep_in.#1.from_period: must be at most 10, the last t",
+        ),
+        (
+            ARCH,
+            "[sensor]",
+            "[[control_limits]]\nnormals = [[1, 0, 0]]\noffsets = [1]\nfrom_period = 10\n[sensor]",
+            "control_limits.#1.from_period: must be at most 9, the last t",
+        ),
+        (
             "two-impulses",
             "[orbit]",
             "[goal]\nposition_box_m = 1.0\n[orbit]",
