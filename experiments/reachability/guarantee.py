@@ -250,6 +250,7 @@ def _checked_plan(
     if safety is None and not rendezvous.nonlinear:
         return CheckedPlan(plan)
     drifts = rendezvous.drifts
+    proved = list[DriftCertificate]()
     programs = itertools.count(1)
 
     def after_program() -> None:
@@ -264,7 +265,9 @@ def _checked_plan(
         keep_out = PassiveSafety(drifts, safety.keep_out_m)
 
         def safe(each: OutputProblem) -> AffinePlan:
-            return safe_plan(each, keep_out, WINDOW, after_program).plan
+            certificate = safe_plan(each, keep_out, WINDOW, after_program)
+            proved.append(certificate)
+            return certificate.plan
 
         return _within(rendezvous, problem, safe)
 
@@ -283,7 +286,9 @@ def _checked_plan(
         raise InputError(f"{rendezvous.name}: {error}") from None
     if safety is None:
         return CheckedPlan(checked, None, found)
-    return CheckedPlan(checked, drift_certificate(checked, drifts), found)
+    # Its directions prove at least the distance of its constraints.
+    certificate = drift_certificate(checked, drifts, proved[-1].normals)
+    return CheckedPlan(checked, certificate, found)
 
 
 def _plan_in_flight(rendezvous: Rendezvous, checked: CheckedPlan) -> ReplannedPlan:

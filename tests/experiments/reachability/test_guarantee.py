@@ -7,6 +7,7 @@ import io
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,6 +31,7 @@ from infoset.experiments.reachability.guarantee_report import COMMAND
 from infoset.rendezvous.reachability import (
     IMPULSE,
     AffinePlan,
+    DriftCertificate,
     NoRobustPlanError,
     NoSolutionError,
     OutputProblem,
@@ -37,6 +39,7 @@ from infoset.rendezvous.reachability import (
     acting_controls,
     drift_certificate,
     linear_motion,
+    safe_plan,
 )
 from tests.built_in import problem_text
 from tests.experiments.command_line import Command
@@ -703,6 +706,27 @@ def test_passive_safety_that_contradicts_the_problem_is_refused(
     code, _, err = infoset("reach", "safe-approach", "--set", 'model="frozen"', "--set", setting)
     assert code == 2
     assert message in err
+
+
+def test_printed_distance_of_drifts_is_not_less_than_the_proved_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    proved = []
+
+    def found(*arguments: Any) -> DriftCertificate:
+        certificate = safe_plan(*arguments)
+        proved.append(certificate)
+        return certificate
+
+    monkeypatch.setattr(guarantee, "safe_plan", found)
+    settings = ["periods=3", "passive_safety.drift_periods=2", "passive_safety.keep_out_m=400"]
+    settings.append("passive_safety.until_period=1")
+
+    report = COMMAND.report(Reach(problem="safe-approach", settings=settings, flights=0))
+
+    assert report.drifts is not None
+    assert report.plan is proved[-1].plan
+    assert (report.drifts.distances >= proved[-1].distances).all()
 
 
 def test_keep_out_that_no_plan_has_is_one_message(infoset: Command) -> None:
