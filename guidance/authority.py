@@ -14,6 +14,8 @@ def correctable_later_m(situation: Situation, range_m: Floats) -> Floats:
     """Return the miss (m) that impulses after this step can still correct.
 
     It is the sum of mu2 x_j/e over the later impulses with x_j > 0, as many as the budget allows.
+    The impulse that is decided now does not count, and its budget is not subtracted. Without a
+    schedule, a rest of the budget below mu2 does not count either.
 
     Parameters
     ----------
@@ -28,7 +30,7 @@ def correctable_later_m(situation: Situation, range_m: Floats) -> Floats:
         times_s = situation.later_times_s - situation.time_s
         return correctable_m(times_s, thruster, budget, range_m / e)
 
-    # Impulses in each of the next steps, the first ones at their maximum.
+    # An impulse of maximum size in each of the next steps.
     to_go_s = range_at_impulse(range_m, e, situation.lead_s) / e
     steps = np.ceil(to_go_s / step_s) - 1.0
     full = np.clip(np.floor(budget / thruster.max_impulse_m_s), 0.0, np.maximum(steps, 0.0))
@@ -46,7 +48,8 @@ def correctable_m(
 
     Impulses have their maximum, the earliest first, until the budget is spent or x = 0 (the range
     is zero). One more has the rest of the budget, none if the rest is below the minimum impulse.
-    Burns end before x = 0. The result has the broadcast shape.
+    Burns are assumed to end before x = 0: one that starts less than half its duration before counts
+    negative. The result has the broadcast shape.
 
     Parameters
     ----------
@@ -55,7 +58,7 @@ def correctable_m(
     budget, to_go_s : ndarray
         Budget, m/s, and time to x = 0; broadcast against each other and against `first`.
     first : ndarray of int or int
-        Index of the first impulse that counts.
+        Index of the first impulse that counts, at most n.
     """
     possible = np.maximum(np.searchsorted(times_s, to_go_s) - first, 0)
     full = np.minimum(budget // thruster.max_impulse_m_s, possible).astype(np.int64)
@@ -86,7 +89,7 @@ def max_correctable_m(
 ) -> Floats:
     """Return the maximum of `correctable_m` for all errors of execution, m.
 
-    The default budget is no limit.
+    For burns it is an upper bound: a longer burn also acts later. The default budget is no limit.
     """
     if budget is None:
         budget = thruster.max_impulse_m_s * (len(times_s) + 1.0)

@@ -35,14 +35,15 @@ class GameNoise:
         error bound; the last one holds for later steps. With `TieRule.LOWER` it has the other sign.
         These two rules then do not choose the angle by the set. None is no shift.
     target_side : ndarray, shape (C, B), or None
-        Sign of the acceleration of each target, 1 or -1, if it is constant. The shift of these two
-        rules then has the other sign along each axis, which is worse: errors and target move the
+        Sign of the acceleration of each target, 1 or -1, if it is constant. With both rules the
+        shift then has the opposite sign along each axis, which is worse: errors and target move the
         true state to the same side.
 
     Raises
     ------
     TypeError, ValueError
-        If `tie` is not a `TieRule`, a draw is not within [-1, 1], or the array has another shape.
+        If `tie` is not a `TieRule`, a draw is not within [-1, 1], or `tie_draws` has neither two
+        nor three axes; in `measure`, if `TieRule.RANDOM` needs draws of another shape or step.
 
     Notes
     -----
@@ -107,7 +108,10 @@ class GameNoise:
         return np.where(side == 0.0, 0.0, self.target_side)
 
     def _shifted(self, sensor: BearingSensor, sight: LineOfSight, chosen: Floats) -> Floats:
-        """Return the shifted true angles of this step, and `chosen` where nothing is shifted."""
+        """Return the shifted true angles of this step, and `chosen` where nothing is shifted.
+
+        No angle is shifted beyond the error bound.
+        """
         if self.shift_m is None:
             return chosen
         side = self.truth_side
@@ -244,6 +248,7 @@ def keep_point(
 ) -> Floats:
     """Return the measured values in [lower, upper] that keep a point, and then most of the set.
 
+    The point is lost where no value in [lower, upper] keeps it; the nearest end is returned there.
     A measured value agrees with an interval of values; "top" and "bottom" are the ends of that
     interval. All arrays have the shape (..., B).
 
@@ -263,7 +268,8 @@ def keep_point(
     ----------
     Kumkov and Patsko (1997), section 7: the rule for ranges, and 'the same way' for angles.
     """
-    # Up to the point, and further up only while nothing of the set is lost below.
+    # For the larger point: the interval reaches up to it, and further up only while nothing of the
+    # set is lost below.
     for_larger = np.clip(np.maximum(point_at_top, min_at_bottom), lower, upper)
     for_smaller = np.clip(np.minimum(point_at_bottom, max_at_top), lower, upper)
     return np.where(is_larger, for_larger, for_smaller)

@@ -28,7 +28,7 @@ def truncated_gaussian(uniform: Floats, sigma: float) -> Floats:
     negative quantile.
     """
     size = np.abs(uniform)
-    # The probability of a larger error of this sign.
+    # The probability of a larger error of this sign, without the truncation.
     tail = 0.5 * (1.0 - size) + size * ndtr(-1.0 / sigma)
     error = np.minimum(-sigma * ndtri(tail), 1.0)
     return np.asarray(np.copysign(error, uniform))

@@ -80,7 +80,8 @@ class KalmanBank:
 
     A camera with a constant centroid error has two parts of errors. The pixel part is the noise of
     the measurements; the variance c^2/3 of the centroid part is added to the variance of the miss.
-    Errors of the engine add (delta k)^2/3 to the variance of V_z after an impulse k.
+    Errors of size of the engine add (delta k)^2/3 to the variance of V_z after an impulse k; errors
+    of its direction are not modelled.
 
     A measurement is *precise* if its variance R is nearly below the rounding of the variance of the
     expected value; R is negligible for an angle that is measured without error. It is used as a
@@ -107,7 +108,10 @@ class KalmanBank:
         self.log_weight = np.zeros((*shape, MEMBERS))
 
     def update(self, situation: Situation) -> None:
-        """Predict over the previous step, and update with the new measurements."""
+        """Predict over the previous step, and update with the new measurements.
+
+        It must be called in each step, from step 0 on, which sets the prior and predicts nothing.
+        """
         if situation.step == 0:
             self._set_prior(situation)
         else:
@@ -182,7 +186,10 @@ class KalmanBank:
         return MissEstimate(best * mean_lever, deviation, mean_lever)
 
     def _weights(self) -> Floats:
-        """Return the probabilities of the filters, shape (C, B, M): zero past the arrival."""
+        """Return the probabilities of the filters, shape (C, B, M): zero past the arrival.
+
+        If all filters of a bank are past it, they are all zero, and so is the estimated miss.
+        """
         ahead = self.mean[..., X] > 0.0
         ratio = np.exp(self.log_weight - self.log_weight.max(axis=-1, keepdims=True))
         weight = np.where(ahead, ratio, 0.0)
@@ -238,7 +245,7 @@ class KalmanBank:
                 np.ptp(bounds.vx_m_s),
                 2.0 * plane.acceleration_m_s2,
             ]
-            # The variance of a uniform distribution is its width squared by 12.
+            # The variance of a uniform distribution is a twelfth of the square of its width.
             self.covariance[axis] = np.diag(np.square(widths[: self.mean.shape[-1]]) / 12.0)
 
     def _predict(self, situation: Situation) -> None:
@@ -279,7 +286,10 @@ class KalmanBank:
         gradient: Floats,
         variance: Floats,
     ) -> None:
-        """Update each filter with one scalar measurement, in Joseph's form, and its weight."""
+        """Update each filter with one scalar measurement, and its weight.
+
+        It is Joseph's form, for precise measurements Potter's.
+        """
         new = situation.is_new(sensor)
         innovation = np.where(new, situation.measured[sensor], 0.0)[..., None] - expected
         if self._gate_sigma is not None:
@@ -325,6 +335,7 @@ class KalmanBank:
         across = np.einsum("nij,ni->nj", root, row)
         square = (across * across).sum(axis=-1) + variance[where]
 
+        # The expected value itself is rounded, too: by less than the same share.
         of_variance = VARIANCE_ROUNDING * self._largest_variance(gradient)[where]
         rounding = of_variance + (VARIANCE_ROUNDING * expected[where]) ** 2
         total = np.maximum(square, rounding)
@@ -401,15 +412,15 @@ class Kalman(Checked):
     dead_zone : float
         Half-width of the dead zone of the estimated miss, in standard deviations.
     last_s : float
-        Time to go below which there is no dead zone, s. With a cut-off, the time before the
-        cut-off.
+        Time to go up to which there is no dead zone, s. If the engine has a last impulse, also the
+        time before it.
     gate_sigma : float or None
         Innovation gate of the filters in standard deviations; None uses all measurements.
 
     Notes
     -----
-    `KalmanBank` describes the filters. The last decision before the arrival that the engine allows
-    has no dead zone.
+    `KalmanBank` describes the filters. If the engine has a last impulse (a cut-off or a schedule),
+    the last decision has no dead zone; otherwise only `last_s` counts.
 
     Limits: the filter guarantees nothing. Its deviations assume independent errors; an error that
     keeps its sign, or changes it on purpose, is within the bound but outside the theory. A

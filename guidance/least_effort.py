@@ -13,7 +13,8 @@ from infoset.guidance.situation import Situation
 from infoset.guidance.symmetric_impulse import range_at_impulse
 
 PARTS = 4
-"""Parts of the labels between two sections: the deciding time to go is often between sections.
+"""Parts into which the labels between two sections are divided: the deciding time to go is often
+between sections.
 
 Chosen: the misses of asteroid-1997, with 29 sections, are the same from 1 to 16, in 0.6 to 1.6
 times the time (measured).
@@ -101,10 +102,11 @@ def unavoidable_m(situation: Situation) -> Floats:
 
     The shape is (C,). It is zero with a schedule.
 
-    Two motions that differ by the sum of the error bounds at the first image, at the range x0, and
-    at the range e tau look alike until then. They arrive 2 e tau (h(e tau) + h(x0))/(1 - e tau/x0)
-    apart, less if the first image and the bounds of the velocity are nearer. Half of it, less what
-    the impulses after tau can correct, is a miss of one of the two.
+    Two motions that differ by the sum of the error bounds at the first image, at the least initial
+    range x0, and at the range e tau look alike until then. They arrive
+    2 e tau (h(e tau) + h(x0))/(1 - e tau/x0) apart, less if the first image and the bounds of the
+    velocity are nearer. Half of it, less what the impulses after tau can correct, is a miss of one
+    of the two.
     """
     whole = situation.information.model
     reference_m = np.zeros(len(whole.axes))
@@ -143,7 +145,7 @@ def balanced(falling: Floats, rising: Floats, slopes: Floats, most: float) -> tu
     """Return the u, abs(u) <= most, with the minimax of two families of lines, and this value.
 
     The families are falling - slopes u and rising + slopes u. `falling` and `rising` have the shape
-    (C, B, S), `slopes` (B, S), and the results (C, B).
+    (C, B, S), `slopes`, not negative, (B, S), and the results (C, B).
     """
     at, value = np.zeros((2, *falling.shape[:2]))
     for axis in range(len(at)):

@@ -49,8 +49,8 @@ class LineOfSight:
         Random numbers of this step by sensor, with the shape of its measurements: independent,
         uniform in [-1, 1], and the same for a run of a seed in every batch.
     x_m : ndarray, shape (B,), or None
-        True distance along x, m; None is that of the angles and the distance. The angles of a
-        misaligned camera are turned.
+        True distance along x, m; None means that it follows from `alpha_rad` and `range_m`. A
+        misaligned camera needs it, because its angles are turned.
     """
 
     step: int

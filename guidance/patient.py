@@ -68,7 +68,9 @@ class Patient(Checked):
         """Return k_s in the last seconds, before them what cannot wait, m/s, shape (C, B).
 
         What cannot wait is the greater of two corrections: the certain one, which every hypothesis
-        needs, and the urgent one, the excess over a share of what later impulses can correct.
+        needs, and the urgent one, the excess over a share of what later impulses can correct. The
+        last seconds count from the impulse to the arrival of the nearer end, at the nominal closing
+        speed.
         """
         miss = situation.predicted_miss
         e = situation.closing_speed_m_s

@@ -18,7 +18,8 @@ class ManoeuvreState:
     """State of predictive guidance.
 
     `due_s`, shape (C, B), is the time to go at which the next manoeuvre begins, s; infinite before
-    the first step in which an impulse can be decided.
+    the first step in which an impulse can be decided, and not used if the engine has scheduled
+    times.
     """
 
     estimator: KalmanBank
@@ -38,11 +39,12 @@ class Predictive(Checked):
     Notes
     -----
     The impulse is k = m / tau, with the estimated miss m and the time to go tau. If the engine has
-    scheduled times (`Thruster.impulses_s`), each of them corrects the whole miss. Otherwise the
+    scheduled times (`Thruster.is_scheduled`), each of them corrects the whole miss. Otherwise the
     first manoeuvre begins at the time to go T/s, with T estimated at the first step in which the
     engine can give an impulse, and each further one at 1/s of the time to go at which the one
     before ended. One also begins at the last time that the engine allows. A manoeuvre that is
-    greater than the maximum impulse of the engine continues in the next steps.
+    greater than the maximum impulse of the engine continues in the next steps. In space each axis
+    has its own manoeuvres and is compared with the maximum impulse alone.
 
     After a manoeuvre, its miss is the error of its estimate. With independent errors of angles this
     falls in proportion to the time to go, or faster, so geometric times make the impulses after the
@@ -51,8 +53,8 @@ class Predictive(Checked):
 
     Good where manoeuvres are few, and the engine is exact: each one is as small as its time allows.
     Limits: a manoeuvre corrects the noise of its estimate too, and the last one decides the miss;
-    between manoeuvres nothing is corrected. The first one waits for measurements, so it costs s/(s
-    - 1) times the impulse of an immediate correction. Nothing is guaranteed.
+    between manoeuvres nothing is corrected. The first one waits for measurements until the time to
+    go T/s, so it costs s times the impulse of an immediate correction. Nothing is guaranteed.
 
     References
     ----------

@@ -73,7 +73,11 @@ class ProportionalNavigation(Checked):
         return PulseState(KalmanBank(shape, self.is_augmented), np.zeros(shape))
 
     def decide(self, situation: Situation, state: PulseState) -> Floats:
-        """Update the estimate, and return the accumulated commands beyond the dead band, m/s."""
+        """Update the estimate, and return the accumulated commands beyond the dead band, m/s.
+
+        The last decision gives the whole sum, also within the dead band. Each axis is compared
+        alone.
+        """
         state.estimator.update(situation)
         if not situation.may_fire:
             return np.zeros_like(state.accumulated_m_s)

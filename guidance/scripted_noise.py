@@ -69,12 +69,13 @@ class ScriptedNoise:
 
 @dataclass(frozen=True)
 class RandomNoise(ScriptedNoise):
-    """Measurements with errors drawn in advance, uniform within their bounds.
+    """Measurements with errors drawn in advance, within their bounds.
 
     Parameters
     ----------
     errors : mapping of str to ndarray, shape (C, B, steps), for ranges (B, steps)
-        Draws by sensor, uniform in [-1, 1]; the error is the draw times the bound.
+        Draws by sensor in [-1, 1], uniform or of `gaussian_noise`; the error is the draw times the
+        bound.
     bias : ndarray, shape (C, B), or None
         Constant errors of the centroid part of a camera's bound, in units of this part; `errors`
         are then errors of the pixel part. None means errors of the whole bound.
@@ -85,7 +86,7 @@ class RandomNoise(ScriptedNoise):
     Raises
     ------
     TypeError, ValueError
-        If an error or a bias is not within [-1, 1].
+        If an error, a bias or a drift is not within [-1, 1].
 
     References
     ----------
@@ -107,15 +108,15 @@ class RandomNoise(ScriptedNoise):
     def errors_of_step(self, sight: LineOfSight) -> dict[str, Floats]:
         """Return the errors of a step by sensor, in units of their bounds.
 
-        With a bias, the draw of a camera is the error of the pixel part, and the bias that of the
-        centroid part.
+        The draw of a camera is the error of the part of its bound that neither `bias` nor `drift`
+        has: the three errors are summed, each times the share of its part.
 
         Raises
         ------
         ValueError
             If errors are missing for this step, or have another shape than the measurements.
         KeyError
-            If there is a bias, but `errors` has none of the camera.
+            If there is a bias or a drift, but `errors` has none of the camera.
         """
         errors = super().errors_of_step(sight)
         camera = sight.sensors.get(Camera.name)
@@ -142,7 +143,7 @@ def measure_with_errors(sight: LineOfSight, errors: Mapping[str, Floats]) -> dic
 def errors_made(sight: LineOfSight, measured: Measurements) -> dict[str, Floats]:
     """Return the errors of measurements in units of the bounds.
 
-    It is the inverse of `measure_with_errors`, to rounding.
+    It is the inverse of `measure_with_errors`, to rounding; errors beyond a bound become 1 or -1.
     """
     errors = {}
     for name, values in measured.items():

@@ -94,7 +94,10 @@ class Situation:
 
     @property
     def last_s(self) -> float:
-        """Time from now to the last impulse that can be given, s; infinite without a last one."""
+        """Time from now to the last impulse that can be given, s; infinite without a last one.
+
+        It is `lead_s`, the time to the impulse that is decided now, if no later one can be decided.
+        """
         if self.later_times_s is None:
             return math.inf
         if not self.later_times_s.size:

@@ -161,15 +161,17 @@ class Thruster:
         """Return the burns that change the miss as much as instantaneous impulses, m/s.
 
         A burn u with the acceleration a changes the miss by u (tau - u / (2 a)), at the time to go
-        tau of its start, which grows with u until the burn lasts until the arrival: an impulse that
-        no burn replaces becomes this one.
+        tau of its start, which grows with u until the burn lasts until the arrival. An impulse that
+        no burn replaces is doubled, so that its burn would last longer than until the arrival; the
+        limits of the engine are applied later (`give`).
 
         Parameters
         ----------
         impulse_m_s : ndarray, shape (C, B)
             Instantaneous impulses.
         to_go_s : float
-            Time from the impulse to the nominal arrival, s.
+            Time from the impulse to the nominal arrival, s. If it is not positive, the impulses are
+            returned unchanged.
         """
         if self.acceleration_m_s2 is None or to_go_s <= 0.0:
             return impulse_m_s
@@ -206,7 +208,7 @@ class Thruster:
 
     @property
     def has_times(self) -> bool:
-        """Whether times before the nominal arrival are given."""
+        """Whether times before the nominal arrival are given; 0 s, the arrival itself, is none."""
         return bool(self.impulses_s or self.last_impulse_s or self.first_impulse_s)
 
     def impulse_steps(self, arrival_s: float, step_s: float) -> Sequence[int] | None:
@@ -221,8 +223,9 @@ class Thruster:
         ------
         ValueError
             If there is no such step, a time of `impulses_s` or `first_impulse_s` is before the
-            first step in which an impulse can be given, or two of `impulses_s` are in one step. The
-            message names the key to change.
+            first step in which an impulse can be given, two of `impulses_s` are in one step, or the
+            period is shorter than a step or gives more than `MAX_IMPULSES`. The message names the
+            key to change.
         """
         if self.last_impulse_s is None and self.first_impulse_s is None and not self.impulses_s:
             return None
@@ -273,7 +276,9 @@ class Thruster:
         last_s = self.last_impulse_s or 0.0
 
         # The first impulse is the one nearest to first_impulse_s.
-        number = 1 - steps_between(last_s, first_s, period_s)
+        # Both times are a period earlier here: the last impulse may be at the arrival itself, where
+        # `steps_between` allows no step.
+        number = 1 - steps_between(last_s + period_s, first_s + period_s, period_s)
         if number > MAX_IMPULSES:
             raise ValueError(
                 f"thruster.impulse_period_s gives {number} impulses, more than {MAX_IMPULSES}; "

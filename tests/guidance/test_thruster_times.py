@@ -71,6 +71,12 @@ def test_the_first_impulse_is_nearest_to_its_time(first_s: float | None, steps: 
     assert engine.impulse_steps(1000.0, 10.0) == steps
 
 
+def test_first_impulse_within_half_a_period_of_the_arrival_is_the_only_one() -> None:
+    engine = replace(ENGINE, last_impulse_s=0.0, impulse_period_s=60.0, first_impulse_s=20.0)
+    # The step nearest to the arrival that is before it.
+    assert engine.impulse_steps(600.0, 10.0) == [59]
+
+
 def test_a_period_of_one_step_is_every_step() -> None:
     engine = replace(ENGINE, last_impulse_s=0.25, impulse_period_s=0.1)
     assert engine.impulse_steps(5801.3 / 58.0, 0.1) == list(range(998 + 1))
