@@ -30,7 +30,7 @@ def finite_values(name: str, value: ArrayLike, *shape: str | int) -> Floats:
     """Return finite numbers of a shape; an empty list is an array without rows.
 
     `shape` has the sizes of the axes. A letter is any size, of the axes n and m at least 1; "..."
-    is any number of axes.
+    is any number of axes. An empty list is such an array only if the last of two axes is a number.
     """
     values = real_values(name, value)
     has_batch = shape[:1] == ("...",)

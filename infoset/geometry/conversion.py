@@ -41,7 +41,7 @@ def ring_of_points(points: Floats) -> Floats:
 
 
 def ring_of_geometry(geometry: BaseGeometry) -> Floats:
-    """Return the ring of a convex shapely Point, LineString or Polygon. O(n).
+    """Return the ring of a convex shapely Point, LineString or Polygon. O(n^2) at worst.
 
     Vertices along a side are dropped.
 

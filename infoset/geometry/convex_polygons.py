@@ -115,7 +115,7 @@ class ConvexPolygons(ConvexSet):
 
     @classmethod
     def from_vertices(cls, rings: ArrayLike) -> Self:
-        """Return the polygons with rings of vertices, shape (..., V, 2). O(n).
+        """Return the polygons with rings of vertices, shape (..., V, 2). O(n^2) at worst.
 
         A ring goes around the polygon in either order. It may repeat vertices, also its first one
         at the end, and have vertices along a side. `stack` makes a batch of polygons from rings of
@@ -124,8 +124,9 @@ class ConvexPolygons(ConvexSet):
         Raises
         ------
         ValueError
-            If a ring is not convex; the message has the first reflex vertex. This is decided
-            exactly. `from_points` takes the convex hull of any points instead.
+            If a ring is not convex; the message has the first reflex vertex, whose number does not
+            count repeated vertices. This is decided exactly. `from_points` takes the convex hull of
+            any points instead.
         """
         vertices = finite_values("rings", rings, "...", "k", 2)
         polygons = cls.unchecked(vertices.copy(), np.full(vertices.shape[:-2], vertices.shape[-2]))
@@ -161,9 +162,10 @@ class ConvexPolygons(ConvexSet):
     def from_constraints(cls, normals: ArrayLike, offsets: ArrayLike) -> Self:
         """Return {p: normals p <= offsets}.
 
-        The normals have the shape (..., k, 2) and any length, the offsets (..., k). Infinite
-        offsets are no limit. O(k^2). Exact: which constraints are redundant, and whether the set is
-        empty, is decided without rounding, and each coordinate is rounded by a few ulp.
+        The normals have the shape (..., k, 2) and any length, the offsets (..., k). An offset of
+        inf is no limit, and -inf gives the empty set. O(k^2). Exact: which constraints are
+        redundant, and whether the set is empty, is decided without rounding, and each coordinate is
+        rounded by a few ulp.
 
         Raises
         ------
@@ -245,9 +247,9 @@ class ConvexPolygons(ConvexSet):
 
     @classmethod
     def from_shapely(cls, geometry: BaseGeometry) -> Self:
-        """Return a convex shapely Point, LineString or Polygon as a single polygon. O(n).
+        """Return a convex shapely Point, LineString or Polygon as a single polygon.
 
-        Vertices along a side are dropped.
+        Vertices along a side are dropped. O(n^2) at worst.
 
         Raises
         ------
@@ -380,9 +382,9 @@ class ConvexPolygons(ConvexSet):
         """Return the intersection with the strip lower <= normal . p <= upper.
 
         `normal` has the shape (2,) or (..., 2), and any length. The bounds have the shape () or
-        (...); infinite ones give half-planes, and lower > upper gives the empty set. The strip is
-        wider on both sides by `slack_ulp` ulp of the products in normal . p: a point that satisfies
-        the bounds up to rounding is not lost.
+        (...); infinite ones give half-planes. The strip is wider on both sides by `slack_ulp` ulp
+        of the products in normal . p: a point that satisfies the bounds up to rounding is not lost.
+        If then lower > upper, the result is empty.
 
         O(n). Vertices inside do not change; new ones are within a few ulp of the coordinates. A
         vertex on a border is inside.
@@ -403,8 +405,8 @@ class ConvexPolygons(ConvexSet):
     def linear_map(self, matrix: ArrayLike) -> ConvexPolygons:
         """Return the image under a matrix, shape (2, 2) or (..., 2, 2).
 
-        A singular matrix gives segments or points. O(n). Each coordinate of a vertex is rounded
-        three times. `affine_map` maps to other dimensions.
+        A singular matrix gives segments or points. O(n), O(n^2) for a singular matrix. Each
+        coordinate of a vertex is rounded three times. `affine_map` maps to other dimensions.
         """
         return self._make(0, kernels.linear_map, self._each("matrix", matrix, 2, 2))
 
@@ -412,7 +414,7 @@ class ConvexPolygons(ConvexSet):
         """Return {matrix p + offset}.
 
         A matrix of shape (m, 2), m not 2, maps a single polygon to a `Polytope` in R^m. `offset`
-        has the shape (2,), (..., 2) or (m,), or is 0. O(n), as `linear_map`.
+        has the shape (2,), (..., 2) or (m,), or is 0. The cost is the cost of `linear_map`.
         """
         rows = real_values("matrix", matrix)
         if rows.shape[-2:] == (2, 2):
@@ -632,9 +634,9 @@ class ConvexPolygons(ConvexSet):
     def is_subset(self, other: ConvexPolygons | Polytope, tolerance: float = 0.0) -> Flags:
         """Return whether all points of the set are in the other one, shape (...).
 
-        With a tolerance, they may be within a distance of it. O(n m). Exact for a tolerance of 0:
-        rounding does not affect the answer. Sets that were computed are subsets only up to rounding
-        in general.
+        With a tolerance, they may be at most this distance from it. The empty set is in each set.
+        O(n m). Exact for a tolerance of 0: rounding does not affect the answer. Sets that were
+        computed are subsets only up to rounding in general.
         """
         if not isinstance(other, ConvexPolygons):
             return np.asarray(self._polytope_with(other).is_subset(other, tolerance))
@@ -727,7 +729,7 @@ class ConvexPolygons(ConvexSet):
         return np.asarray(np.maximum(self._excess(other), other._excess(self)))
 
     def sample(self, count: int, seed: int | np.random.Generator = 0) -> Floats:
-        """Return at least one point distributed uniformly over each set, shape (..., count, 2).
+        """Return points distributed uniformly over each set, shape (..., count, 2).
 
         O(n) for each point; inside to rounding.
         """

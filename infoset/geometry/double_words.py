@@ -59,6 +59,8 @@ def two_product(a: float, b: float) -> tuple[float, float]:
 def precise_dot(a: Floats, b: Floats, start: float) -> tuple[float, float]:
     """Return start + a . b as the sum of two numbers, as exact as with doubled digits.
 
+    Entries of `a` after the last one of `b` do not count.
+
     References
     ----------
     T. Ogita, S. M. Rump and S. Oishi, Accurate sum and dot product, SIAM J. Sci. Comput. 26 (2005).
@@ -76,7 +78,8 @@ def precise_dot(a: Floats, b: Floats, start: float) -> tuple[float, float]:
 def affine_image(points: Floats, matrix: Floats, shift: Floats) -> tuple[Floats, Floats]:
     """Return matrix x + shift of points, shape (k, m), and the maximum errors, shape (m,).
 
-    Each coordinate is rounded once.
+    Each coordinate is rounded once. The errors are the greatest roundings of each coordinate over
+    all points, without a sign.
     """
     image = np.empty((len(points), len(matrix)))
     errors = np.zeros(len(matrix))
@@ -89,7 +92,7 @@ def affine_image(points: Floats, matrix: Floats, shift: Floats) -> tuple[Floats,
 
 @_kernels.compiled
 def supports(points: Floats, normals: Floats) -> Floats:
-    """Return max normal . point of each normal, shape (f,), rounded up.
+    """Return max normal . point of each normal, shape (f,), rounded up; -inf without points.
 
     The products are nearly exact.
     """

@@ -1,10 +1,10 @@
 """Compiled operations on one convex polygon of the plane.
 
 A polygon is an array `points` of shape (capacity, 2) whose first `count` rows are its vertices,
-counter-clockwise. One vertex is a point, two are a segment, and none is the empty set; all
-operations accept them. Operations that may change the number of vertices write to `out`, which must
-not overlap `points`, and return the new count. No tolerance is absolute: a cut or a sum is exact up
-to rounding of the coordinates, a few ulp.
+counter-clockwise. One vertex is a point, two are a segment, and none is the empty set; operations
+accept them unless they ask for a nonempty set. Operations that may change the number of vertices
+return the new count: they work in place, or write to `out`, which must not overlap `points`. No
+tolerance is absolute: a cut or a sum is exact up to rounding of the coordinates, a few ulp.
 
 Because of rounding, a polygon is convex only up to a few ulp: the direction of a tiny edge is
 arbitrary, vertices may coincide, and the vertices of a set as thin as the rounding error may have
@@ -141,8 +141,8 @@ def crossing(
 ) -> Point:
     """Return the point of the edge i-j at a level of `normal . p`.
 
-    It is interpolated from the nearer end, and does not depend, bit for bit, on the order of i and
-    j, so that a cut segment stays a segment.
+    The heights of i and j differ. It is interpolated from the end nearer to the level, and does not
+    depend, bit for bit, on the order of i and j, so that a cut segment stays a segment.
     """
     near = i
     far = j
@@ -190,7 +190,7 @@ def cut_cap(
 
     enter = crossing(points, before, first, normal_x, normal_y, level)
     leave = crossing(points, last, after, normal_x, normal_y, level)
-    # A line through a vertex, or two equal crossings, adds no vertex.
+    # A crossing at a vertex that stays adds none, and two equal crossings add one.
     differ = enter.x != leave.x or enter.y != leave.y
     adds_enter = height(points, before, normal_x, normal_y) < level and differ
     adds_leave = height(points, after, normal_x, normal_y) < level
@@ -234,9 +234,10 @@ def clip_to_band(
     """Cut in place by the band lower <= normal . p <= upper; return the new count and the overlap.
 
     The array needs room for two more vertices. The normal has any nonzero length; infinite bounds
-    give a half-plane. The overlap is the smaller overlap of polygon and band at the two borders; it
-    is minus their distance if they do not intersect. O(count). A vertex on a border is inside. The
-    new vertices of an axis-parallel cut lie exactly on its line.
+    give a half-plane. The overlap is the smaller overlap of polygon and band at the two borders,
+    times the length of the normal; it is minus their distance, times this length, if they do not
+    intersect, and -inf if the polygon is empty or lower > upper. O(count). A vertex on a border is
+    inside. The new vertices of an axis-parallel cut lie exactly on its line.
     """
     if count == 0 or lower > upper:
         return 0, -np.inf
@@ -278,7 +279,10 @@ def extremes(points: Points, count: int, normal_x: float, normal_y: float) -> tu
 
 @inlined
 def support_index(points: Points, count: int, normal_x: float, normal_y: float) -> int:
-    """Return the index of the first highest vertex along a direction. O(count)."""
+    """Return the index of the first highest vertex of a nonempty polygon along a direction.
+
+    O(count).
+    """
     best = 0
     best_height = height(points, 0, normal_x, normal_y)
     for i in range(1, count):
@@ -320,7 +324,7 @@ def map_linearly(
 def scaled_determinant(xx: float, xy: float, yx: float, yy: float) -> float:
     """Determinant of a matrix that is divided by a power of two near its largest entry.
 
-    The products then neither underflow nor overflow.
+    The products then do not overflow, and underflow only if the entries differ by 150 decades.
     """
     exponent = math.frexp(max(abs(xx), abs(xy), abs(yx), abs(yy)))[1]
     return cross(

@@ -93,7 +93,7 @@ def linear_map(
 
 @compiled
 def invert(matrix: Floats, out: Floats) -> None:
-    """Inverse matrices, shape (B, 2, 2); zero for a singular matrix."""
+    """Inverse matrices, shape (B, 2, 2). `out` is zero before, and stays so for a singular one."""
     origin = Point(0.0, 0.0)
     for i in range(len(matrix)):
         m = matrix[i]
@@ -253,7 +253,11 @@ def unit_vector(start: Point, end: Point) -> Point:
 def excess(
     vertices: Floats, counts: Integers, out: Floats, other: Floats, other_counts: Integers
 ) -> None:
-    """Maximum distances of a vertex from the other polygons, 0 only for subsets."""
+    """Maximum distances of a vertex from the other polygons, 0 only for subsets.
+
+    They are 0 for an empty set, also in another one, and inf for other sets if the other polygon is
+    empty. `out` is zero before.
+    """
     for i in range(counts.size):
         points, count = polygon_exact.tidy(other[i], other_counts[i])
         for k in range(counts[i]):
@@ -267,7 +271,10 @@ def excess(
 def gap(
     vertices: Floats, counts: Integers, out: Floats, other: Floats, other_counts: Integers
 ) -> None:
-    """Distances between polygons: 0 only if they intersect, infinite if one is empty."""
+    """Distances between polygons: 0 only if they intersect, infinite if one is empty.
+
+    `out` is zero before.
+    """
     common = np.empty((vertices.shape[1] + other.shape[1], 2))
     for i in range(counts.size):
         if polygon_exact.intersect(vertices[i], counts[i], other[i], other_counts[i], common) > 0:

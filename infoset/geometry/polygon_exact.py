@@ -158,7 +158,10 @@ def sort_points(points: Points, count: int) -> None:
 
 @compiled
 def drop_repeats(points: Points, count: int) -> int:
-    """Remove vertices that repeat the previous one, in place; return the new count. O(count)."""
+    """Remove vertices that repeat the previous one, in place; return the new count. O(count).
+
+    Last vertices that repeat the first one are removed, too.
+    """
     made = 0
     for i in range(count):
         made = append(points, made, points[i, 0], points[i, 1])
@@ -234,7 +237,10 @@ def is_strictly_convex(points: Points, count: int) -> bool:
 
 @compiled
 def tidy(points: Points, count: int) -> tuple[Points, int]:
-    """Return the polygon if it is strictly convex, otherwise its hull. O(count)."""
+    """Return the polygon itself if it is strictly convex, otherwise its hull, in a new array.
+
+    O(count) for a strictly convex polygon, otherwise as `hull`.
+    """
     if is_strictly_convex(points, count):
         return points, count
     out = np.empty((count, 2))
@@ -330,7 +336,10 @@ def append_inner(
 
 @compiled
 def meeting(a: Point, b: Point, c: Point, d: Point) -> Point:
-    """Return the point in which the edges a-b and c-d cross, within 4 ulp of the coordinates."""
+    """Return the point in which the edges a-b and c-d cross, within 4 ulp of the coordinates.
+
+    The ends of each edge are on different sides of the other one, and none of them on it.
+    """
     # The shorter edge is divided, from its nearer end.
     if abs(d.x - c.x) + abs(d.y - c.y) < abs(b.x - a.x) + abs(b.y - a.y):
         a, c = c, a

@@ -119,8 +119,8 @@ def beyond(values: Floats, lines: Floats, i: int, j: int, k: int) -> float:
 def intersect_lines(rows: Floats, out: Points) -> int:
     """Write the polygon {p: a x + b y <= c for all rows}; return its size, or `UNBOUNDED`.
 
-    `rows` has the shape (k, 3, L), and `out` at least (k + 4, 2). An infinite c is no limit;
-    a = b = 0 is no limit either if c >= 0, and the empty set otherwise. O(k^2).
+    `rows` has the shape (k, 3, L), and `out` at least (k + 4, 2). c = inf is no limit, and c = -inf
+    the empty set; a = b = 0 is no limit either if c >= 0, and the empty set otherwise. O(k^2).
 
     The borders are inserted one by one into a large box. A vertex is kept as the pair of its
     borders, and an exact determinant decides whether it satisfies a row, so that rounding decides
@@ -236,9 +236,10 @@ def meeting_of_lines(values: Floats, lines: Floats, i: int, j: int) -> Point:
 def difference(points: Points, count: int, other: Points, other_count: int, out: Points) -> int:
     """Write the Minkowski (Pontryagin) difference {p: p + q in the polygon for all q in the other}.
 
-    Neither is empty. O(count * (count + other_count)). Each side moves inward until it meets the
-    vertex of the other polygon that is farthest along its normal, which is chosen exactly. Its
-    normal and its offset are sums of numbers without rounding, so that the intersection is exact.
+    Neither is empty; `out` has at least count + 4 rows. O(count * (count + other_count)). Each side
+    moves inward until it meets the vertex of the other polygon that is farthest along its normal,
+    which is chosen exactly. Its normal and its offset are sums of numbers without rounding, so that
+    the intersection is exact.
     The coordinates are divided by powers of two, so that products neither overflow nor underflow.
     """
     a, n = tidy(points, count)
@@ -268,7 +269,8 @@ def difference(points: Points, count: int, other: Points, other_count: int, out:
 def write_box_rows(a: Points, b: Points, rows: Floats) -> None:
     """Write the first four rows of a difference a - b: the sides of the bounding box of a.
 
-    They are the sides in the directions x, -x, y and -y, moved inward by the extent of b.
+    They are the sides in the directions x, -x, y and -y, moved inward by the support function of b
+    in these directions.
     Every difference needs them: `write_side_row` writes no side along an axis, and a segment or a
     point has no other bounds. `rows`, shape (k, 3, L >= 2), are zero before.
     """

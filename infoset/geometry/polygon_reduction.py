@@ -105,8 +105,8 @@ def cheapest_edge(points: Points, count: int) -> CheapestEdge:
 def removed_edge(points: Points, before: int, i: int, j: int, after: int) -> Removal:
     """Return the area that the removal of the edge from vertex i to j adds, twice.
 
-    It is infinite if the edge cannot be removed, and -1 if the path is not convex there. `before`
-    and `after` are the vertices next to the edge.
+    It is infinite if the edge cannot be removed, and -1 if the path does not turn left at vertex i.
+    `before` and `after` are the vertices next to the edge.
     """
     from_x = points[i, 0] - points[before, 0]
     from_y = points[i, 1] - points[before, 1]
@@ -136,8 +136,8 @@ def drop_inner_edges(points: Points, count: int, fewest: int, work: Points) -> t
     """Remove edges inside a path, in place, until `fewest` vertices are left.
 
     The path moves outward only. The edge that adds the minimum area is removed first, of equal ones
-    the first. Return the new number of vertices, and False if no edge can be removed before that.
-    O(count + removed log(count)).
+    the first. Return the new number of vertices, and False if no edge can be removed before that,
+    or the path does not turn left at the start of one. O(count + removed log(count)).
 
     `work` is a working array of twice as many rows as the minimum power of two from `count`. Its
     first column is a tree: the leaves are the areas that the removal of the edge after each vertex
@@ -219,8 +219,9 @@ def update_nodes(tree: Floats, first: int, last: int) -> None:
 def box_around(points: Points, count: int, sign: float, slope: float) -> int:
     """Replace a path by three sides of a box, in place; return the new count, 4.
 
-    They go from its ends along a slope to its outermost vertex. `sign` is 1 if greater x is
-    outward, else -1.
+    Two equally long sides go outward from its ends along a slope dy/dx; the one from the inner end
+    reaches the x of the outermost vertex. `sign` is 1 if greater x is outward, else -1. The array
+    has room for four vertices.
     """
     first_x = points[0, 0]
     first_y = points[0, 1]
@@ -239,7 +240,10 @@ def box_around(points: Points, count: int, sign: float, slope: float) -> int:
 
 @compiled
 def make_rectangle(points: Points, count: int) -> int:
-    """Replace a polygon by its bounding rectangle along its diameter, in place. O(count^2)."""
+    """Replace a polygon by its bounding rectangle along its diameter, in place. O(count^2).
+
+    The array has room for four vertices; a set without a width has fewer.
+    """
     diameter = farthest_pair(points, count)
     x = 1.0
     y = 0.0

@@ -26,8 +26,9 @@ from infoset.geometry.polygon_exact import tidy
 def add_segment(points: Points, count: int, half_x: float, half_y: float) -> int:
     """Add the segment from -half to +half (Minkowski sum), in place; return the new count.
 
-    It is at most count + 2. O(count), in two passes. The boundary is divided at its extremes across
-    the segment; the part to the right of the segment's direction moves by +half, the rest by -half.
+    It is at most count + 2, for which the array needs room. O(count), in two passes. The boundary
+    is divided at its extremes across the segment: the part in front, from the rightmost vertex
+    counter-clockwise to the leftmost one as seen along +half, moves by +half, the rest by -half.
     A division at extremes, and not at sign changes of edges, is correct for tiny edges with a wrong
     direction. If rounding could hide an extreme (an edge along the segment, a set thin across it, a
     point), the edges are merged as in `add_polygon`.
@@ -102,7 +103,7 @@ def add_polygon(points: Points, count: int, other: Points, other_count: int, out
     edges of both are merged in order of direction, which gives vertices that are one addition each:
     rounding errors do not accumulate. If rounding has given an edge a wrong direction, the hull is
     taken first, which costs more: the merge needs edges in order. Rounding may exchange two edges
-    that are nearly parallel, which moves a vertex by less than that.
+    that are nearly parallel, which moves a vertex by less than a rounding of the coordinates.
     """
     if count == 0 or other_count == 0:
         return 0

@@ -25,7 +25,7 @@ Two roundings of one facet are up to 8.5e-13 apart (random systems of three stat
 merged.
 """
 REDUCED = 2.0**12 * SNAP
-"""Thickness, 3.0e-8, of a layer in place of a flat set.
+"""Distance, 3.0e-8, of the two sides of a layer from the flat set that it replaces.
 
 It is about the square root of the rounding, so that the layer stays thick. From this depth on a set
 is certainly not flat, and a pivot of a matrix certainly not zero.

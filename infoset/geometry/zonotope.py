@@ -135,8 +135,9 @@ class Zonotope(ZonotopeArrays, ConvexSet):
     def reduce_outward(self, order: float) -> Zonotope:
         """Return a zonotope with at most `order` n generators (`order` >= 1) that contains the set.
 
-        The longest generators stay. The others, those with the least |g|_1 - |g|_inf in units of
-        the widths of the set, become a box around their sum. O(m n).
+        The generators with the greatest |g|_1 - |g|_inf, in units of the widths of the set, stay.
+        The others become a box around their sum: also long ones along an axis, which a box has
+        exactly. O(m n).
 
         References
         ----------
@@ -374,7 +375,7 @@ class Zonotope(ZonotopeArrays, ConvexSet):
     def area(self) -> float:
         """Return the area of a set of R^2; 0 for a segment or a point.
 
-        `volume` is for any space.
+        A ValueError is raised in other spaces; `volume` is for any space.
         """
         return self.polytope().area()
 

@@ -28,8 +28,9 @@ class CentreAndGenerators(NamedTuple):
 def fewer_generators(generators: Floats, count: int) -> Floats:
     """Return at most `count` >= n generators of a zonotope that contains a given one.
 
-    The generators have the shape (m, n). The longest ones stay. The others, with the least |g|_1 -
-    |g|_inf in units of the widths of the set, become a box around their sum. O(m n).
+    The generators have the shape (m, n). The ones with the greatest |g|_1 - |g|_inf, in units of
+    the widths of the set, stay. The others become a box around their sum: also long ones along an
+    axis, which a box has exactly. O(m n).
 
     References
     ----------

@@ -56,7 +56,10 @@ def simplices_of(sides: Flags, dimension: int) -> Integers:
 
 
 def _facets_of(face: int, others: list[int], size: int) -> list[int]:
-    """Return the facets of a face of some dimension: the maximal intersections with other faces."""
+    """Return the facets of a face of dimension `size`: the maximal intersections with other faces.
+
+    Each has at least `size` vertices.
+    """
     parts = sorted({face & other for other in others} - {face}, key=int.bit_count, reverse=True)
     found: list[int] = []
     for part in parts:
@@ -80,7 +83,7 @@ def largest_ball(rows: Floats, limits: Floats) -> tuple[Floats, float]:
     """
     # The program has rows of size one. Its last variable is the radius / `minimum`, the size of the
     # smallest row, or 1 if that is less: no coefficient exceeds 1. The value 1e-300 only avoids a
-    # division by zero: with a row of zeros the program is not solved.
+    # division by zero: with a row of zeros the result has no meaning.
     units = np.abs(rows).max(axis=1, initial=1e-300)
     minimum = float(units.min(initial=1.0))
     matrix = np.column_stack([rows / units[:, None], minimum / units])
@@ -109,9 +112,9 @@ def triangle_of(columns: Floats) -> tuple[Floats, Integers]:
 def orthonormal(columns: Floats, rows: Floats) -> tuple[Floats, Floats]:
     """Return an orthonormal basis of the span of columns, shape (n, d), and functions in it.
 
-    `rows`, shape (k, d), are linear functions of the coefficients of the columns; the result has
-    functions of the coefficients of the basis. Each row of the basis is exact to rounding of
-    itself: the sizes of the rows may differ much.
+    The columns are independent. `rows`, shape (k, d), are linear functions of their coefficients;
+    the result has functions of the coefficients of the basis. Each row of the basis is exact to
+    rounding of itself: the sizes of the rows may differ much.
     """
     if not columns.shape[1]:
         return columns, rows

@@ -73,7 +73,10 @@ class PolytopeArrays:
 
     @cached_property
     def normals(self) -> Floats:
-        """Normals of the facets, shape (f, n), of unit length, along the affine hull."""
+        """Normals of the facets, shape (f, n), of unit length, along the affine hull.
+
+        The empty set has one row of zeros.
+        """
         if self.is_empty:
             return np.zeros((1, self.space))
         rows = self.facets[:, :-1] / self.scale
@@ -84,7 +87,7 @@ class PolytopeArrays:
 
     @cached_property
     def offsets(self) -> Floats:
-        """Offsets of the facets, shape (f,): normals x <= offsets."""
+        """Offsets of the facets, shape (f,): normals x <= offsets; -1 for the empty set."""
         if self.is_empty:
             return -np.ones(1)
         if len(self.equations):
@@ -179,7 +182,10 @@ class PolytopeArrays:
 
 
 def half_spaces(one: PolytopeArrays, origin: Floats | float = 0.0) -> tuple[Floats, Floats]:
-    """Return half-spaces rows (x - origin) <= limits: the facets, and two for each equation."""
+    """Return half-spaces rows (x - origin) <= limits: the facets, and two for each equation.
+
+    The set is not empty: the empty set has no facets here.
+    """
     sides = np.vstack([one.facets, one.equations, -one.equations])
     rows = sides[:, :-1] / one.scale
     return rows, moved_limits(rows, sides[:, -1], origin - one.centre)

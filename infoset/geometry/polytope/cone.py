@@ -169,7 +169,10 @@ def _first_nonzero(numbers: Row) -> int | None:
 
 
 def _moved_along(vectors: list[Row], heights: Row, line: Row, height: int) -> list[Row]:
-    """Return vectors with some `heights` over a row, moved onto it along a line with a `height`."""
+    """Return vectors with some `heights` over a row, moved onto it along a line with a `height`.
+
+    They are multiplied by `height`: it must be positive for rays, a negative one reverses lines.
+    """
     moved = zip(vectors, heights, strict=True)
     return [combined(height, vector, -above, line) for vector, above in moved]
 
@@ -192,9 +195,9 @@ def _inserted(rows: list[Row], rays: list[Row], on: Flags, done: Flags, lines: l
 
 
 def _cut(rays: list[Row], on: Flags, row: Row, number: int, least: int) -> tuple[list[Row], Flags]:
-    """Return the rays above a row and the rays in which edges cross it, and which is on which row.
+    """Return the rays above or on a row and the rays in which edges cross it, and their incidence.
 
-    The row has a `number`; an edge lies on at least `least` rows.
+    The row has a `number`, whose column of `on` is written; an edge lies on at least `least` rows.
     """
     heights = [dot(row, ray) for ray in rays]
     on[:, number] = [height == 0 for height in heights]

@@ -55,8 +55,9 @@ coordinates: UNSURE, one rounding of the whole set, is then 2 SNAP of the part, 
 no longer be told from a flat set.
 """
 _GOOD_WIDTH_RATIO = 2.0**6
-"""Coordinates are good if the set is at most this wide in them, and at least its inverse: up to two
-digits are lost then, compared with coordinates in which the set is one wide.
+"""Coordinates are good if no coordinate of a vertex exceeds this, and all widths of the set are at
+least its inverse: up to two digits are lost then, compared with coordinates in which the set is one
+wide.
 """
 _MAX_FRAMES = 3
 """Number of systems of coordinates in which half-spaces are tried before integers decide: those of
@@ -150,10 +151,10 @@ def of_half_spaces(
     *,
     is_inside: bool = True,
 ) -> PolytopeArrays:
-    """Return {x: rows (x - origin) <= limits}; limits may be infinite.
+    """Return {x: rows (x - origin) <= limits}; a limit of inf is none, -inf gives the empty set.
 
-    `ends` are the ends of a box that about contains the set: they save time. If the set certainly
-    `is_inside` this box, and unbounded because of rounding, it is clipped to the box.
+    `ends` are the ends of a box that about contains the set: they save time. `is_inside` says that
+    the set is certainly in this box: if rounding makes it unbounded, it is clipped to the box.
 
     `sizes`, shape (n,), are the sizes of the coordinates from which limits were computed. Integers
     would be exact about the wrong set, often an empty one: where they decide, the half-spaces are
@@ -221,8 +222,8 @@ def _by_double_description(
 ) -> PolytopeArrays | None:
     """Return {x: rows (x - origin) <= limits} with rounded numbers.
 
-    None means that integers must decide: the set is not bounded, not closed, or not thicker than
-    REDUCED in these coordinates.
+    None means that integers must decide: a row is nearly zero, or the set is not bounded, not
+    closed, or a facet is nearer than REDUCED to the mean of the vertices in these coordinates.
     """
     space = len(scale)
     facets = _scaled(rows, limits, origin, centre, scale)
@@ -300,7 +301,7 @@ def _is_short(rows: Floats) -> Flags:
 
 
 def _holds_without_direction(limits: Floats, which: Flags) -> bool:
-    """Whether 0 x <= limit holds, to rounding, for some of the rows."""
+    """Whether 0 x <= limit holds, to rounding, for each row of `which`."""
     return bool((limits[which] >= -ON * np.abs(limits).max(initial=0.0)).all())
 
 
@@ -342,9 +343,9 @@ def cut(
 ) -> PolytopeArrays:
     """Return the part of a bounded set where rows (x - origin) <= limits, or the set itself.
 
-    A half-space from which the set sticks out by less than ON of its size does not cut it. A part
-    that is much smaller than the set is computed again, in its own coordinates, from the
-    half-spaces that are near it.
+    The set is not empty, and the limits are finite. A half-space from which the set sticks out by
+    less than ON of its size does not cut it. A part that is much smaller than the set is computed
+    again, in its own coordinates, from the half-spaces that are near it.
     """
     facets = _in_coordinates_of(whole, rows, limits, origin)
     cuts = _cutting(whole, facets)

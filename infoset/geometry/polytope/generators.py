@@ -280,7 +280,8 @@ def _parallel_groups(generators: Floats, numbers: Integers) -> tuple[list[list[i
 def faces_of(generators: Floats) -> Faces | None:
     """Return the faces of a zonotope in one to three dimensions, of generators of shape (m, d).
 
-    No two generators are parallel. It is None if rounding decides which generators are coplanar.
+    No two generators are parallel, and they span all dimensions. It is None if rounding decides
+    which generators are coplanar.
     """
     dimension = generators.shape[1]
     if dimension == 1:

@@ -35,7 +35,10 @@ def _ones(word: Any) -> int:
 
 @_kernels.allocation_free
 def common(one: Bits, others: Bits, counts: Integers) -> None:
-    """Write the numbers of common bits of a set, shape (words,), and others, shape (words, k)."""
+    """Write the numbers of common bits of a set, shape (words,), and others, shape (words, k).
+
+    Only the first len(counts) of the others are compared.
+    """
     counts[:] = 0
     for word in range(len(one)):
         for k in range(len(counts)):
@@ -86,8 +89,8 @@ class Needed(NamedTuple):
 def without_redundant(on: Flags, dimension: int) -> Needed:
     """Return the points and rows that are not redundant, from an incidence of shape (points, rows).
 
-    A point is redundant if it is on fewer than `dimension` rows, or on no other rows than another
-    point, and a row likewise.
+    A point is redundant if it is on fewer than `dimension` rows, or another point is on all of its
+    rows; of points on the same rows the first stays. The same holds for rows.
     """
     return Needed(*_without_redundant(on, dimension))
 
@@ -112,7 +115,10 @@ def _without_redundant(on: Flags, dimension: int) -> tuple[Integers, Integers, F
 
 @_kernels.compiled
 def _maximal(bits: Bits, least: int) -> Flags:
-    """Return which sets have at least `least` bits and are in no other set, of equal ones one."""
+    """Return which sets have at least `least` bits and are in no other set.
+
+    Of equal sets it is the first.
+    """
     columns = np.ascontiguousarray(bits.T)
     shared = np.empty(len(bits), np.int64)
     counts = np.empty(len(bits), np.int64)

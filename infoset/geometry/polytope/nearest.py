@@ -19,8 +19,8 @@ _MAX_PAIRS = 1000
 """Maximum number of pairs of vertices that Wolfe's algorithm adds, a guard: it ends after a few
 vertices of each hull. For 23 random pairs of hulls 10 are enough (measured)."""
 _PRECISION = 64.0 * EPS
-"""Decrease of x . d, relative to the sizes of x and of the hulls, that a new pair must offer: 64
-roundings.
+"""Decrease of x . d, for hulls of the size one, that a new pair must offer, relative to the squared
+length of x, or to one if x is longer: 64 roundings.
 """
 _REFINEMENTS = 3
 """Maximum number of corrections of the shares. Each multiplies their error by 1e-16 times the
@@ -110,8 +110,8 @@ def _next_pair(
 ) -> tuple[int, int, float, bool]:
     """Return the pair of vertices with the lowest difference along x, its gain, and if it is known.
 
-    x is the present difference. The gain is the distance along x by which the new difference is
-    lower, less the minimum gain. It is known if a present pair has the same difference.
+    x is the present difference. The gain is x . x - x . d for the new difference d, less the
+    minimum gain (`_PRECISION`). The pair is known if a present pair has the same difference.
     """
     x, low = _combination(shares, one[i], two[j])
     heights = _heights(one, one[i[0]], x, low)
@@ -163,8 +163,8 @@ def _affine_minimizer(one: Floats, two: Floats, shares: Floats) -> Floats:
 def _edge_factor(one: Floats, two: Floats) -> tuple[Floats, Floats]:
     """Return the lengths of the edges and R of E = Q R, with edges of length one as columns of E.
 
-    The edges are the differences one - two, less the first one. An edge that depends on earlier
-    edges has a zero on the diagonal of R.
+    The edges are the differences one - two, less the first one; no two differences are equal. An
+    edge that depends on earlier edges has a zero on the diagonal of R.
     """
     basis = (one[1:] - one[0]) - (two[1:] - two[0])
     count = len(basis)

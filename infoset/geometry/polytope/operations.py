@@ -32,8 +32,8 @@ def polytope_from_support(
 
     `furthest` returns a point of the set furthest along a direction, both of shape (space,).
     `space` is 2 or 3; more works but the cost grows fast. Vertices of the result are points of the
-    set; the set extends beyond its facets, at most `max_facets`, by no more than the relative
-    `tolerance`.
+    set; the set extends beyond its facets, at most `max_facets`, by no more than `tolerance` times
+    its greatest width along an axis. An equation of a flat set counts as two facets.
 
     The hull of the known points is enlarged: each facet beyond which the set extends gives a new
     point, and so does each direction across a flat hull. It ends if there is no such facet, after
@@ -42,7 +42,7 @@ def polytope_from_support(
     Raises
     ------
     ArithmeticError
-        If it has too many facets.
+        If the hull has more than `max_facets` facets, or does not end after 200 enlargements.
     """
     unit = np.eye(space)
     points = np.array([furthest(direction) for direction in np.vstack([unit, -unit])])

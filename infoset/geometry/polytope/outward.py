@@ -54,8 +54,9 @@ def image(
 
     The image is in coordinates in which it is about one wide, y' = matrix y + s, where a facet
     a y <= b is a' y' <= b + a' s; a' matrix differs from a by rounding. The result has no facets
-    unless the matrix is square with pivots that are certainly not zero. The hull of points may lack
-    a tip: it gives too small supports.
+    unless the matrix is square with pivots that are certainly not zero. Their offsets are not the
+    supports of the points: the hull of the given points may lack a tip of the given facets. The
+    errors, shape (m,), are not in the facets: the caller enlarges the result by them.
     """
     m, n = matrix.shape
     sizes = np.array([size_of(column) for column in points.T])
@@ -167,10 +168,10 @@ def push_out(
 ) -> Floats:
     """Return points, shape (v, n), moved to the outer sides of their facets, if `most` allows.
 
-    Points on none but the first `known` facets stay, and so do points that are exactly on their
-    facets. The others move across their facets (`_cross_facets`), or where this fails, at a sharp
-    corner, and in a `flat` set, away from the centre. No point moves by more than `most`: where
-    rounding moves facets more than the vertex, the hull may lack the very tip.
+    Points on none but the first `known` facets stay, and so do points that are on or beyond all of
+    their facets. The others move across their facets (`_cross_facets`), or where this fails, at a
+    sharp corner, and in a `flat` set, away from the centre. No point moves by more than `most`:
+    where rounding moves facets more than the vertex, the hull may lack the very tip.
 
     The hull of the points then contains the set of the facets: a map of the set to the hull that
     takes each facet to its outer side covers the set.

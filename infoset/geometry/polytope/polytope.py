@@ -142,7 +142,8 @@ class Polytope(PolytopeArrays, ConvexSet):
         """Return {x: normals x <= offsets, across x = levels}.
 
         The shapes are (m, n), (m,), (k, n) and (k,). The set may be empty or unbounded. Rows with
-        infinite offsets are left out. One step of the double description for each row.
+        an offset of inf are left out, and -inf gives the empty set. One step of the double
+        description for each row.
         """
         rows, limits = constraint_values(("normals", "offsets"), normals, offsets, "k", "n")
         if across is not None:
@@ -377,8 +378,9 @@ class Polytope(PolytopeArrays, ConvexSet):
     def enlarged(self, by: ArrayLike) -> Polytope:
         """Return a set that contains {x + e: |e_i| <= by_i}, with `by` of shape (n,).
 
-        Each facet moves outward. A flat set becomes 3e-8 of its coordinates thick. O((v + f) n) for
-        a set with an interior.
+        Each facet moves outward. A flat set is first made thick, by `by` or by 3e-8 of its
+        coordinates to each side, whichever is more, so that the result is at least twice as thick
+        as the exact set across its affine hull. O((v + f) n) for a set with an interior.
         """
         margin = finite_values("by", by, self.space)
         not_negative("by", float(margin.min()))
@@ -394,7 +396,8 @@ class Polytope(PolytopeArrays, ConvexSet):
     def _layer(self, margin: Floats) -> Polytope:
         """Return a flat set with an interior: its equations become two half-spaces each.
 
-        They are apart by a `margin`, shape (n,), or by REDUCED of its coordinates if this is more.
+        Each is moved outward by a `margin`, shape (n,), or by REDUCED of its coordinates if this is
+        more, so that the layer is twice as thick.
         """
         sizes = np.maximum(margin, REDUCED * np.abs(self.vertices).max(axis=0))
         rows = self.equations[:, :-1] / self.scale
@@ -559,8 +562,8 @@ class Polytope(PolytopeArrays, ConvexSet):
 
         It has at most `cap` (>= 2n) facets and `max_vertices` (>= 2^n) vertices. It starts with the
         bounding box. Then it is cut by the facet with the greatest excess, relative to the width of
-        the set along its normal, until it has `cap` facets. A flat set becomes 3e-8 of its
-        coordinates thick.
+        the set along its normal, until the next cut would exceed `cap` or `max_vertices`. A flat
+        set becomes thick by 3e-8 of its coordinates to each side.
         """
         Limits(minimum=2 * self.space, whole=True).need("cap", cap)
         self.bounded()
@@ -609,7 +612,10 @@ class Polytope(PolytopeArrays, ConvexSet):
         return polyhedron.Polyhedron(self.space, tuple(points), (), (), facets, equations)
 
     def recession(self) -> Polytope:
-        """Return the cone of the directions in which the set is unbounded, {0} if it is bounded."""
+        """Return the cone of the directions in which the set is unbounded, {0} if it is bounded.
+
+        An EmptyPolytopeError is raised for the empty set.
+        """
         return self._of_exact(polyhedron.recession(self.needed()._polyhedron))
 
     def support_function(self, directions: ArrayLike) -> Floats:
@@ -649,10 +655,11 @@ class Polytope(PolytopeArrays, ConvexSet):
     def margin(self, points: ArrayLike) -> Floats:
         """Return the minimum distance of `points`, shape (..., n), from the facets, shape (...).
 
-        It is positive inside. For a flat set it is at most minus the distance from the affine hull,
-        for the empty set -inf. It is not negative at the vertices: the rounding of a scalar
-        product, and of the representation (distances of vertices beyond facets), is added. Outside,
-        -`margin` is at most the `distance`.
+        It is positive inside. The equations of a flat set count as facets: it is negative farther
+        than 7e-12 of the coordinates outside of the affine hull. It is -inf for the empty set. It
+        is not negative at the vertices: the rounding of a scalar product, and of the representation
+        (distances of vertices beyond facets), is added. Outside, -`margin` is at most the
+        `distance`.
         """
         x = finite_values("points", points, "...", self.space)
         if self.is_empty:

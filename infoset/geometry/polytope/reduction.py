@@ -22,9 +22,9 @@ _kernels = Kernels("contract", "nnan", "nsz")
 def reduced_outward(polytope: PolytopeArrays, cap: int, max_vertices: int) -> PolytopeArrays:
     """Return a set that contains a polytope with an interior, with few facets and vertices.
 
-    It has at most `cap` facets and `max_vertices` vertices. It starts with the bounding box, so
-    that all widths are exact, and is cut by the facet beyond which it extends most, relative to the
-    width along its normal.
+    It has at most `cap` (>= 2n) facets and `max_vertices` (>= 2^n) vertices. It starts with the
+    bounding box, so that all widths are exact, and is cut by the facet beyond which it extends
+    most, relative to the width along its normal.
     """
     points, facets, incidence = _cut_by_worst(polytope.points, polytope.facets, cap, max_vertices)
     outer = replace(polytope, points=points, facets=facets, incidence=incidence)

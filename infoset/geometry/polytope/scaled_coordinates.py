@@ -30,8 +30,9 @@ def coordinates(
 ) -> tuple[Floats, Floats]:
     """Return a centre and scales, powers of two, each of shape (n,), for a set between two points.
 
-    `minimum`, shape (n,), are minimum widths of the set. A scale is at least a `share` of the
-    coordinates. Differences from a centre far away are exact.
+    A scale is the greatest power of two up to the width, or up to 1 if that is zero. The width is
+    at least `minimum`, shape (n,), and at least a `share` of the coordinates. Differences from a
+    centre far away are exact.
     """
     centre = np.zeros(len(lower))
     scale = np.empty(len(lower))

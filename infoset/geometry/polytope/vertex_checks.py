@@ -27,8 +27,9 @@ def touching(
     """Return the incidence with all points within SNAP of a facet, and whether it is consistent.
 
     It is not if a point is outside of a facet by more than `far`, or this far away from a facet
-    that it is `on`, shape (v, f). Only points on facets after the first `known` are compared.
-    `size` is the maximum coordinate of the points, at least one: SNAP is relative to it.
+    that it is `on`, shape (v, f). Only points on facets after the first `known` are compared, all
+    if `known` is 0. `size` is the maximum coordinate of the points, at least one: SNAP is relative
+    to it.
     """
     n = points.shape[1]
     units = np.array([size_of(facet) for facet in facets])
@@ -50,8 +51,8 @@ def touching(
 def refined(points: Floats, facets: Floats, equations: Floats, on: Flags, known: int) -> Floats:
     """Return points; points on facets after the first `known` move to where their facets meet.
 
-    The steps have the least length at which the facets are met best. Cuts of a small part combine
-    points that are far from it, so that their rounding grows.
+    All points move if `known` is 0. The steps have the least length at which the facets are met
+    best. Cuts of a small part combine points that are far from it, so that their rounding grows.
     """
     n = points.shape[1]
     result = points.copy()
@@ -67,7 +68,7 @@ def refined(points: Floats, facets: Floats, equations: Floats, on: Flags, known:
 
 @_kernels.compiled
 def loses_points(points: Floats, used: Integers, on: Flags, least: int, distance: float) -> bool:
-    """Whether a vertex is lost: a point on `least` facets, far from all points that are `used`.
+    """Whether a vertex is lost: a point on `least` or more facets, far from all that are `used`.
 
     Far is farther than `distance` along an axis. Between facets at a small angle many points are
     near both: the incidence does not show which of them are vertices.
