@@ -20,7 +20,7 @@ from infoset.arrays import Flags, Floats, some
 from infoset.engine.predicted_miss import ExtremePoints, PredictedMiss
 from infoset.engine.set_state import SetState, SetStatus
 from infoset.information_set import InformationSet, InformationSetView
-from infoset.limits import COUNT, flags, real_array, shown
+from infoset.limits import COUNT, Limits, flags, real_array, shown
 from infoset.model import SetModel
 from infoset.set_queries import MaskedFloats, MaskedIntegers, Section, SetQueries
 from infoset.suspects import Suspects
@@ -122,7 +122,9 @@ class CoveredSetView(InformationSetView):
 
     @property
     def status(self) -> list[SetStatus]:
-        """Status of each set: that of its members if they agree."""
+        """Status of each set: the first of TRACKING, REFUTED, FINISHED and STOPPED that a member
+        has, otherwise EMPTY.
+        """
         return [_status_of(row) for row in self._members_status().tolist()]
 
     @property
@@ -256,6 +258,7 @@ class CoveredSetView(InformationSetView):
     def section_at(self, label_m: float, engagement: int = 0, member: int = 0) -> Section:
         """Return the section of one member at any label, computed by replaying the history."""
         self._need_engagement(engagement)
+        Limits(minimum=0, maximum=len(self.left_out) - 1, whole=True).need("member", member)
         return self._members.section_at(label_m, engagement * len(self.left_out) + member)
 
 

@@ -323,6 +323,14 @@ def test_lost_image_does_not_change_the_classes_of_later_images() -> None:
         np.testing.assert_array_equal(before, after)
 
 
+def test_section_of_a_member_that_does_not_exist_is_refused() -> None:
+    covered = CoveredSet(MODEL, batch=2)
+
+    # Member 4 of engagement 0 would be member 0 of engagement 1.
+    with pytest.raises(ValueError, match="member must be at most 3: got 4"):
+        covered.section_at(X, engagement=0, member=4)
+
+
 def test_rates_are_refused() -> None:
     with pytest.raises(ValueError, match="cannot be cut by rates"):
         CoveredSet(MODEL).measure_rate(0.0, 1e-6)
