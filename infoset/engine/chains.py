@@ -281,7 +281,9 @@ def turn(section: SectionView, tau: float) -> None:
 
 @inlined
 def spread(section: SectionView, tau: float, half_v: float) -> None:
-    """Add the segment of V from -half_v to half_v along the level of `tau` (Minkowski sum)."""
+    """Add the segment of V from -half_v to half_v, which is not negative, along the level of `tau`
+    (Minkowski sum).
+    """
     half_m = half_v * tau
     move(section.right, half_v, half_m)
     move(section.left, -half_v, -half_m)
@@ -365,7 +367,7 @@ def cut(section: SectionView, tau: float, lower: float, upper: float) -> tuple[b
     Return whether it is not empty, and the smaller overlap of section and band at the two borders,
     m: minus their distance if they do not intersect. If the intersection is empty, the section is
     unchanged. A band with `lower` above `upper` is empty: that of a label behind x = 0, or beyond
-    the range at which the error bound is zero.
+    the range at which the error bound is zero. The overlap is then at most `upper` - `lower`.
     """
     right, left, rings, _ = section
     minimum, maximum = heights(section, tau)
@@ -393,7 +395,7 @@ def find_peak(chain: Chain, rings: Floats, sign: float, magnitude: float) -> int
     `sign` is 1 for the right chain, -1 for the left one. `magnitude` is the magnitude of the terms
     of the predicted misses, to which their rounding error is relative, m. The search starts at the
     previous peak and ends where the miss decreases by more than rounding, so that vertices that
-    nearly coincide do not stop it.
+    nearly coincide do not stop it. Of exactly equal misses the previous peak stays.
     """
     first = chain.begin
     last = chain.end - 1

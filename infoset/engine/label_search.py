@@ -147,7 +147,8 @@ def narrow_ends(lower: float, upper: float, resolution: float, past: Past) -> Fe
 
 @allocation_free
 def search_bracket(past: Past) -> bool:
-    """Search for a feasible label in the bracket of the workspace, whose labels are infeasible.
+    """Search for a feasible label in the bracket of the workspace, whose labels are infeasible and
+    whose middle one empties last.
 
     Return whether the middle label is feasible now. If not, no feasible label was found, and
     `room.unproved` is set unless it is proved that there is none. The larger half of the bracket is

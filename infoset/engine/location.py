@@ -64,7 +64,7 @@ class KnownLabels(NamedTuple):
 def list_known_labels(
     b: int, limit_below: float, limit_above: float, sections: Sections, past: Past
 ) -> KnownLabels:
-    """Write the limits and the stored labels between them to the workspace.
+    """Write the limits and the stored labels strictly between them to the workspace.
 
     The limits have only their labels: whether they are feasible is not known yet.
     """

@@ -39,9 +39,9 @@ class PredictedMiss:
     exists : ndarray of bool, shape (B,)
         Whether the set has a feasible section; the other fields are zero where it has none.
     lower_m, upper_m : ndarray, shape (C, B)
-        Ends pi_* and pi^* of the interval along each lateral axis, signed, m.
+        Ends pi_* and pi^* of the interval along each lateral axis, signed, m, of the aim point.
     lower_point, upper_point : ExtremePoints
-        States that reach the ends.
+        States of the centre that reach the ends.
 
     References
     ----------

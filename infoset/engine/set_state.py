@@ -43,7 +43,7 @@ class SetStatus(Enum):
     """The set contains states above the range threshold."""
     EMPTY = 1
     """No state agrees with the data, no section has passed below the threshold, and the set was not
-    recovered.
+    recovered; or the set was ended because others of its engagement contain it.
     """
     FINISHED = 2
     """All sections have passed below the range threshold."""

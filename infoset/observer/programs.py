@@ -47,7 +47,8 @@ class Stage:
     step : int
         Number of the step.
     prior : ConvexPolygons, Polytope or Zonotope
-        Set that contains the state, before the strips.
+        Set that contains the state, before the strips. In a program only that of the first stage is
+        a constraint; the others give the sizes of the states.
     normals, lower, upper : ndarray, shapes (r, n), (r,), (r,)
         Strips lower <= normal . x <= upper of the measurements, enlarged by their rounding errors.
     outputs : ndarray of int, shape (r,)

@@ -198,10 +198,10 @@ class Polygons(Batch):
 
 @dataclass(frozen=True, eq=False)
 class RunPolytope:
-    """The set of one run as a polytope, of at most `max_facets` facets; None is no bound.
+    """The set of one run as a polytope, of at most `max_facets` facets after a cut.
 
-    `reduced` is whether the set, or one that it was computed from, was replaced by a larger one
-    with fewer facets.
+    None is no bound. `reduced` is whether the set, or one that it was computed from, was replaced
+    by a larger one with fewer facets.
     """
 
     polytope: Polytope

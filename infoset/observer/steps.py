@@ -19,8 +19,9 @@ from infoset.geometry import polygon, polygon_exact, polygon_reduction, polygon_
 from infoset.geometry.polygon import Points
 
 MAX_VERTICES = 512
-"""Maximum number of vertices of a polygon; polygons with more are reduced outward, so that the time
-of a step is bounded. Chosen: twice the maximum of a section of an engagement.
+"""Number of vertices to which a polygon with more is reduced outward in a step, so that the time of
+a step is bounded; the enlargement after it and cuts add some. Chosen: twice the maximum of a
+section of an engagement.
 """
 _SHARP = 2.0
 """Slope of the edges at a vertex that is extreme along an axis, relative to the other axis, in
@@ -342,7 +343,7 @@ def update_all(sets: Batch, strips: Strips, excess: Floats, out: Batch) -> None:
 
     The bounds are enlarged by `CUT_SLACK` times their terms and the terms of normal . x. `excess`,
     shape (B, r), receives the distance between set and strip, in the unit of the bounds, where the
-    set becomes empty.
+    set becomes empty; its other elements are unchanged.
     """
     normals = strips.normals
     for b in range(sets.counts.size):
