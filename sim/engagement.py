@@ -50,6 +50,8 @@ class Step:
     ----------
     tracking, flying : ndarray of bool, shape (B,)
         Engagements that still measure and decide, and those before their closest approach.
+    sight : Sight
+        True geometry before the impulse; of a misaligned camera in its axes.
     measured : mapping of str to ndarray
         Values measured in this step, by sensor, shape (C, B), of ranges (B,); without the sensors
         that measured in no engagement.
@@ -120,6 +122,8 @@ class Engagements:
     def flying(self) -> bool:
         """Whether any true motion is before its closest approach or before x = 0, where its label
         leaves the set.
+
+        It is false after the last step for which numbers were drawn.
         """
         return not self._flight.arrived.all() and self.step < self._draws.steps
 
@@ -188,7 +192,7 @@ class Engagements:
     def results(self, runs: NDArray[np.int64]) -> Results:
         """Return the results so far, with these run numbers.
 
-        Without a closest approach so far, the miss is the present range.
+        Without a closest approach so far, the miss is the present distance from the aim point.
         """
         arrivals_s = self._flight.arrivals_s(self.step)
         miss = self._flight.miss()

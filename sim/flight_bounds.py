@@ -214,7 +214,7 @@ def _sums(values: Floats) -> Floats:
 def greater_of_neighbours(values: Floats) -> Floats:
     """Return the greater value of each two neighbours along the last axis.
 
-    It is a bound between them if the values are monotonic.
+    It is a bound between them if the values are monotonic there. The result is shorter by one.
     """
     return np.asarray(np.maximum(values[..., 1:], values[..., :-1]))
 

@@ -61,7 +61,8 @@ def with_gravity(model: SetModel, sun: Sun | None, impulses_m_s: float) -> SetMo
     Raises
     ------
     ValueError
-        If gravity has no bound, because the motions may come too near the attracting body.
+        If gravity has no bound: the motions may come too near the attracting body, or gravity may
+        take away the closing speed or change it by more than the guaranteed model allows.
 
     Notes
     -----
@@ -118,5 +119,8 @@ def _max_later(values: Floats) -> Floats:
 
 
 def _max(values: Floats) -> float:
-    """Return the maximum value of a function between times that are close together."""
+    """Return a bound of the maximum of a function from its values at times that are close together.
+
+    Between two times it may exceed both values by the maximum difference of two neighbours.
+    """
     return float(values.max() + np.abs(np.diff(values)).max())

@@ -84,7 +84,7 @@ class Passage:
         Minimum distance since the start, m: the distance at the start if the object recedes from
         then on.
     arrival_s : ndarray
-        Time from the beginning of the step to x = 0.
+        Time from the beginning of the step to x = 0, which may be before or after the step.
     lateral_m : ndarray, shape (C, B)
         Lateral position at the minimum distance.
     """
@@ -304,7 +304,9 @@ def leap(
 
     With the acceleration a(p) at the position p, and a1 = a(p), a2 = a(p + h v/2 + h^2 a1/8), a3 =
     a(p + h v + h^2 a2/2), the position gains h v + h^2 (a1 + 2 a2)/6 and the velocity h (a1 + 4 a2
-    + a3)/6. It is exact for a constant acceleration. `stage` is memory of the shape of the state.
+    + a3)/6. It is exact for a constant acceleration. The stored accelerations of the state must be
+    those at its position (`accelerate`), and are so afterwards. `stage` is memory of the shape of
+    the state.
 
     References
     ----------
@@ -401,10 +403,10 @@ def products(state: Floats) -> tuple[float, float]:
 def turning_times(state: Floats, duration_s: float) -> tuple[float, float]:
     """Return the increasing times within a leap at which the rate of r . v is zero, s.
 
-    Both are `duration_s` without such a time; r . v is monotone between the ends of the leap and
-    these times. With the acceleration a of the start of the leap its rate is v . v + r . a + 3 v .
-    a t + 1.5 a . a t^2. It has no zero in a leap in which the acceleration changes the velocity
-    only little.
+    Both are `duration_s` without such a time; with only one, the second is equal to it or
+    `duration_s`. r . v is monotone between the ends of the leap and these times. With the
+    acceleration a of the start of the leap its rate is v . v + r . a + 3 v . a t + 1.5 a . a t^2.
+    It has no zero in a leap in which the acceleration changes the velocity only little.
     """
     _, constant = products(state)
     linear = quadratic = 0.0
@@ -495,7 +497,7 @@ def approach_within(
     """Keep the closest approaches within a leap that starts at a state: `keep_closest`.
 
     They are the start, if the object recedes there, and the times at which r . v becomes positive.
-    `scratch` is memory of three states.
+    `before` is not changed. `scratch` is memory of three states.
     """
     trial = scratch[0]
     stage = scratch[1]
@@ -598,8 +600,9 @@ def advance_all(
     """Advance all states by a step, and write the closest approaches within it: see `Passage`.
 
     The length of a leap depends on the state of the engagement alone, so a run does not depend on
-    the others of its batch. `passage` is whether the object has passed, the time of arrival, s, and
-    the nearest relative positions so far, m, shape (B, A + 1).
+    the others of its batch. `passage` is whether the object has passed, false at the beginning, the
+    time of arrival, s, and the nearest relative positions so far, m, shape (B, A + 1). `scratch` is
+    memory of four states.
     """
     before = scratch[0]
     stage = scratch[2]

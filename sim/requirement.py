@@ -149,7 +149,8 @@ AnyRequirement = Requirement | HitRequirement
 def parse_requirement(text: str) -> AnyRequirement:
     """Read a requirement; raise ValueError for another text.
 
-    The text `miss_m<10` without a quantile means the 99 % quantile.
+    The text `miss_m<10` without a quantile means the 99 % quantile, and `hit>0.95` means
+    `hit>=0.95`.
     """
     match = _FORM.fullmatch(text[:100])
     if match is None:
@@ -182,9 +183,10 @@ class RequirementVerdict:
     runs_needed : int or None
         Approximate number of runs that decide with `watched=True`, if the share of runs that
         satisfy the bound stays the same; None if it is over `MAX_RUNS_NEEDED`, because the estimate
-        is at the bound.
+        is at the bound. It is `runs` if the sample decides.
     known : int
-        Runs with a value of the quantity; the others do not satisfy the bound.
+        Runs with a value of the quantity; the others do not satisfy the bound. All runs for a
+        `HitRequirement`.
     """
 
     decision: Decision
@@ -290,7 +292,7 @@ def _estimated_share(count: int, size: int, watched: bool) -> _Estimate:
 
 
 def _decision(holding: Integers, share: float, watched: bool) -> Decision:
-    """Return the first decision of a sample.
+    """Return the first decision of a sample; without `watched`, the decision of all its runs.
 
     `holding` is the number of the first 1, 2, ..., n runs that satisfy the bound.
     """
@@ -374,8 +376,8 @@ def p_values(runs: ArrayLike, count: ArrayLike, share: ArrayLike) -> tuple[Float
 def runs_needed(count: int, runs: int, share: float) -> int | None:
     """Return the approximate number of runs that decide a requirement with `watched=True`.
 
-    None is more than `MAX_RUNS_NEEDED`. If all runs satisfy the bound so far, it is the minimum
-    number that can decide.
+    It is greater than `runs`, which do not decide. None is more than `MAX_RUNS_NEEDED`. If all runs
+    satisfy the bound so far, it is the minimum number that can decide.
     """
 
     def deciding(sizes: Integers) -> Integers:

@@ -38,7 +38,8 @@ class _OutputTime:
     where : ndarray of bool, shape (B,)
         Flights that measure.
     slope, slope_rate_per_s : ndarray, shape (C, B)
-        Slope z/x of the true line of sight, and its rate.
+        Slope z/x of the true line of sight in the axes of the camera, and its rate; in the model
+        `paper` the angle and its rate, which that model takes for them.
     """
 
     step: int
@@ -127,7 +128,7 @@ class TruthSection:
 
     def _margins(self, arrival_s: Floats) -> Floats:
         """Return the margin of each flight at each of L measurements, m, shape (L, B); infinite
-        where it does not measure.
+        where it does not measure, and below the range threshold.
         """
         times = self._output_times
         if not times:

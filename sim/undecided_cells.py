@@ -18,7 +18,7 @@ from infoset.sim.storage import CampaignFolder
 
 GROWTH = 1.05
 """A sample grows by at least this factor between two checks of a quantile: a check after each chunk
-would cost O(N^2), and a campaign is at most 5 % longer than needed.
+would cost O(N^2), and a campaign is at most 5 % and one chunk longer than needed.
 """
 
 
@@ -27,7 +27,9 @@ class CellSample:
 
     A quantile is checked after certain numbers of chunks, which depend neither on the workers nor
     on their speed: a campaign stops at the same run with any number of workers and interruptions.
-    The cost is O(N log N) over a campaign. A requirement is checked after each run.
+    The cost is O(N log N) over a campaign. A requirement is checked after each run, and its
+    decision is final. A quantile can be undecided again at a later check, which is made if another
+    noise of the cell is undecided, or the cell has fewer runs than its minimum.
     """
 
     def __init__(self, rule: StoppingRule | AnyRequirement, chunks: int) -> None:
@@ -39,7 +41,7 @@ class CellSample:
         self._values: Floats = np.empty(0)
 
     def add(self, values: Floats) -> None:
-        """Add the values of a chunk; NaN is unknown."""
+        """Add the values of a chunk, the chunks in the order of their runs; NaN is left out."""
         self._count += 1
         before = len(self._values)
         self._values = np.append(self._values, values[~np.isnan(values)])
@@ -55,7 +57,9 @@ class CellSample:
 
 @dataclass
 class _Cell:
-    """Progress of a cell: its chunks, the number of judged ones, and the judged runs by noise."""
+    """Progress of a cell: its chunks, the judged runs by noise, the number of judged chunks, and
+    simulated chunks, by their runs, that wait for an earlier one.
+    """
 
     chunks: list[range]
     samples: dict[str, CellSample]

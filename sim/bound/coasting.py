@@ -30,7 +30,7 @@ MIN_RANGE = 1e-9
 
 
 class NoArrivalError(ValueError):
-    """Gravity keeps the object from reaching x = 0."""
+    """Gravity keeps the object from reaching x = 0 within `LONGEST_FLIGHT`."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,8 @@ def coasting(position_m: Floats, velocity_m_s: Floats, sun: Sun | None, step_s: 
     Parameters
     ----------
     position_m, velocity_m_s : ndarray, shape (C,)
-        (z, x) and (V_z, V_x) at t = 0; (y, z, x) and (V_y, V_z, V_x) in space; SI units.
+        (z, x) and (V_z, V_x) at t = 0; (y, z, x) and (V_y, V_z, V_x) in space; SI units. x is
+        positive and V_x negative.
     sun : Sun or None
         None is free space.
     step_s : float
@@ -130,7 +131,7 @@ def coasting(position_m: Floats, velocity_m_s: Floats, sun: Sun | None, step_s: 
     Raises
     ------
     NoArrivalError
-        If x stays positive.
+        If x is positive until `LONGEST_FLIGHT`; never in free space.
     """
     if sun is None:
         return _straight(position_m, velocity_m_s, step_s)
@@ -160,7 +161,8 @@ def _straight(position_m: Floats, velocity_m_s: Floats, step_s: float) -> Coasti
 
 
 class _KeplerFlight(NamedTuple):
-    """Integrated flight in space until x = 0, in units of the first range and the flight time.
+    """Integrated flight in space until x = 0, in units of the first range and of the flight time
+    without gravity.
 
     Parameters
     ----------
@@ -223,7 +225,11 @@ def _kepler(position_m: Floats, velocity_m_s: Floats, sun: Sun, step_s: float) -
 
 
 def _on_circular_orbit(sun: Sun, metres: float, parameter: float) -> Floats:
-    """Return the heliocentric position and velocity of the spacecraft, shape (2, 3)."""
+    """Return the heliocentric position and velocity of the spacecraft, shape (2, 3).
+
+    `metres` is the unit of length, and `parameter` the gravitational parameter in the units of
+    `_KeplerFlight`. The orbit is circular only if `sun` has no velocity of the spacecraft.
+    """
     toward_sun, along_orbit = sun_and_orbit(sun)
     distance = sun.distance_m / metres
     return np.stack([-distance * toward_sun, np.sqrt(parameter / distance) * along_orbit])
@@ -232,8 +238,8 @@ def _on_circular_orbit(sun: Sun, metres: float, parameter: float) -> Floats:
 def _kepler_flight(relative: Floats, craft: Floats, parameter: float) -> _KeplerFlight | None:
     """Integrate spacecraft, relative motion, transition matrix and `Coasting.pushed` together.
 
-    None if x does not become zero. `relative` and `craft` are positions and velocities, shape (2,
-    3).
+    None if x does not become zero within `LONGEST_FLIGHT`. `relative` and `craft` are positions and
+    velocities, shape (2, 3).
     """
     from scipy.integrate import solve_ivp  # takes long to load
 

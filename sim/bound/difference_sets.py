@@ -55,10 +55,12 @@ class FarthestDifference(NamedTuple):
 
 
 class Segments(NamedTuple):
-    """Segments [-1, 1] (x, y) whose sum is a set, in the order of their angles from 0 to pi.
+    """Segments [-1, 1] (x, y) whose sum is a set, in the order of their angles in [0, pi).
 
     Each segment has a number in the order in which segments were made. Cuts remove segments or
-    parts of them, and make a new segment of the parts.
+    parts of them, and make a new segment of the parts. The kernels below change the arrays; of `x`,
+    `y`, `number` and `share` the first `count` values are in use, of `first_part` the first `made`
+    + 1, with the numbers of segments in the sum and of segments ever made.
 
     Parameters
     ----------
@@ -84,7 +86,10 @@ class Segments(NamedTuple):
 
 @allocation_free
 def find_place(segments: Segments, count: int, x: float, y: float) -> int:
-    """Return the index of the first segment whose angle is not less than that of a direction."""
+    """Return the index of the first segment whose angle is not less than that of a direction.
+
+    The angle of the direction (x, y) is in [0, pi). The index is `count` if all angles are less.
+    """
     low = 0
     high = count
     while low < high:
@@ -100,7 +105,10 @@ def find_place(segments: Segments, count: int, x: float, y: float) -> int:
 def insert_segment(
     segments: Segments, count: int, place: int, x: float, y: float, number: int
 ) -> int:
-    """Insert a whole segment at an index and return the number of segments."""
+    """Insert a whole segment at an index and return the number of segments.
+
+    The index must be the place of its angle among the others.
+    """
     for i in range(count, place, -1):
         segments.x[i] = segments.x[i - 1]
         segments.y[i] = segments.y[i - 1]
@@ -117,7 +125,9 @@ def insert_segment(
 def add_segment(segments: Segments, count: int, made: int, x: float, y: float) -> tuple[int, float]:
     """Add a segment to the sum, and return the number of segments and a sign.
 
-    The stored segment is the sign times (x, y), so that its angle is from 0 to pi.
+    The stored segment is the sign times (x, y), so that its angle is in [0, pi). Its number is
+    `made`, which the caller then increases by one, also for a segment of length zero, which is not
+    stored.
     """
     sign = 1.0
     if y < 0.0 or (y == 0.0 and x < 0.0):
@@ -130,7 +140,10 @@ def add_segment(segments: Segments, count: int, made: int, x: float, y: float) -
 
 
 class Strip(NamedTuple):
-    """Normal of a strip abs(normal s) <= limit, and direction of its border, from 0 to pi."""
+    """Normal of a strip abs(normal s) <= limit, and direction of its border, in [0, pi).
+
+    The two have the same length.
+    """
 
     normal_x: float
     normal_y: float
@@ -212,6 +225,8 @@ def cut_by_strip(
 ) -> tuple[int, int]:
     """Cut the sum by abs(normal s) <= limit; return its number of segments, and of all ever made.
 
+    The limit is not negative. If the whole sum is within it, nothing changes.
+
     Lemma 20a: the corner is the vertex where abs(normal s) is greatest. On each side of it segments
     are removed, the last one in part, until each side has lost half of the excess of the corner
     over the limit. The new segment along the border is the sum of the removed parts. Their signs
@@ -261,9 +276,10 @@ def cut_by_strip(
 def write_shares(
     segments: Segments, count: int, made: int, towards: Floats, shares: Floats
 ) -> None:
-    """Write the shares of the segments ever made, in [-1, 1] up to rounding, in the farthest one.
+    """Write the shares of the segments ever made in the member of the sum farthest along `towards`.
 
-    The signs of the segments of the sum are passed down to the parts of each, the youngest first.
+    They are in [-1, 1] up to rounding. `shares`, shape (made,), is zero before. The signs of the
+    segments of the sum are passed down to the parts of each, the youngest first.
     """
     for i in range(count):
         along = towards[0] * segments.x[i] + towards[1] * segments.y[i]
@@ -302,7 +318,7 @@ def farthest_difference(
     """
     steps, strips = limits.shape
     # Each width, acceleration and cut makes at most one segment. A strip removes at most two
-    # segments in part, and each segment is removed as a whole once.
+    # segments in part, and each segment is removed as a whole at most once.
     made_at_most = 2 + steps + common * strips
     parts_at_most = made_at_most + 2 * common * strips
     segments = Segments(
@@ -317,7 +333,7 @@ def farthest_difference(
     signs = np.empty(made_at_most)
     number_of_push = np.empty(common, dtype=np.int64)
 
-    # Distance by the accelerations after each step, which no measurement limits.
+    # Distance by the accelerations from each step on, which no later measurement limits.
     later = np.zeros(steps + 1)
     for k in range(steps - 1, -1, -1):
         later[k] = later[k + 1] + abs(towards[0] * pushes[k, 0] + towards[1] * pushes[k, 1])

@@ -197,6 +197,8 @@ def _course(scenario: Scenario) -> _Course:
 def _half_widths_m(model: SetModel, nearest_m: float, measured: Flags) -> Floats:
     """Return the maximum half-width of the possible misses at each step, m.
 
+    It is after the measurement of the step, and infinite where the range is below `nearest_m`.
+
     Half of the difference of two members of a set is a member of the set from a centred box after
     measurements of 0. If images may be wrong, the two can be members of two sets of the cover; both
     agree with the images that neither of these sets leaves out, those outside up to 2q classes.
@@ -230,7 +232,11 @@ def _half_widths_m(model: SetModel, nearest_m: float, measured: Flags) -> Floats
 
 
 def _guarantee(scenario: Scenario, course: _Course, case: _Case) -> tuple[float, float]:
-    """Return the maximum miss of `symmetric-miss`, m, and the maximum sum of its impulses, m/s."""
+    """Return the maximum miss of `symmetric-miss`, m, and the maximum sum of its impulses, m/s.
+
+    Both are upper limits, without the budget. Without a step that decides, the miss is the maximum
+    possible miss at the start.
+    """
     model = scenario.set_model
     maximum_m_s = scenario.engine.max_impulse_m_s
     e = model.closing_speed_m_s

@@ -184,7 +184,7 @@ def _reserve_in_free_space(
 
 
 def _impulses_until(end_s: float, thruster: Thruster, step_s: float) -> float:
-    """Return the maximum sum of impulses until a time, m/s."""
+    """Return the maximum sum of impulses until a time, m/s; one at that time counts."""
     steps = math.floor(end_s / step_s * (1.0 + IMPULSE_ROUNDING)) + 1
     return min(thruster.budget_m_s, thruster.max_impulse_m_s * steps)
 

@@ -37,7 +37,8 @@ class LowerBound:
         Best pair at both ends of the interval of V_x and at the nominal closing speed, the best one
         first.
     by_label : tuple of TruthPair
-        Best pairs of all examined labels, in ascending order, for each velocity along x.
+        Best pair or single motion of each examined label and velocity along x, in ascending order
+        of the velocity, then of the label.
     """
 
     pairs: tuple[TruthPair, ...]

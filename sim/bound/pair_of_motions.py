@@ -49,11 +49,12 @@ class TruthPair:
         Minimum ratio of the miss to the distance across x at x = 0, with any impulses.
     position_m, velocity_m_s : ndarray, shape (2, 2) or (2, 3)
         (z, x) and (V_z, V_x) of the two motions at t = 0; (y, z, x) and (V_y, V_z, V_x) in space.
-    acceleration_m_s2 : ndarray, shape (2, steps) or (2, 2, steps)
-        Accelerations of the two motions along z over each step; x = 0 is in the last step. In
-        space, those along y and z: axis, motion, step.
+    acceleration_m_s2 : ndarray, shape (axes, 2, steps)
+        Accelerations along each lateral axis, z in a plane, y and z in space, of each of the two
+        motions over each step; x = 0 is in the last step.
     wrong_steps : tuple of two ndarray of int
-        Steps of the wrong images of each motion, at most q, ascending. They do not limit the
+        Steps of the wrong images of each motion, at most q, ascending: the later half of the last
+        2q images for the first motion, the earlier half for the second. They do not limit the
         difference of the two (Theorem 5b of docs/guarantee-bound.md). Empty for a single motion.
     """
 
@@ -623,7 +624,8 @@ def later_impulses(
 ) -> tuple[Floats, Floats]:
     """Return times, s, and sizes, m/s, of the maximum impulses that are decided after a step.
 
-    The earliest impulse is the first one.
+    The impulses are given before `until_s`, the earliest one first. The earliest ones are as large
+    as the engine allows, and those after the budget is spent are zero.
     """
     thruster = scenario.engine
     step_s = scenario.set_model.step_s
