@@ -23,8 +23,9 @@ TARGET, TIME, ROW, DECIDED = 0, 1, 2, 3
 
 
 class Legs(NamedTuple):
-    """Legs on a grid of G times, from time i to time i + l.
+    """Legs on a grid of G times, from departure i to arrival i + l.
 
+    Arrival i is later than departure i by the minimum gap, so that l = 0 is a leg of this length.
     The arrays have one row if the legs depend on l alone, or a row for each i.
     """
 
@@ -38,6 +39,7 @@ class CostToCome(NamedTuple):
     """Least energies of the visits of one target at each of G times, in m rows.
 
     Each is the quadratic c + 1/2 (V - m)' P^-1 (V - m) of the velocity V relative to the target.
+    After a rendezvous m and P are zero: V = 0 is the only velocity.
     """
 
     cost: Floats
@@ -86,8 +88,9 @@ def extend(
 
     Only `cost` and `back` of `visits` are changed. They have `kept.ranks` rows in all, or as many
     rows for each time of the target before: the lowest energies that come from different targets,
-    or whose deciding times are more than `kept.apart` steps apart. The deciding time is the time of
-    the target before or, if it has rows for each, the time of the one before it.
+    or whose deciding times are more than `kept.apart` steps apart. They rise from row to row. The
+    deciding time is the time of the target before or, if `visits` have rows for each of these
+    times, the time of the target before that, which is zero if `earlier` has no such rows.
     """
     matrix = np.empty((SIX, SIX))
     error = np.empty(rows)
@@ -105,7 +108,7 @@ def extend(
             origin = Origin(before, leave, row, decided)
 
             for arrive in range(leave, best.shape[1]):
-                # The energy never falls; it is infinite if there is no visit.
+                # No leg lowers the energy, which is infinite if there is no visit.
                 if not spent < best[first + ranks - 1, arrive]:
                     continue
                 write_leg(
@@ -170,7 +173,8 @@ def insert(
 ) -> None:
     """Insert an energy, with the visit it comes from, among the lowest, from row `first` on.
 
-    Of energies that come from the same target at near deciding times, only one is kept.
+    Of energies that come from the same target at near deciding times, only the lowest is kept. The
+    `kept.ranks` energies rise from row to row; the greatest is dropped if another is inserted.
     """
     last = first + kept.ranks - 1
     place = last
@@ -210,7 +214,8 @@ def write_leg(
 ) -> None:
     """Write the rows of e = `relative` - Phi m, and of the lower triangle of Phi P Phi' + G.
 
-    The number of rows is the length of `error`.
+    Phi is here its half of velocities. The number of rows is the length of `error`; the upper
+    triangle of `matrix` is not written.
     """
     response = legs.response[leave % len(legs.response), arrive - leave]
     gramian = legs.gramian[leave % len(legs.gramian), arrive - leave]
@@ -231,7 +236,10 @@ def write_leg(
 
 @allocation_free
 def factorise(matrix: Floats, rows: int) -> None:
-    """Replace the lower triangle of a positive definite matrix by its Cholesky factor."""
+    """Replace the lower triangle of a positive definite matrix by its Cholesky factor.
+
+    Only the first `rows` rows and columns count, and only their lower triangle is read.
+    """
     for first in range(rows):
         for second in range(first + 1):
             value = matrix[first, second]

@@ -26,8 +26,9 @@ SMALLEST_COSTATE = 1e-300
 MAX_PATH_STEPS = 50_000
 """Largest number of steps of a segment: some 800 revolutions."""
 MIN_RADIUS = 0.02
-"""A trajectory nearer to the centre than this, relative to the distance at its start, counts as
-falling into the centre. Chosen: there the steps are some 350 times shorter than at the start.
+"""A trajectory that is at most this far from the centre at the start of a step, relative to the
+distance at the start of its block, counts as falling into the centre. Chosen: there the steps are
+some 350 times shorter than at the start.
 """
 RESIDUAL_TOLERANCE = 1e-11
 """Largest residual of a trajectory, in units of its block: ten times the errors of the steps."""
@@ -62,7 +63,8 @@ def _rates(
     """Fill the time derivatives of z, in column 0, and of its variations, in the others.
 
     r' = v, v' = -r / |r|^3 + lambda_v, lambda_r' = lambda_v / |r|^3 - 3 (r . lambda_v) r / |r|^5,
-    lambda_v' = -lambda_r, and the rate of the energy is |lambda_v|^2 / 2. The energy is not varied.
+    lambda_v' = -lambda_r, and the rate of the energy is |lambda_v|^2 / 2. The energy is not varied:
+    its row is not written in the other columns, and must be zero there.
     """
     r0 = z[0, 0]
     r1 = z[1, 0]
@@ -361,7 +363,7 @@ def _advance(z: Floats, duration: float) -> None:
 def _residual(block: Block, unknowns: Floats, slopes: Floats | None = None) -> Floats | None:
     """Return the residual at the nodes, or None if there is no trajectory.
 
-    If `slopes` is given, the derivatives are filled into it.
+    If `slopes` is given, the derivatives are filled into it; without a trajectory some of them.
     """
     goals = block.goal / block.value_units[:6]
     size = len(unknowns)
@@ -397,7 +399,11 @@ def _residual(block: Block, unknowns: Floats, slopes: Floats | None = None) -> F
 
 
 def _follow(block: Block, initial: Floats, min_step: float) -> Floats | None:
-    """Continue unknowns to a residual of zero, in steps as long as Newton's method converges."""
+    """Continue unknowns to a residual of zero; None if that fails.
+
+    The residual is reduced in proportion, in steps that are halved until Newton's method converges;
+    a step below `min_step`, a share of the first residual, has failed.
+    """
     slopes = np.empty((len(initial), len(initial)))
     first = _residual(block, initial, slopes)
     if first is None:
@@ -443,8 +449,8 @@ def _newton(
 ) -> tuple[Floats, int] | None:
     """Return unknowns with a residual `goal` by Newton's method, and the number of rounds.
 
-    Derivatives are computed again if the convergence is slow. The result is None without
-    convergence.
+    `slopes` are derivatives near by, which are computed again, in place, if the convergence is
+    slow. The result is None without convergence.
     """
     enough = RESIDUAL_TOLERANCE if share == 1.0 else ON_THE_WAY
     before = np.inf

@@ -49,9 +49,9 @@ class BoundedPath(LinearPath):
 
 
 def needed_bound(path: LinearPath) -> float:
-    """Return the smallest possible bound, m/s^2, at the times of a `path`; to 1e-6 below.
+    """Return the smallest possible bound, m/s^2, at the times of a `path`.
 
-    It is at most 1e-6 of it too low.
+    It is never too high, and at most 1e-6 of it too low.
     """
     return least_bound(_arcs(path)).value_m_s2
 

@@ -53,7 +53,7 @@ class OrderSearch(NamedTuple):
 
     grid: Grid
     orders: int
-    """The best orders on the grid, which were searched again."""
+    """Number of the best orders on the grid, which were searched again; zero if it has none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +169,8 @@ def best_order_of_slots(
 
     `progress` is called with the share of orders decided.
 
-    Branch and bound. Orders in which a stay ends after the next visit do not fit and are left out.
+    Branch and bound. Orders in which a stay ends at the next visit or later do not fit and are left
+    out.
 
     Raises
     ------
@@ -303,8 +304,9 @@ def _bounded(
 ) -> TimeLimits:
     """Return limits with a latest time.
 
-    Without one, it is the time after which the price of time alone costs more. The objective of any
-    order bounds that time. It is sought in doubled intervals up to eight times the last guess.
+    Without one, it is a time after which the price of time alone costs more than the visits of an
+    `order` that end before. Tried are one, two, four and eight times the duration of the longest
+    guess; if the price does not cost more after the last, that one is taken.
 
     Raises
     ------
@@ -329,7 +331,11 @@ def _bounded(
 
 @dataclass
 class _OrderSearch:
-    """A depth-first search through partial orders."""
+    """A depth-first search through partial orders.
+
+    `solve` returns objective and path of an order, from initial times, with more starts if its last
+    argument is true. `fits`, shape (place, target), is None if every target fits every place.
+    """
 
     solve: Callable[[tuple[int, ...], Sequence[Floats], bool], tuple[float, Path]]
     count: int
@@ -403,7 +409,11 @@ class _OrderSearch:
             self.progress(self.decided / factorial(self.count))
 
     def _warm(self, before: Path | None) -> list[Floats]:
-        """Return initial times: those of the previous visits, contracted, and one more gap."""
+        """Return two sets of initial times of one more visit than `before`; none without a path.
+
+        The first has the earlier visits contracted, and the new one at their old end. The second
+        has the new one halfway to the horizon; if no time is left before it, it is like the first.
+        """
         if before is None:
             return []
         times = before.nodes.arrive_s

@@ -51,7 +51,7 @@ class Path(ABC):
     costate_start : ndarray, shape (6,)
         lambda at the start.
     time_gradient : ndarray, shape (N,)
-        dI / dt_i.
+        dI / dt_i by the arrival at node i; a departure moves with the arrival before it.
     """
 
     nodes: Nodes
@@ -74,16 +74,18 @@ class Path(ABC):
 
     @property
     def jumps(self) -> Floats:
-        """Costate before minus costate after, shape (N, 6): dI / d(target's state).
+        """Costate before minus costate after, shape (N, 6).
 
-        It is zero in the velocity of a flyby.
+        Without a stay at the node it is dI / d(target's state). It is zero in the velocity of a
+        flyby.
         """
         return self.costate_before - self.costate_after
 
     def costate(self, time_s: Floats) -> Floats:
         """Return lambda (m/s^3, m/s^2), shape (k, 6), at k times.
 
-        At a node it is the value after the jump, and it is zero during a stay.
+        At a node it is the value after the jump, at the last one before it; it is zero during a
+        stay, also at its beginning.
         """
         return self.along(time_s)[1]
 
@@ -229,7 +231,7 @@ def _carried(
 ) -> tuple[Floats, Floats]:
     """Return states and costates at the inner times of a grid.
 
-    They follow from the state at its start and the costate at its end.
+    They follow from the state at its start and the costate at its end. The times do not decrease.
     """
     segment = motion.segment(grid[:-1], grid[1:])
     count = len(grid) - 2
@@ -247,9 +249,10 @@ def _carried(
 
 
 def check_times(start_s: float, arrive_s: Floats, leave_s: Floats) -> None:
-    """Raise `ValueError` unless all times are finite and increase.
+    """Raise `ValueError` unless all times are finite and each arrival is after what comes before.
 
-    These are the times of the start, of the arrivals and of the departures.
+    That is the start, or the departure from the node before. A departure is not compared with its
+    arrival.
     """
     if not (np.isfinite(start_s) and np.isfinite(arrive_s).all() and np.isfinite(leave_s).all()):
         raise ValueError("a time is not finite")

@@ -84,8 +84,8 @@ def search_grid(
 ) -> GridSearch:
     """Search times before the latest one of `limits`, and all orders or a given one, on a grid.
 
-    Each gap between visits is the minimum gap and a number of steps. `progress` is called with the
-    share that is done.
+    Each gap between visits is the minimum gap and a number of steps. `limits` must have a latest
+    time, for the arrival at the last target. `progress` is called with the share that is done.
 
     Raises
     ------
@@ -168,7 +168,8 @@ class _TimeGrid:
     def _most_times(self) -> int:
         """Return the largest number of times with at most `MAX_TRIPLES` sequences of three times.
 
-        Two visits have no such sequences.
+        It is at most `MAX_TIMES`, or `MAX_ORDER_TIMES` for all orders. Two visits have no such
+        sequences.
         """
         passes = sum(
             self._pairs(visits) * (self._ranks if visits > 3 else 1)

@@ -18,7 +18,9 @@ from infoset.rendezvous.multipoint.segments import NotSettledError, Path
 FlyAt = Callable[[Floats], Path]
 
 MIN_SHARE = 1e-6
-"""Default of the minimum gap, as a share of the available time."""
+"""Smallest minimum gap, as a share of the available time; without a latest time, of the duration of
+the longest guess. A gap of zero has no path.
+"""
 _POLISH_ROUNDS = 8
 """Largest number of rounds of Newton's method, which starts near a minimum."""
 _DIFFERENCE = 1e-5
@@ -32,7 +34,8 @@ _WALL = 20.0
 """Logarithm of the objective at times without a path, above its value at the start of the descent:
 a wall for the line search. Chosen."""
 _MAX_WALLS = 6
-"""Number of times without a path after which a descent stops; chosen: its line search is lost."""
+"""Largest number of points without a path in a descent, which stops at one more; chosen: its line
+search is lost."""
 _MAX_RESTARTS = 4
 """Largest number of descents from the end of the last one; chosen: later ones change little."""
 _SETTLED = 1e-3
@@ -81,7 +84,7 @@ class TimeLimits:
     Parameters
     ----------
     latest_s : float or None
-        Latest end of the last visit.
+        Latest arrival at the last target, whose stay is not counted; None is no limit.
     min_gap_s : float
         Minimum time between a departure and the next arrival.
     price_per_s : float
@@ -107,11 +110,12 @@ class TimeLimits:
 
 
 class Grid(NamedTuple):
-    """Equally spaced times of the first visit; later visits have the same gaps and stays before."""
+    """Equally spaced times of a visit; for later visits they begin later by gaps and stays."""
 
     times: int
+    """Number of times of a visit."""
     until_s: float
-    """End of the last visit at the last time."""
+    """Latest time of the arrival at the last target."""
 
 
 class TimeSearch(NamedTuple):
@@ -166,10 +170,14 @@ class _StoppedError(Exception):
 
 @dataclass
 class _Trials:
-    """The objective as a function of gaps, with their limits and a count of evaluations."""
+    """The objective as a function of gaps, with their limits and a count of evaluations.
+
+    A gap is the time from a departure, or the start, to the next arrival.
+    """
 
     fly: FlyAt
     shifts_s: Floats
+    """Times of the arrivals if all gaps were zero, s; the first one is the start."""
     price_per_s: float
     minimum: float
     """The minimum gap, s."""
@@ -192,7 +200,7 @@ class _Trials:
         return _Trial(gaps, path, path.cost + price, slope)
 
     def attempt(self, gaps: Floats) -> _Trial | None:
-        """Return None instead of an error if there is no path at such times."""
+        """Return the trial of gaps, or None if `fly` raises a ValueError: no path at such times."""
         try:
             return self(gaps)
         except ValueError:
@@ -230,9 +238,10 @@ def optimise_times(
     dwell_s : ndarray, shape (N,)
         Duration of the stay with each target.
     guesses : sequence of ndarray, shape (N,)
-        Additional initial times, s; those outside the limits are ignored.
+        Additional initial times, s; those outside the limits are ignored. The longest one is the
+        scale of the others if there is no latest time.
     enough : float
-        Objective, m^2/s^3, below which a descent stops.
+        Objective, m^2/s^3, below which a descent stops, and no other start is followed.
     progress : callable or None
         Called with the share of starts that are followed.
 
@@ -243,7 +252,8 @@ def optimise_times(
     ValueError
         If there is no latest time and no guess.
     NotSettledError
-        If the conditions of a minimum are not satisfied, where the end is polished.
+        If the conditions of a minimum are not satisfied, where the end is polished, or `fly` raises
+        it and no start has a path.
 
     Notes
     -----
@@ -251,7 +261,8 @@ def optimise_times(
     no more than their neighbours; a lower minimum elsewhere is not excluded. The descent is
     sequential quadratic programming in the gaps, on the logarithm of the objective, with the exact
     gradient dI/dt; then Newton's method, with differences of the gradient, on the gaps that are not
-    at a limit. Each step computes one path.
+    at a limit. Each point of a descent is one path, each step of Newton's method two for each free
+    gap and one.
     """
     count = len(dwell_s)
     shifts = start_s + np.concatenate([[0.0], np.cumsum(dwell_s[:-1])])
@@ -337,7 +348,8 @@ def _unsettled(trials: _Trials, best: _Trial) -> float:
 def room_s(start_s: float, dwell_s: Floats, limits: TimeLimits) -> float:
     """Return the time for travel, s; infinite without a latest time.
 
-    Raise `NoRoomError` if the visits do not fit.
+    The stay with the last target is not counted: it is after the latest time. Raise `NoRoomError`
+    if the visits do not fit.
     """
     if limits.latest_s is None:
         return float(np.inf)
@@ -356,9 +368,10 @@ def room_s(start_s: float, dwell_s: Floats, limits: TimeLimits) -> float:
 
 
 def _spread(count: int, scale: float, minimum: float, bounded: bool, most: int) -> list[Floats]:
-    """Return initial gaps: even, rising and falling ones, then a Halton sequence.
+    """Return the first `most` initial gaps: even, rising and falling ones, then a Halton sequence.
 
-    The shapes are stretched over all the time and over half of it.
+    The three shapes are stretched over all the time and half of it or, if the time is not
+    `bounded`, over 0.5 to 8 times the `scale`.
     """
     rising = np.arange(1.0, count + 1.0)
     lengths = (1.0, 0.5) if bounded else (0.5, 1.0, 2.0, 4.0, 8.0)
@@ -377,10 +390,11 @@ def _spread(count: int, scale: float, minimum: float, bounded: bool, most: int) 
 
 
 def _valleys(starts: Sequence[_Trial], most: int) -> list[_Trial]:
-    """Return one start of each valley, the cheapest first.
+    """Return at most `most` starts: one of each valley, the cheapest first, then the others.
 
-    A start of a valley costs no more than its nearest neighbours. Toern and Viitanen,
-    "Topographical global optimization using pre-sampled points", J. Global Optim. 5 (1994) 267-276.
+    A start of a valley costs no more than its nearest neighbours. The others too are in ascending
+    order of cost. Toern and Viitanen, "Topographical global optimization using pre-sampled points",
+    J. Global Optim. 5 (1994) 267-276.
     """
     ranked = sorted(starts, key=lambda trial: trial.objective)
     gaps = np.stack([trial.gaps for trial in ranked])
@@ -393,9 +407,9 @@ def _valleys(starts: Sequence[_Trial], most: int) -> list[_Trial]:
 def _descend(
     trials: _Trials, start: _Trial, scale: float | Floats, tolerance: float, enough: float
 ) -> _Trial:
-    """Minimise from a start, in gaps over `scale`.
+    """Minimise from a start, in gaps over `scale`, and return the cheapest trial within the limits.
 
-    It stops below `enough`, or after a few points without a path.
+    It stops below `enough`, or after a few points without a path. The start itself counts.
     """
     if start.objective < enough:
         return start
@@ -447,7 +461,10 @@ def _descend(
 
 
 def _polish(trials: _Trials, best: _Trial) -> _Trial:
-    """Newton's method on the gaps above the minimum gap; at the latest time their sum is fixed."""
+    """Newton's method on the gaps above the minimum gap; at the latest time their sum is fixed.
+
+    The result is `best` if the method does not lower the objective, up to rounding.
+    """
     minimum = trials.minimum
     total = trials.total
     # An end this near to the latest time is moved onto it; chosen.

@@ -61,7 +61,7 @@ The rounding of shares is below 1e-6.
 def needed_bound(encounter: Encounter) -> NeededBound:
     """Return the smallest bound with which any meeting of an `encounter` is possible.
 
-    It is at most 1e-6 of it too low.
+    It is never too high, and at most 1e-6 of it too low. Craft of weight 0 count.
     """
     least = least_bound([_arc(encounter, craft, 1.0) for craft in encounter.craft])
     return NeededBound(least.value_m_s2, tuple(np.flatnonzero(least.shares > _NEEDS_IT).tolist()))

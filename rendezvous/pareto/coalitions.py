@@ -15,7 +15,8 @@ from infoset.rendezvous.pareto.solution import EncounterSolution, weighted_point
 MAX_CRAFT = 12
 """Largest number of craft: 4095 coalitions, each a least-squares problem."""
 _EXCESS_ROUNDING = 1e-18
-"""Excess that is the rounding of an ideal, as a share of the squared cost of the free values."""
+"""Excess of all craft that is the rounding of ideals, as a share of their squared cost at free
+values of zero."""
 
 
 class Core(Enum):
@@ -70,7 +71,7 @@ class Coalitions:
 def analyse_coalitions(solution: EncounterSolution) -> Coalitions:
     """Analyse every coalition of a `solution`, whose meeting is the best one for the group.
 
-    With one M and equal weights c(S) = sum over pairs of d_ij^2 / |S|. c is superadditive with
+    With one M and weights of 1 c(S) = sum over pairs of d_ij^2 / |S|. c is superadditive with
     c({i}) = 0, so its core is empty unless all ideals of craft with a weight above 0 coincide.
     O(2^n n).
 

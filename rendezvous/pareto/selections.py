@@ -23,7 +23,8 @@ def min_sum_of_costs(solution: EncounterSolution) -> Floats:
 
     The J_i are costs like impulses. A sum of norms of affine functions, convex: Newton's method in
     a trust region. It begins at the best of the mean of the ideals and the ideals that cost
-    nothing, where the norm has a corner.
+    nothing, where the norm has a corner. If the ideals of the craft with a weight above 0 coincide,
+    they are the result.
     """
     roots, back, middle, ideals, size, weights = _scaled(solution)
     if size == 0.0:
@@ -59,10 +60,11 @@ def min_sum_of_costs(solution: EncounterSolution) -> Floats:
 def minimax_excess(solution: EncounterSolution) -> Floats:
     """Return free values, shape (f,), that minimise the maximum weighted excess of a `solution`.
 
-    With one M, the centre of the smallest enclosing ball. Sequential quadratic programming on (p,
-    t), minimum t with w_i e_i(p) <= t, then Newton's method on the conditions of the active craft.
-    If weights differ by a factor of 1e4 and more, the maximum can be up to 1e-4 of itself above the
-    minimum.
+    With one M and equal weights, it is the centre of the smallest ball that contains the ideals of
+    the craft with a weight above 0; other craft never count. Sequential quadratic programming on
+    (p, t), minimum t with w_i e_i(p) <= t, then Newton's method on the conditions of the active
+    craft. If weights differ by a factor of 1e4 and more, the maximum can be up to 1e-4 of itself
+    above the minimum.
     """
     costs = [cost for cost in solution.costs if cost.craft.weight > 0.0]
     weights = np.array([cost.craft.weight for cost in costs])
@@ -107,7 +109,7 @@ def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
     """Return the Pareto-optimal free values of a `solution` nearest to `preferred` ones.
 
     Both have shape (f,), and the distance is the norm of M. An exact projection onto the convex
-    hull of the ideals.
+    hull of the ideals of all craft, also of those with a weight of 0.
 
     Raises
     ------

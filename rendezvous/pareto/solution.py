@@ -73,7 +73,8 @@ class CraftCost:
     root : ndarray, shape (f, f)
         R, upper triangular, M = R' R; m/s^1.5 over the units of p.
     effort_base, effort_slope : ndarray, shapes (c,) and (c, f)
-        The scaled effort y(p) = base + slope p, |y|^2 = J^2.
+        The scaled effort y(p) = base + slope p, |y|^2 = J^2, for c common components (6, or 3 in an
+        intercept).
     to_costate : ndarray, shape (6, c)
         From y to the costate at the meeting.
     """
@@ -115,7 +116,10 @@ class EncounterSolution:
 
     @property
     def same_matrix(self) -> bool:
-        """Whether all craft have one M: then the Pareto set is the convex hull of the ideals."""
+        """Whether all craft have one M, up to rounding, and not only up to a factor.
+
+        Then the Pareto set is the convex hull of the ideals.
+        """
         first = self.costs[0].matrix
         return all(np.allclose(cost.matrix, first, rtol=1e-12, atol=0.0) for cost in self.costs[1:])
 
@@ -190,8 +194,8 @@ def solve_encounter(encounter: Encounter) -> EncounterSolution:
 def weighted_point(costs: Sequence[CraftCost], weights: ArrayLike) -> Floats:
     """Return the free values, shape (f,), that minimise the weighted sum of excesses.
 
-    The `weights`, shape (n,), are not negative. The values are (sum w_i M_i)^-1 sum w_i M_i p_i*,
-    as a least-squares problem of the roots of M_i of the `costs`.
+    The `weights`, shape (n,), are not negative, and not all zero. The values are (sum w_i M_i)^-1
+    sum w_i M_i p_i*, as a least-squares problem of the roots of M_i of the `costs`.
     """
     roots = np.sqrt(np.asarray(weights, dtype=np.float64))
     rows = np.concatenate([root * cost.root for root, cost in zip(roots, costs, strict=True)])
