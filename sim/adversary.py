@@ -99,6 +99,10 @@ class WorstEngagement:
         the scenario.
     construction : str
         Kind of the first plan from which the engagement was derived.
+    changes : int
+        Number of plans from that one to the plan of this engagement; 0 for a first plan.
+    evaluations : int
+        Number of simulated engagements of the search.
     sets_emptied : int
         Number of simulated engagements whose set became empty. If it is zero, `keep_set` makes no
         difference.

@@ -115,8 +115,8 @@ class Body(Checked):
     def certain_miss_m(self) -> float:
         """Miss from the aim point above which no strategy can be sure of a hit, m.
 
-        It is outside the body, or for an ellipse in an unknown direction outside for some
-        directions.
+        A point that is farther from the aim point is outside the body, or for an ellipse in an
+        unknown direction outside for some directions.
         """
         longer_m, shorter_m = self.axes_m
         far_m = shorter_m if self.is_turned_by_chance else longer_m

@@ -132,7 +132,7 @@ class Covariance:
         lower = np.zeros((self.size, self.size))
         for k, column in enumerate(self.correlation.T):
             rest = column[k:] - lower[k:, :k] @ lower[k, :k]
-            # A correlation of rounding in a row has its square here.
+            # A variance, to which a correlation that is only rounding contributes its square.
             if rest[0] > CORRELATION_ROUNDING**2:
                 lower[k:, k] = rest / np.sqrt(rest[0])
         return self.sigma[:, None] * lower

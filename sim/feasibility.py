@@ -26,8 +26,8 @@ class Feasibility:
     Parameters
     ----------
     steps, images, decisions : int
-        Numbers of steps until the nominal arrival, of images before the last decision, and of steps
-        in which an impulse can be given.
+        Numbers of steps until the nominal arrival, of images until the last decision, and of steps
+        before the nominal arrival in which an impulse can be given.
     unguided_miss_m : float
         Maximum miss without impulses of `STARTS` starts, without gravity, m.
     engine_corrects_m, budget_corrects_m : float
@@ -54,7 +54,8 @@ class Feasibility:
 def feasibility(scenario: Scenario) -> Feasibility | None:
     """Return the limits of the misses; None if the nominal arrival is more than `MAX_STEPS` away.
 
-    A start is beyond an engine that corrects less than its miss minus the radius of the body.
+    A start is beyond an engine that corrects less than its miss minus the radius of the body, which
+    is zero for a scenario without a body.
     """
     model = scenario.set_model
     thruster = scenario.engine

@@ -94,7 +94,7 @@ def with_gravity(model: SetModel, sun: Sun | None, impulses_m_s: float) -> SetMo
     )
     *along_y, along_z = (_max(each) for each in tide + scale)
 
-    # Change of the closing speed until the end of each step.
+    # Change of the closing speed until the end of each step, as a share of the lowest one.
     slowest_m_s = min(m, model.closing_speed_m_s)
     changes = np.cumsum(greater_of_neighbours(pull)) * flight.times_s[1] / slowest_m_s
     allowed = 1.0 - replace(model, gravity_speed_change=0.0).speed_error

@@ -66,7 +66,10 @@ class Sight:
     slope_rate_per_s: Floats
 
     def turned(self, slope: Floats) -> Sight:
-        """Return the geometry in which all slopes are greater by a constant, shape (C, B)."""
+        """Return the geometry in which all slopes are greater by a constant, shape (C, B).
+
+        The distance and the rates stay those of the true line of sight.
+        """
         turned = self.slope + slope
         return replace(self, alpha_rad=np.arctan(turned), slope=turned)
 

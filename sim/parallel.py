@@ -88,7 +88,8 @@ class Task:
     cell : int
         Number of the scenario in a sweep.
     progress, observe : callable or None
-        As for `simulate`; for threads only.
+        As for `simulate`; for threads only. With MIXED noise, random runs are simulated before game
+        runs: the fraction goes from 0 to 1 for each, and the index counts the runs of one noise.
     versions : dict of str to str
         Versions of the packages that must simulate the runs.
     """

@@ -99,8 +99,9 @@ class TrueFlight:
             self.arrived |= ~self.flying & (self._arrival_s <= (step + 1) * self._step_s)
 
     def arrivals_s(self, step: int) -> Floats:
-        """Return the times of x = 0, s, before a step; without further impulses for flights that
-        have not arrived.
+        """Return the times of x = 0 since the start, s, shape (B,), at the beginning of a step.
+
+        For flights before their closest approach it is the time without further impulses.
         """
         if not self.flying.any():
             return self._arrival_s
@@ -108,7 +109,9 @@ class TrueFlight:
         return np.where(self.flying, ahead_s, self._arrival_s)
 
     def miss(self) -> Miss:
-        """Return the misses; without a closest approach so far, the present range and position."""
+        """Return the misses; without a closest approach so far, the present distance from the aim
+        point and position.
+        """
         passed = np.isfinite(self._distance_m)
         present_m = self._motion.position_m.T
         distance_m = np.where(passed, self._distance_m, self._motion.sight().range_m)

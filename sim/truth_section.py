@@ -106,9 +106,9 @@ class TruthSection:
         """Return the signed margins (m) of the true states in their sections, one array of shape
         (B,) per step.
 
-        The margin of a step is the margin at the last measurement; it is masked before the first
-        one. It includes an allowance for rounding. `arrival_s` are the times from the start to
-        x = 0.
+        The margin of a step is the margin at the last measurement until then; it is masked before
+        the first one. It includes an allowance for rounding. The last array is for the step that
+        begins now. `arrival_s` are the times from the start to x = 0.
         """
         measured: dict[int, Floats] = {}
         for time, margin in zip(self._output_times, self._margins(arrival_s), strict=True):

@@ -88,7 +88,8 @@ class TimeLimits:
     min_gap_s : float
         Minimum time between a departure and the next arrival.
     price_per_s : float
-        kappa, m^2/s^4, not negative; kappa times the duration is added to the energy.
+        kappa, m^2/s^4, not negative; kappa times the duration, from the start to the last arrival,
+        is added to the energy.
 
     Raises
     ------

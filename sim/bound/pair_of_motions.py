@@ -196,7 +196,8 @@ class _Sighting(NamedTuple):
 class PairApproach:
     """Data of one label and velocity that all its motions use.
 
-    `motion` starts in the middle of the box and has no impulses.
+    `motion` starts in the middle of the box and has no impulses. If gravity keeps it from x = 0,
+    `arrives` is false, `motion` is a straight line, and the bounds are zero.
     """
 
     def __init__(self, scenario: Scenario, label_m: float, vx_m_s: float) -> None:
@@ -283,7 +284,7 @@ class PairApproach:
 
         To first order a pair is not better than half of the farthest difference less the correction
         by later impulses. The pairs are computed in descending order of this number, until it is
-        not greater than the best pair.
+        not greater than the best pair. If the motion does not arrive, one is computed.
         """
         correction_m = self._corrections_m()
         limiting = self._limiting_steps()
