@@ -266,6 +266,7 @@ class _AdversarySearch:
         """Simulate `budget` engagements: first plans, then generations of changed plans."""
         flights = _in_chunks(*self._planner.first(max(1, round(FIRST_SHARE * budget))))
         while flights:
+            # In the order of the flights: the result must not depend on the threads.
             for plans, emptied in pool.map(self._evaluate, *zip(*flights, strict=True)):
                 self.evaluations += len(plans)
                 self.sets_emptied += emptied
@@ -317,7 +318,11 @@ class _AdversarySearch:
         )
 
     def engagements(self, plans: Plans, constructions: Constructions | None = None) -> Engagements:
-        """Return plans in flight; the plans store the errors that game noise chooses."""
+        """Return plans in flight.
+
+        With `constructions` game noise chooses the errors and writes them into `plans`; without
+        them the errors of the plans are made.
+        """
         position_m, velocity_m_s = (part.copy() for part in np.split(plans.start, 2, axis=1))
         draws = replace(self._draws(len(plans)), position_m=position_m, velocity_m_s=velocity_m_s)
         target_m_s2 = self._target_m_s2(plans)

@@ -230,7 +230,11 @@ class Planner:
         return joined(plans), Constructions(*map(np.concatenate, columns))
 
     def _made(self, maker: _Maker, count: int) -> Plans:
-        """Return a number of first plans of one construction."""
+        """Return a number of first plans of one construction, and add them to `constructions`.
+
+        The errors of the angles are the choices of `Constructions` until game noise replaces them;
+        the other errors are zero.
+        """
         errors = np.zeros((count, len(self.sensors), self._axes, self._steps))
         errors[:, ANGLE] = maker.draw_choices(count)
         # Game noise with a shift knows the sign of a constant acceleration.
@@ -248,7 +252,10 @@ class Planner:
         )
 
     def _construction(self, tie: TieRule | None, drawn: Floats) -> Constructions:
-        """Return game noise with a rule for ties, and for None with the drawn extremes."""
+        """Return game noise with a rule for ties, and for None with the drawn extremes.
+
+        Only the rules UPPER and LOWER have a shift.
+        """
         count = len(drawn)
         choices = drawn.copy()
         side = 0.0

@@ -179,7 +179,10 @@ def worst_shift_m(scenario: Scenario) -> Floats | None:
 
 
 def _worst_difference(model: SetModel, images_s: Floats, arrival_s: float) -> tuple[float, float]:
-    """Return b0, m, and the maximum s, m/s, of `worst_shift_m` in the planar model of one axis."""
+    """Return b0, m, and the maximum s, m/s, of `worst_shift_m` in the planar model of one axis.
+
+    `images_s`, times of at least two images before the arrival, decrease.
+    """
     range_m = images_s * model.closing_speed_m_s
     bound_m = model.angle_sensor.error_bound(range_m) * range_m
     last_s = images_s[-1]

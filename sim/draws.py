@@ -228,7 +228,10 @@ def _wrong_measurements(
 
 
 def draw_starts(scenario: Scenario, runs: Sequence[int], seed: int) -> Starts:
-    """Return the initial states of some runs."""
+    """Return the initial states of some runs.
+
+    They are uniform in the dispersion; with a covariance they are normal and within it.
+    """
     lower, upper = corners(scenario.dispersion)
     redraws = None
     if scenario.covariance is None:

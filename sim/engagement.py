@@ -312,7 +312,10 @@ class Engagements:
         )
 
     def _move_sets(self, impulse: Floats) -> None:
-        """Move the sets by the impulses and to the next step."""
+        """Move the sets by the impulses and to the next step.
+
+        The impulses are those of the thruster: the sets allow for the errors of execution.
+        """
         flying = self._flight.flying
         self._information.shift(impulse, flying)
         self._truth_section.shift(impulse, modulus(impulse) > 0.0)
@@ -347,7 +350,10 @@ class Engagements:
         return np.ma.MaskedArray(published_m, mask=~self._label_ends.left)
 
     def _hit(self, miss: Miss) -> MaskedFlags:
-        """Return whether each engagement hits; masked if the body has no size."""
+        """Return whether each engagement hits; masked if the body has no size.
+
+        A miss that reaches the edge of the body is a hit.
+        """
         body = self.scenario.body
         if body is None:
             return np.ma.MaskedArray(np.zeros(len(miss.distance_m), dtype=bool), mask=True)

@@ -220,7 +220,10 @@ def greater_of_neighbours(values: Floats) -> Floats:
 
 
 def _bounds(nominal: _Motion, deviation: _Motion, times_s: Floats, instants: int) -> FlightBounds:
-    """Return the bounds of a flight until its last arrival."""
+    """Return the bounds of a flight in its first `instants`, the last of which has x = 0.
+
+    A ValueError is raised if the motions may come too near the attracting body or stop closing.
+    """
     place, speed = nominal.relative
     place_error = deviation.place_m.sum(axis=0)
     speed_error = deviation.speed_m_s.sum(axis=0)

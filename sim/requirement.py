@@ -329,7 +329,10 @@ def _ranks(size: int, share: float, watched: bool) -> tuple[int, int]:
 
 
 def share_interval(count: int, runs: int) -> tuple[float, float]:
-    """Return the 95 % confidence interval of a share by the confidence sequence of `judge`."""
+    """Return the 95 % confidence interval of a share by the confidence sequence of `judge`.
+
+    Its lower end is 0 for a count of 0, and its upper end 1 for a count of all runs.
+    """
 
     def end(index: int, outside: float) -> float:
         """Return the end toward `outside`, where the p-value of an index is the tail."""

@@ -130,7 +130,10 @@ def extend(
 def write_quadratics(
     earlier: CostToCome, legs: Legs, relative: Floats, before: int, visits: CostToCome
 ) -> None:
-    """Write m and P of the flybys that come from the target `before`; arguments as for `extend`."""
+    """Write m and P of the flybys that come from the target `before`; arguments as for `extend`.
+
+    It is called after `extend` for all targets before: `visits.back` must be final.
+    """
     matrix = np.empty((SIX, SIX))
     error = np.empty(SIX)
     back = visits.back

@@ -201,7 +201,10 @@ class Block:
 def blocks_of(
     start_s: float, start_state: Floats, nodes: Nodes, gravitational_parameter_m3_s2: float
 ) -> list[Block]:
-    """Split visits after every rendezvous: the next ones start from a known state."""
+    """Split visits after every rendezvous: the next ones start from a known state.
+
+    The last block ends at the last node, also if that is a flyby.
+    """
     blocks = []
     first = 0
     for node in range(len(nodes.arrive_s)):

@@ -486,7 +486,10 @@ class PairApproach:
         sides: tuple[float, float],
         losses: _Losses,
     ) -> TruthPair:
-        """Return two motions with a start relative to the middle of the box, times `sides`."""
+        """Return two motions with a start relative to the middle of the box, times `sides`.
+
+        Equal sides are a single motion.
+        """
         signs = np.array(sides)
         is_single = sides[0] == sides[1]
         wrong = self._wrong_steps(-1 if is_single else last_common_step)

@@ -165,7 +165,10 @@ def _name(cell: int, runs: Sequence[int]) -> str:
 
 
 def need_free(path: Path, *, resume: bool) -> None:
-    """Raise StorageError if a folder has content, except a campaign to `resume`."""
+    """Raise StorageError if a folder has content, except a campaign to `resume`.
+
+    The lock and temporary files of a process that died do not count.
+    """
     with reporting(path):
         if not path.exists():
             return
