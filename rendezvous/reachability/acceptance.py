@@ -25,7 +25,7 @@ def keeps_drifts(certificate: DriftCertificate, keep_out_m: float) -> Acceptance
     """Return whether all drifts of a plan of the rest stay outside a ball about the target.
 
     The engines may fail after the same impulses as in the `certificate` of the plan before the
-    flight, whose directions are tried first.
+    flight, whose directions are tried first. After the last of them every plan is accepted.
     """
     coasting = certificate.tube.coasting
     rests = [_rest_of(coasting, time) for time in range(coasting.impulses)]

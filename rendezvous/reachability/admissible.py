@@ -71,7 +71,7 @@ class Lifted:
         return np.asarray(self.control_free + self.control_response @ point)
 
     def until(self, time: int) -> Lifted:
-        """Return the set without constraints on states after a time."""
+        """Return the set without the constraints of later times; bounds on controls remain."""
         return self.only(np.flatnonzero(self.moments <= time))
 
     def only(self, kept: Places) -> Lifted:
@@ -91,7 +91,10 @@ class Lifted:
         )
 
     def within(self, point: Floats, basis: Floats) -> Lifted:
-        """Return the set in coordinates z of v = point + basis z, for which the equations hold."""
+        """Return the set in coordinates z of v = point + basis z.
+
+        The equations must hold for all z; they are left out.
+        """
         return replace(
             self,
             free=self.free + self.response @ point,
@@ -247,7 +250,8 @@ def _lifted(
     """Return the set with the bounds on the controls, the first `width` of the p variables.
 
     In a box the bounds |v_i| <= 1 are rows, which have no time and no label: -1. In a ball they
-    are no rows, and `ball` of the result stands for them.
+    are no rows, and `ball` of the result stands for them. The list `constraints`, those on states,
+    is extended.
     """
     width = block.periods * len(block.controls)
     unit = np.eye(width, response.shape[2])
@@ -280,7 +284,8 @@ def joined(parts: Sequence[Lifted], controls: Sequence[Places], periods: int, to
     """Return the product of the sets of several blocks, with controls in the order of the problem.
 
     `controls` are the indices of each block's controls among the `total` controls of the problem;
-    other controls are zero. States are in the order of the blocks.
+    other controls are zero. States are in the order of the blocks, and labels are indices of each
+    block's own constraints.
     """
     order = [t * total + int(j) for places in controls for t in range(periods) for j in places]
     control_free = np.zeros(periods * total)
@@ -376,7 +381,7 @@ def _bound_norm(
 def min_relaxation(lifted: Lifted) -> tuple[float, Floats]:
     """Return the minimum relaxation of the constraints for a feasible point, and this point.
 
-    All rows on states and all equations are relaxed, but not the bounds on controls. The relaxation
+    All rows on states and all equations are relaxed, but no constraint on controls. The relaxation
     is at least -1, where the search stops, and not positive if the set is not empty. The relaxation
     of equations is not negative; without equations a negative relaxation is a margin.
     """
@@ -409,9 +414,10 @@ def quadratic(lifted: Lifted, matrix: Floats, vector: Floats) -> Floats:
 
 
 def min_sum_of_norms(lifted: Lifted, scale: Floats, group: int) -> Floats:
-    """Minimise the sum over the periods of the norm of the `group` controls of a period.
+    """Return the point of least sum over the periods of the norm of the `group` controls of each.
 
-    `scale`, shape (T m,), contains the units of the controls.
+    The set has no equations: `lifted.equal` is not used. `scale`, shape (T m,), contains the units
+    of the controls.
     """
     periods = len(lifted.control_free) // group
     tops = np.hstack([np.zeros((periods, lifted.size)), np.eye(periods)])
@@ -420,10 +426,11 @@ def min_sum_of_norms(lifted: Lifted, scale: Floats, group: int) -> Floats:
 
 
 def min_peak(lifted: Lifted, scale: Floats, group: int) -> tuple[float, Floats]:
-    """Return the minimum common bound of all controls, and controls that attain it.
+    """Return the minimum common bound of all controls, and a point of the set that attains it.
 
     It bounds each component, or for thrust in a ball the norm of the `group` controls of a period.
-    `scale`, shape (T m,), contains the units of the controls.
+    The set has no equations: `lifted.equal` is not used. `scale`, shape (T m,), contains the units
+    of the controls.
     """
     cost = np.concatenate([np.zeros(lifted.size), [1.0]])
     program = ConeProgram(cost).keep(lifted.rows, lifted.limits)

@@ -38,7 +38,7 @@ _SPARES = (1e-7, 1e-6, 1e-5)
 """As in `guaranteed`: margins of the constraints against the solver's errors."""
 _SINGULAR = 1e-12
 """Determinant of a basis, with columns of length one, below which the columns are dependent to
-rounding: they do not define a vertex."""
+rounding: they do not define a vertex. Relative singular values and residuals below it are zero."""
 _OUTSIDE = 1e-9
 """A basic solution with an entry below zero by less than this counts as a vertex: one more point
 does not make a guarantee wrong, a missing one would."""
@@ -91,7 +91,7 @@ def multipliers(problem: OutputProblem) -> Multipliers:
 
 
 def _independent(columns: Floats) -> Floats:
-    """Return columns in coordinates of their span, the sum of weights first; shape (c, rank)."""
+    """Return columns in coordinates of their span after the sum of weights, shape (c, 1 + rank)."""
     _, sizes, basis = np.linalg.svd(columns[:, 1:], full_matrices=False)
     rank = int((sizes > _SINGULAR * sizes.max(initial=1.0)).sum())
     return np.column_stack([columns[:, 0], columns[:, 1:] @ basis[:rank].T])
@@ -169,8 +169,9 @@ class AnsweredPlan:
     plan : AffinePlan
         The controls up to u(T - 2); its last control is zero.
     multipliers : tuple of ndarray, shapes (r - 1, T, q)
-        Multipliers of equal outputs, costates, for each vertex of M that has r positive weights.
-        Any values give a valid guarantee.
+        Multipliers of equal outputs, costates, for each vertex of M that has r positive weights, in
+        the order of `multipliers`; for only the first of two opposite vertices if the start is a
+        zonotope. Any values give a valid guarantee.
     """
 
     plan: AffinePlan
@@ -317,11 +318,11 @@ def _maximum(
 
 
 def last_answer(problem: OutputProblem) -> AffinePlan:
-    """Return the best control of a problem of one period without a path, whose start is known.
+    """Return the best control of a problem of one period without a path.
 
-    The maximum of |x(T) - target| over the start and the errors is a maximum of affine functions of
-    the control, and is computed at all points where m + 1 of them or of the limits are equal. No
-    solver is used.
+    Its output is not used: the start is what outputs leave open. The maximum of |x(T) - target|
+    over the start and the errors is a maximum of affine functions of the control, and is computed
+    at all points where m + 1 of them or of the limits are equal. No solver is used.
     """
     resting = AffinePlan(
         problem,
@@ -377,8 +378,8 @@ def information_radius(problem: OutputProblem) -> MirrorBound:
     """Return the bound (3) for k = T - 1: the radius of what outputs leave open at the end.
 
     It holds without limits of the controls too. The largest |E z| in the norm of the goal of errors
-    z that all outputs do not show; k linear programs. A polytope as start is treated as in
-    `lower_bound`.
+    z that all outputs do not show; one linear program for each row of the goal. A polytope as start
+    is treated as in `lower_bound`.
     """
     certain = _certain(problem)
     bounds = _bounds_of_rows(certain, problem.periods - 1)
@@ -388,13 +389,14 @@ def information_radius(problem: OutputProblem) -> MirrorBound:
 def lower_bound(problem: OutputProblem) -> MirrorBound:
     """Return the best bound (3) for k = T - 2: the last control sees one more output.
 
-    At most one linear program for each vertex of M (a few dozen). Errors proportional to the
+    One linear program for each row of the goal, and at most one for each vertex of M (a few dozen).
+    The bound is 0, without errors, if no vertex gives more. Errors proportional to the
     controls are left out, because a strategy may avoid them. For a start that is a polytope, the
     bound is for its part that is symmetric about the centre.
     """
     certain = _certain(problem)
     last = problem.periods - 2
-    # Without the equations after `last` each normal has errors of its own: an upper bound.
+    # Without the equations after `last` the errors of each normal are independent: upper bounds.
     tops = np.array([bound.value for bound in _bounds_of_rows(certain, last)])
     vertices = _vertices(certain, one_of_two=True)
     uppers = np.array([vertex.weights @ tops - vertex.cost for vertex in vertices])

@@ -27,7 +27,8 @@ class ErrorBounds:
     relative : ndarray, shape (m,)
         The part of a control's absolute value that is added to `execution`.
     measured : ndarray, shape (q,)
-        Of the first q components of the state, which are measured at t = 0, ..., T - 1.
+        Of the first q components of the state, which are measured at t = 0, ..., T - 1; 0 for exact
+        measurements, and q = 0 for none.
     disturbance : ndarray, shape (T, n, p), or None
         Effects of unit components of an unknown acceleration in a period.
     sight : SightSensor or None

@@ -139,7 +139,8 @@ class Coasting:
         Raises
         ------
         ValueError
-            If the intervals are too long for a bound between their ends.
+            If the motion is nonlinear, and the intervals are too long for a bound between their
+            ends; for linear motion `CoastTube.sagittas` raises it.
         UnboundedCoastError
             If nonlinear motion is not proved to stay within any distance.
         """
@@ -300,8 +301,8 @@ class CoastTube:
     def overshoots(self, normals: Floats) -> Floats:
         """Return by how much normals . state may exceed both ends of an interval, (K, N, k).
 
-        With an acceleration of at most M the position exceeds its chord by h^2 / 8 M, and the
-        velocity exceeds both ends by h / 2 M. `normals` have the shape (k, 6).
+        With an acceleration of at most M the position exceeds its chord by M h^2 / 8, and the
+        velocity exceeds both ends by M h / 2. `normals` have the shape (k, 6).
         """
         position = np.linalg.norm(normals[:, :3], axis=1)
         velocity = np.linalg.norm(normals[:, 3:], axis=1)
@@ -323,7 +324,10 @@ class CoastTube:
         return np.stack(ends, axis=2)
 
     def certain_distances(self, directions: Floats) -> Floats:
-        """Return a lower bound of directions . position in each interval, m, shape (K, N)."""
+        """Return a lower bound of directions . position in each interval, m, shape (K, N).
+
+        The `directions`, shape (K, N, 3), are unit vectors: it is then a bound of the distance too.
+        """
         lowest = np.full(directions.shape[:2], np.inf)
         for end in (slice(None, -1), slice(1, None)):
             middle = np.einsum("kia,kia->ki", directions, self.middles[:, end, :3])

@@ -139,7 +139,8 @@ class ConeProgram:
     def vertex(self) -> Floats:
         """Return a solution of a linear program, shape (p,): a vertex of its feasible set.
 
-        The simplex method (HiGHS) finds it, in rows scaled to a maximum entry of one. Raise
+        The program has no cones and no matrix. The simplex method (HiGHS) finds the solution, in
+        rows scaled to a maximum entry of one. Raise
         `NoSolutionError` as `checked` does.
         """
         rows, limits = self._stacked("rows")
@@ -223,10 +224,11 @@ class ConeProgram:
         """Return the violation of the constraints at a point, and its duality gap.
 
         Multipliers, of all constraints in their order, are moved into the dual cone first. A `cost`
-        replaces the cost of the program. The gap is relative to the value, or to the change of the
-        value that the allowed violation can cause. By weak duality the value at a solution y is at
-        least - v . matrix v / 2 - multipliers . limits - |residual| . |y|; y is assumed to be at
-        most twice as large as the point.
+        replaces the cost of the program. The gap is relative to the largest of the value, the
+        change of the value that the allowed violation can cause, and 1. By weak duality the value
+        at a solution y is at least - v . matrix v / 2 - multipliers . limits - |residual| . |y|;
+        the components of y are assumed to be at most twice the largest one of the point, or twice
+        1.
         """
         linear = self.cost if cost is None else cost
         rows, ends = self._all()

@@ -43,7 +43,7 @@ _MAX_CHECKS = 40
 """Maximum number of programs with the same normals: each one has more rows, or larger caps."""
 _GAIN = 1e-3
 """Relative decrease of the guarantee below which the normals are not renewed, as for the caps of
-errors proportional to the controls."""
+errors proportional to the controls; also that of a violation, relative to the keep-out distance."""
 _SPARE = 1e-6
 """Margin of the constraints in the program of the least violation, relative to their sizes."""
 _CAP_RESERVE = 1e-3
@@ -201,7 +201,7 @@ def safe_plan(
     and impulses in m/s. The plan's problem has the constraints of the drifts as further rows of the
     path. The normals of the constraints are those of the plan without safety at first, and are then
     renewed until the guarantee stays: the plan is a local optimum. Its distances are certificates.
-    `on_program` is called after each program that was solved.
+    `on_program` is called after each plan with constraints on drifts.
 
     Raises
     ------
@@ -363,7 +363,10 @@ def _rows(safety: PassiveSafety, normals: Floats, allowances: Floats, entered: F
 
 
 def _least_violation(search: _Search, found: _SafePlan) -> _SafePlan:
-    """Return the plan whose drifts violate the constraints least, with renewed normals."""
+    """Return the plan whose drifts violate the constraints least, with renewed normals.
+
+    It is `found` itself if no interval of it is near the ball.
+    """
     problem = search.problem
     safety = search.safety
     certificate = found.certificate
@@ -396,9 +399,10 @@ def _least_violation(search: _Search, found: _SafePlan) -> _SafePlan:
 def _plan_of_least_violation(
     problem: OutputProblem, rows: PathRows, window: int | None, known: Flags, least: float
 ) -> PlanWithRows:
-    """Return the plan that minimises the largest violation of rows, which is `least` or more.
+    """Return the plan that minimises the largest violation of the lower ends of rows.
 
-    The constraints of the problem enter as in `plan_with_rows`.
+    The violation is `least`, which is negative, or more. The constraints of the problem enter as in
+    `plan_with_rows`.
     """
     kept = problem.rows
     limits = len(kept.times) - len(known)

@@ -325,7 +325,7 @@ def guided_flight(
 
     The plan and the options are those of `GuidedCraft`. The true motion is moved; its errors must
     be within the bounds of the problem, or the promises do not hold. `cuts` returns half-spaces of
-    the present states, such as `SightTruth.cuts`; they are called after each output.
+    the present states, such as `SightTruth.cuts`; it is called after each output.
     """
     craft = GuidedCraft(plan, window=window, max_facets=max_facets)
     guarantees = [craft.guarantee]
@@ -360,7 +360,7 @@ def _bases(problem: OutputProblem, time: int) -> list[Floats]:
     """Return normals of parallelotopes around a set of five or more states, shape (n, n) each.
 
     They are the goal carried back to the period, which makes the last answer exact, the states, and
-    the outputs of this period and of the one before.
+    the outputs of this period and of the one before; those that are not regular are left out.
     """
     goal = problem.goal
     for t in range(problem.periods - 1, time - 1, -1):

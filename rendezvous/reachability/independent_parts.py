@@ -161,6 +161,9 @@ def plan_of_parts(
 
 
 def part_of_plan(part: ProblemPart, plan: AffinePlan) -> AffinePlan:
-    """Return the plan of an independent part of the problem of a plan by `plan_of_parts`."""
+    """Return the plan of an independent part of the problem of a plan by `plan_of_parts`.
+
+    Its certificates are for the errors and the caps of `part`.
+    """
     gains = plan.gains[:, :, part.controls[:, None], part.outputs]
     return AffinePlan(part.problem, plan.nominal[:, part.controls], gains)

@@ -19,8 +19,8 @@ from infoset.rendezvous.reachability.independent_parts import independent_parts,
 from infoset.rendezvous.reachability.outputs import AffinePlan, OutputProblem, PathRows, joined
 
 _CONE_FACES = 8
-"""Half-spaces that replace the cone about a measured direction in space: the pyramid is at most 8 %
-wider than the cone."""
+"""Half-spaces that replace the cone about a measured direction in space: the edges of the pyramid
+are 8.2 % farther from its axis than the cone."""
 _MAX_ROUNDS = 12
 """Maximum number of programs, as for errors proportional to the controls."""
 _GAIN = 1e-3
@@ -124,7 +124,7 @@ def _tangents(direction: Floats) -> Floats:
 def axes_of(positions: Floats) -> Floats:
     """Return unit vectors along and across the directions of positions, (T, d), shape (T, d, d).
 
-    In space the second one is in the plane of the first two coordinates.
+    No position is zero. In space the second one is in the plane of the first two coordinates.
     """
     along = positions / np.linalg.norm(positions, axis=1, keepdims=True)
     across = np.zeros_like(along)

@@ -87,7 +87,8 @@ def between_periods(
     """Return the matrices of states within periods, as functions of (x(t), u(t)).
 
     `motion`, `periods`, `period_s` and `acceleration_m_s2` are as in `discretised`; `instants` is
-    the number of evenly spaced times within each period. The shape is (periods, instants, 6, 9).
+    the number of evenly spaced times within each period, without its ends. The shape is (periods,
+    instants, 6, 9).
     """
     starts = period_s * np.arange(periods)[:, None]
     since_start = period_s * np.arange(1, instants + 1) / (instants + 1)

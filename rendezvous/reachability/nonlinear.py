@@ -56,10 +56,10 @@ def nonlinear_plan(
     """Return a plan whose certificates hold for the motion about a central body.
 
     The problem has states in m and m/s in Hill's axes and impulses in m/s at the starts of the
-    periods; its disturbance must not contain the remainder of gravity. `coasting` has the orbit,
-    the semi-major axis, the period and the intervals of the flight; its numbers of impulses and of
-    periods are not used. `solve` returns a plan for a problem with the remainder, for example one
-    that `safe_plan` finds.
+    periods; its disturbance contains the effect of `coasting.acceleration_m_s2`, but must not
+    contain the remainder of gravity. `coasting` has the orbit, the semi-major axis, the period and
+    the intervals of the flight; its numbers of impulses and of periods are not used. `solve`
+    returns a plan for a problem with the remainder, for example one that `safe_plan` finds.
 
     Raises
     ------

@@ -205,7 +205,10 @@ class OutputProblem:
 
     @cached_property
     def errors_of_period(self) -> Floats:
-        """The effects of all errors in a period on the state at its end, shape (T, n, p + m)."""
+        """The effects of all errors in a period on the state at its end, shape (T, n, p + a).
+
+        The a last errors are those of controls that have an error in some period.
+        """
         execution = self.control * self.execution[:, None, :]
         acting = execution.any(axis=(0, 1))
         blocks = [execution[:, :, acting]]
@@ -367,7 +370,10 @@ class AffinePlan:
 
     @cached_property
     def excess(self) -> float:
-        """The largest violation of a row, in units of the problem; at most 0 if all hold."""
+        """The largest violation of a row, in units of the problem; at most 0 if all hold.
+
+        It is minus infinity if there are no rows.
+        """
         rows = self.problem.rows
         over = self.row_ranges.upper - rows.upper
         under = rows.lower - self.row_ranges.lower

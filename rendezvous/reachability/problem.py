@@ -65,7 +65,7 @@ class ReachabilityProblem:
     thrust : ThrustShape
         Meaning of `control_bounds`.
     normals : ndarray, shape (k, n)
-        Further constraints on states: normals x(t) <= offsets(t).
+        Further constraints on states: normals x(t) <= offsets(t); no normal is zero.
     offsets : ndarray, shape (T + 1, k)
         Offsets in the units of normals x; infinite at times without the constraint.
     constraint_names : tuple of str
@@ -79,7 +79,8 @@ class ReachabilityProblem:
         Immediate effect of a control, for impulses at the start of a period: the constraints of
         time t also apply to x(t) + jump u(t), and B(t) = A(t) jump.
     control_normals : ndarray, shape (k, m)
-        Further constraints on controls: control_normals u(t) <= control_offsets(t).
+        Further constraints on controls: control_normals u(t) <= control_offsets(t); no normal is
+        zero.
     control_offsets : ndarray, shape (T, k)
         Offsets in the units of control_normals u; infinite at times without the constraint.
 

@@ -111,7 +111,7 @@ class OptimalControls:
     def ranges(self) -> Floats:
         """Return the minimum and maximum of each control over the set, shape (T, m, 2).
 
-        They are found by 2 T m linear programs.
+        They are found by at most 2 T m linear programs, or cone programs for thrust in a ball.
         """
         periods = self.problem.periods
         result = np.zeros((periods, self.problem.controls, 2))

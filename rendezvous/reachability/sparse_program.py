@@ -18,6 +18,8 @@ _ATTEMPTS = tuple(SolverSettings(constant, False) for constant in (1e-7, 3e-8, 1
 Programs of plans have more degenerate rows than the others: with 3e-8 alone the factorisation fails
 for approach-cone with feedback, with 1e-7 it fails in no program of the tests."""
 _SOLVED = (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved)
+"""Statuses with a point. One that is less accurate is used too: certificates do not depend on
+it."""
 _INFEASIBLE = (
     clarabel.SolverStatus.PrimalInfeasible,
     clarabel.SolverStatus.AlmostPrimalInfeasible,
@@ -25,7 +27,7 @@ _INFEASIBLE = (
 
 
 class InfeasibleProgramError(ArithmeticError):
-    """The solver proved that no point satisfies the constraints."""
+    """The solver found that no point satisfies the constraints, to its tolerance."""
 
 
 class Term(NamedTuple):

@@ -101,7 +101,7 @@ class _Rows:
     def problem_with_broken(self, tube: CoastTube, excess: Floats) -> OutputProblem:
         """Return the problem with the constraints that were broken before, and those of a plan.
 
-        Of each constraint and period the most broken interval enters.
+        Of each constraint and period the most broken interval enters; it stays for later plans.
         """
         worst = excess.argmax(axis=1)[:, None, :]
         broken = np.take_along_axis(excess, worst, axis=1) > 0.0
@@ -199,7 +199,8 @@ def _with_free_end(plan: AffinePlan) -> AffinePlan:
 def _from_end(tube: CoastTube, problem: OutputProblem, guarantee: float) -> CoastTube | None:
     """Return the states of the last period whose motion ends within a guarantee.
 
-    The sets of the other periods are the origin. None if the norm of the goal bounds no state.
+    The sets of the other periods are the origin. None unless the goal is a regular matrix: only
+    then a guarantee bounds all states.
     """
     size = problem.states
     if np.linalg.matrix_rank(problem.goal) < size or len(problem.goal) > size:
