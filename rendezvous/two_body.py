@@ -242,8 +242,8 @@ def flight_fault(
 def coast(states: Floats, duration_s: ArrayLike, gravitational_parameter_m3_s2: float) -> Floats:
     """Return `states` (r, v), shape (..., 6), about the attracting point, after coasting.
 
-    `duration_s` may be negative. The method is Lagrange's f and g functions of the universal
-    anomaly, which are the same for ellipses, parabolas and hyperbolas.
+    `duration_s` is finite, and may be negative. The method is Lagrange's f and g functions of the
+    universal anomaly, which are the same for ellipses, parabolas and hyperbolas.
 
     Raises
     ------

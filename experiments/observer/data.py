@@ -151,7 +151,7 @@ def _point(shape: Set, errors: Errors, generator: np.random.Generator) -> Floats
 
 
 def _padded(inputs: Floats | None, steps: int, size: int) -> Floats:
-    """Return inputs for a number of steps; zero where there are none."""
+    """Return inputs for a number of steps: the first ones, and zeros where there are fewer."""
     padded = np.zeros((steps, size))
     if inputs is not None:
         padded[: len(inputs)] = inputs[:steps]

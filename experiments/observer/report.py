@@ -39,7 +39,7 @@ class ObserverReport:
 
     @cached_property
     def excess_widths(self) -> Floats | None:
-        """Widths of the last set less the exact widths, shape (n,); None if it is not reduced."""
+        """Widths of the last set less the exact widths, (n,); None if not reduced, or empty."""
         last = self.estimates[-1]
         if not last.reduced or last.is_empty:
             return None

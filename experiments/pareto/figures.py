@@ -196,7 +196,7 @@ def _draw_set(
 def _hull(solution: EncounterSolution) -> Floats | None:
     """Return the convex hull of the ideal meetings in the first two free components.
 
-    It is None if it has no area.
+    It is None if it has no area, or if the craft have different M: the Pareto set is not the hull.
     """
     if not solution.same_matrix:
         return None

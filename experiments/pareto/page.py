@@ -88,8 +88,8 @@ def _own_data(report: ParetoReport, paths: list[_Path]) -> dict[str, object]:
     encounter = solution.encounter
     free = [component.name.lower() for component in encounter.free]
 
-    # If all craft have the same M, the Pareto set is the convex hull of the ideals, and its outline
-    # can be drawn; else it is shown as points.
+    # If all craft have the same M, the Pareto set is the convex hull of the ideals; in two
+    # components its outline can be drawn. Else it is shown as points.
     hull: Floats | None = None
     points: object = []
     if solution.same_matrix and len(free) == 2:

@@ -38,7 +38,8 @@ from infoset.rendezvous.pareto.coalitions import MAX_CRAFT
 SWEEP = (0.5, 2.0, 31)
 """Smallest and largest duration of the sweep, relative to the problem's, and their number.
 
-Chosen: costs change by some powers of the duration, and 31 points draw a smooth curve.
+Durations are from the last start of a craft. Chosen: costs change by some powers of the duration,
+and 31 points draw a smooth curve.
 """
 
 
