@@ -19,6 +19,7 @@ from infoset.rendezvous.pursuit_evasion.solver import solve
 from infoset.rendezvous.pursuit_evasion.steering import Steering
 
 PathNow = Callable[[float], Floats]
+"""State of a craft, shape (6,), nondimensional, by the time from the start of a leg."""
 
 HIT_M = 100.0
 """Distance up to which the closest approach to a point counts as a capture. Chosen: in the last leg

@@ -27,7 +27,8 @@ _SOLVER_TOLERANCE = 1e-10
 """Tolerance at which Clarabel stops, relative: a tenth of `MAX_VIOLATION`."""
 _SIZE_FACTOR = 2.0
 """Assumed maximum size of a solution, in sizes of the point that the solver found. The lower bound
-by weak duality contains it (`violation_and_gap`). Chosen."""
+by weak duality contains it (`violation_and_gap`). Chosen: with 16 the same programs are solved
+(measured in test_conic and test_routes)."""
 
 
 class SolverSettings(NamedTuple):

@@ -13,6 +13,7 @@ from infoset.rendezvous._arrays import Floats
 from infoset.rendezvous.relative_motion.linear_motion import HeldMotion, HeldSegment, state_scales
 
 OfTime = Callable[[Floats], Floats]
+"""Matrices A(t), shape (..., 6, 6), of times, s, of the shape (...)."""
 
 NODES = 8
 """Gauss points of a panel: collocation of order 16, exact to rounding on panels of a radian."""
