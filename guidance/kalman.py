@@ -75,8 +75,9 @@ class KalmanBank:
     Python loop.
 
     The acceleration a has a uniform prior within the bound nu of the set's model, and changes by a
-    random walk with the variance nu^2/3 over the nominal flight. A manoeuvre of constant size that
-    starts at a random time within the flight has this spectral density (Zarchan).
+    random walk with the variance nu^2/3 over a flight from the maximum initial range. A manoeuvre
+    of constant size that starts at a random time within the flight has this spectral density
+    (Zarchan).
 
     A camera with a constant centroid error has two parts of errors. The pixel part is the noise of
     the measurements; the variance c^2/3 of the centroid part is added to the variance of the miss.
@@ -410,7 +411,8 @@ class Kalman(Checked):
     Parameters
     ----------
     dead_zone : float
-        Half-width of the dead zone of the estimated miss, in standard deviations.
+        Half-width of the dead zone of the estimated miss, in standard deviations. The default was
+        chosen on runs with seed 11 (docs/strategies.md).
     last_s : float
         Time to go up to which there is no dead zone, s. If the engine has a last impulse, also the
         time before it.

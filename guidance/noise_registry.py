@@ -18,8 +18,9 @@ from infoset.guidance.scripted_noise import RandomNoise
 class NoiseKind(Enum):
     """How measurement errors are chosen within their bounds.
 
-    RANDOM errors are uniform and independent, GAUSSIAN ones independent, CORRELATED ones Gaussian
-    and correlated in time; GAME errors are chosen against the guidance.
+    RANDOM errors are uniform and independent, GAUSSIAN ones truncated Gaussian and independent,
+    CORRELATED ones truncated Gaussian and correlated in time; GAME errors are chosen against the
+    guidance.
     """
 
     RANDOM = "random"
@@ -56,12 +57,13 @@ class NoiseBatch(NamedTuple):
     errors : mapping of str to ndarray, shape (C, B, steps), for ranges (B, steps)
         Random numbers by sensor, independent and uniform in [-1, 1].
     bias : ndarray, shape (C, B), or None
-        Random numbers of the constant error of a camera's centroid; None without such an error.
+        Random numbers of the constant error of a camera's centroid, uniform in [-1, 1]; None
+        without such an error.
     drift : ndarray, shape (C, B, steps), or None
         Random numbers of the drift of a camera's attitude, uniform in [-1, 1] and correlated in
         time; None without a drift.
     tie : ndarray, shape (C, B, steps)
-        Random numbers of `TieRule.RANDOM`.
+        Random numbers of `TieRule.RANDOM`, uniform in [-1, 1].
     worst_shift_m, target_side : callable
         Return `shift_m` and `target_side` of `GameNoise`. They are computed only if a noise needs
         them.

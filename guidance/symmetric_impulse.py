@@ -17,7 +17,8 @@ def symmetric_impulse(
     Parameters
     ----------
     interval : PredictedMiss
-        Interval of each engagement; the impulse is zero where it does not exist.
+        Interval of each engagement; the impulse is zero where it does not exist, and where both
+        points have the range zero at the impulse.
     closing_speed_m_s : float
         Nominal closing speed e.
     lead_s : float

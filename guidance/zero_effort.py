@@ -36,7 +36,10 @@ class ZeroEffortMiss:
         """Start without a state."""
 
     def decide(self, situation: Situation, state: None) -> Floats:
-        """Return the impulse that makes the miss of the middle zero, m/s."""
+        """Return the impulse k that minimises the weighted squares of the middles' misses, m/s.
+
+        It is zero if all ranges at the impulse are zero.
+        """
         lower, upper = situation.information.predicted_miss_by_section_m()
         feasible = situation.information.feasible
         # The addition keeps the weights positive if every section is a single point.

@@ -66,9 +66,10 @@ class ConvexPolygons(ConvexSet):
     vertices. All arguments are checked: numbers are finite (TypeError if they are not real
     numbers), and shapes fit (ValueError).
 
-    An empty member of a batch does not affect the others: sets made from it are empty, its support
-    function is -inf, its distance from any set is inf, and points such as its centroid are masked
-    (`numpy.ma.MaskedArray`). A single empty set has no such points; then a ValueError is raised.
+    An empty member of a batch does not affect the others: sets made from it are empty (except a
+    `convex_hull` with another set), its support function is -inf, its distance from any set is inf,
+    and points such as its centroid are masked (`numpy.ma.MaskedArray`). A single empty set has no
+    such points; then a ValueError is raised.
 
     An operation of a single polygon with a `Polytope` of the plane, in either order, converts the
     polygon to a `Polytope`: the resulting set is a `Polytope`, and exact only to rounding.

@@ -67,7 +67,8 @@ ones, which knows the ends of the set.
 _LEAST_WIDTH = 64.0 * UNSURE / SNAP
 """Minimum scale of an axis, relative to the coordinates from which limits were computed: 64
 roundings of these coordinates are then SNAP in the scale, so that a set as thin as this is flat.
-64 is chosen.
+Chosen: 60 differences that are segments are all flat from 16 to 16384, and 15 of them have an
+interior with 4 (measured).
 """
 _PIVOT_GROWTH = 64.0
 """Factor by which elimination (`pivots`) may enlarge the distances of points from the plane of a

@@ -77,11 +77,12 @@ class Polytope(PolytopeArrays, ConvexSet):
     result that is bounded is rounded to nearest. Infinite results are inf; results that do not
     exist, such as a centroid, raise an UnboundedPolytopeError.
 
-    Operations on the empty set give the empty set; points such as its centroid do not exist
-    (EmptyPolytopeError). All arguments are checked: numbers are finite (TypeError if they are not
-    real numbers), shapes and spaces fit (ValueError).
+    Operations on the empty set give the empty set, except `convex_hull` with another set; points
+    such as its centroid do not exist (EmptyPolytopeError). All arguments are checked: numbers are
+    finite (TypeError if they are not real numbers), shapes and spaces fit (ValueError).
 
-    The other set of an operation may be a single polygon, one of `ConvexPolygons`: it is converted.
+    The other set of an operation may also be a `Zonotope` or a single polygon of `ConvexPolygons`:
+    it is converted.
 
     Operators: `P & Q` (intersection), `P + Q` (Minkowski sum), `P + vector` (translation), `A @ P`
     (linear map), `2 * P`, `-P`, `point in P`, `P <= Q` (subset, to rounding); `ConvexSet` defines
