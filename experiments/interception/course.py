@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from infoset.arrays import Floats, Integers
 from infoset.experiments.common.units import duration_text
 from infoset.guidance.thruster import modulus
+from infoset.sensors import OffsetCamera
 from infoset.sim import Outcome, Record, Scenario
 from infoset.sim.adversary import WORST_FOUND
 from infoset.sim.engagement import Step
@@ -70,6 +71,13 @@ class Clock:
         if to_go_s < 0.0:
             return f"{-to_go_s:.3g} s after the nominal arrival"
         return f"{duration_text(to_go_s)} to go"
+
+
+def measured_name(scenario: Scenario) -> str:
+    """Return the name of the measured angles, which may be those of another point of the body."""
+    if isinstance(scenario.bearing_sensor, OffsetCamera):
+        return "measured angle of the centre of brightness"
+    return "measured angle"
 
 
 def min_to_go_s(scenario: Scenario) -> float:

@@ -18,6 +18,7 @@ from infoset.experiments.interception.course import (
     complete_steps,
     kept_steps,
     marks,
+    measured_name,
     min_to_go_s,
     outcome_title,
     record_titles,
@@ -215,21 +216,23 @@ def _axis_data(record: Record, axis: int, kept: Sequence[int]) -> dict[str, obje
     rates = record.true_rate_rad_s[:, axis]
     misses = true_predicted_misses(record)[:, axis]
 
-    data: dict[str, object] = {"along": "", "measured_name": "measured angle"}
+    measured = measured_name(record.scenario)
+    data: dict[str, object] = {"along": "", "measured_name": measured}
     if record.scenario.is_spatial:
-        data = {"along": f" along {name}", "measured_name": f"measured angle along {name}"}
+        data = {"along": f" along {name}", "measured_name": f"{measured} along {name}"}
     data |= {
         "axis": name,
         "angle_error_rad": model.angle_sensor.constant_error_rad,
         "angle_error_slope_rad_m": model.angle_sensor.error_slope_rad_per_m,
         "centroid_error_m": model.angle_sensor.centroid_bound_m,
+        "image_shift_m": model.angle_sensor.shift_m,
         "disturbance_m_s2": model.disturbance_m_s2,
     }
     unknown = np.full(record.true_angle_rad.shape, np.nan)
     for kind in SENSORS:
         if kind.is_lateral:
-            measured = record.measured.get(kind.name, unknown)
-            data[f"measured_{kind.quantity}"] = _known(measured[kept, axis])
+            values = record.measured.get(kind.name, unknown)
+            data[f"measured_{kind.quantity}"] = _known(values[kept, axis])
 
     fired = np.flatnonzero(modulus(record.impulse_m_s.T))
     return data | {

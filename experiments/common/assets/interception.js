@@ -205,7 +205,8 @@ class Column {
     const ends = drawn.length > 1 ? [drawn[0], drawn[drawn.length - 1]] : drawn;
     const look = { fill: theme.colours.measured, opacity: 0.13, stroke: theme.colours.measured, width: 1, closed: true };
     for (const { range } of angle === null ? [] : ends) {
-      plane.band(...[-1, 1].map((sign) => place([0, angle + sign * this.errorAt(range)])[1]), look);
+      const centre = this.centreAt(angle, range);
+      plane.band(...[-1, 1].map((sign) => place([0, centre + sign * this.errorAt(range)])[1]), look);
     }
     if (rate !== null) {
       plane.upright(...[-1, 1].map((sign) => place([rate + sign * record.rate_error_rad_s, 0])[0]), look);
@@ -327,9 +328,15 @@ class Column {
     if (found.length) return this.sectionLines(found.reduce((best, each) => (area(each) < area(best) ? each : best)));
     const error = this.errorAt(truth.range);
     const measured = this.record.measured_angle_rad[this.step];
-    if (this.stage !== MEASURED || measured === null || Math.abs(y / angleUnit[1] - measured) > error) return null;
+    if (this.stage !== MEASURED || measured === null) return null;
+    if (Math.abs(y / angleUnit[1] - this.centreAt(measured, truth.range)) > error) return null;
     return [`${this.record.measured_name} ${shown(measured * angleUnit[1], angleUnit[0])}`,
       `error at most ${shown(error * angleUnit[1], angleUnit[0])} at x = ${shown(truth.range / 1e3, "km")}`];
+  }
+
+  /** The angle of the centre of the body at a range, from the measured one: the set subtracts a known offset. */
+  centreAt(measured, range) {
+    return Math.atan(Math.tan(measured) - this.record.image_shift_m / range);
   }
 
   errorAt(range) {

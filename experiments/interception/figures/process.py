@@ -26,11 +26,16 @@ from infoset.experiments.common.figure_style import (
 )
 from infoset.experiments.interception.course import (
     Clock,
+    measured_name,
     outcome_title,
     record_titles,
     true_predicted_misses,
 )
-from infoset.experiments.interception.figures.shared import MAX_VECTORS, count_down, draw_impulses
+from infoset.experiments.interception.figures.shared import (
+    MAX_VECTORS,
+    count_down,
+    draw_impulses,
+)
 from infoset.sensors import BearingSensor
 from infoset.sim import Record
 
@@ -161,7 +166,10 @@ def _draw_sight(
     change = np.abs if is_modulus else np.asarray
     steps, values = _measured(trace, sensor)
     if steps.size:
-        _dots(axes, times[steps], change(values), f"measured {sensor}")
+        name = f"measured {sensor}"
+        if sensor == "angle":
+            name = measured_name(trace[0].scenario)
+        _dots(axes, times[steps], change(values), name)
     axes.plot(times, change(_true(trace, sensor)), color=TRUTH, label="true value")
 
 
@@ -176,16 +184,22 @@ def _dots(axes: Axes, times: Floats, values: Floats, label: str) -> None:
 
 
 def _draw_angle_error(axes: Axes, trace: Trace, clock: Clock) -> None:
-    """Draw the errors of the measured angle and their bound at the true range, µrad."""
-    record = trace[0]
+    """Draw the errors of the measured angle and their bound at the true range, µrad.
+
+    They are about the angle that the set expects of the true state: with a correction of the centre
+    of brightness that of this point.
+    """
+    record, axis = trace
     steps, values = _measured(trace, "angle")
     times = clock.at(record)[steps]
     bounds = 1e6 * _sensor(trace).error_bound(record.true_range_m[steps])
     axes.axhline(0.0, **_ZERO)
     band: dict[str, Any] = {"facecolor": MEASURED, "alpha": 0.18, "linewidth": 0.0}
     axes.fill_between(times, -bounds, bounds, label="bound of the angle error", **band)
-    # `_measured` and `_true` are in mrad, and the axis is in µrad.
-    errors = 1e3 * (values - _true(trace, "angle")[steps])
+    sensor = record.scenario.set_model.angle_sensor
+    expected_rad = sensor.expected(record.true_angle_rad[steps].T, record.true_range_m[steps])
+    # `_measured` is in mrad, and the axis is in µrad.
+    errors = 1e3 * values - 1e6 * expected_rad[axis]
     _dots(axes, times, errors, "error of the measured angle")
 
 

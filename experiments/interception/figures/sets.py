@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -218,14 +219,18 @@ def draw_plane(axes: Axes, plane: Plane) -> None:
 
 
 def _shade_allowed(axes: Axes, plane: Plane) -> None:
-    """Shade the angles that the measurement allows at the nearest and the farthest section."""
+    """Shade the angles that the measurement allows at the nearest and the farthest section.
+
+    The set subtracts a known offset of the measured point, a length.
+    """
     if plane.measured_rad is None or not plane.chosen:
         return
     sensor = plane.record.scenario.set_model.axis(plane.name).angle_sensor
     label = "angles allowed by the measurement"
     for section in (plane.chosen[0], plane.chosen[-1]):
         error = float(sensor.error_bound(section.range_m))
-        low, high = ((plane.measured_rad + sign * error) * 1e3 for sign in (-1.0, 1.0))
+        centre = math.atan(math.tan(plane.measured_rad) - sensor.shift_m / section.range_m)
+        low, high = ((centre + sign * error) * 1e3 for sign in (-1.0, 1.0))
         axes.axhspan(low, high, color=MEASURED, alpha=0.09, linewidth=0.0, zorder=0.4, label=label)
 
 
