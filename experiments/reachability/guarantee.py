@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -37,6 +38,7 @@ from infoset.rendezvous.reachability import (
     ReplannedPlan,
     ThrustShape,
     UnboundedCoastError,
+    UnsafeDriftsError,
     acting_controls,
     affine_plan,
     answers_within,
@@ -282,6 +284,8 @@ def _checked_plan(
             checked = found.plan
         else:
             checked = solve(problem)
+    except UnsafeDriftsError as error:
+        raise _unsafe(rendezvous, error) from None
     except (NoRobustPlanError, UnboundedCoastError) as error:
         raise InputError(f"{rendezvous.name}: {error}") from None
     if safety is None:
@@ -289,6 +293,32 @@ def _checked_plan(
     # Its directions prove at least the distance of its constraints.
     certificate = drift_certificate(checked, drifts, proved[-1].normals)
     return CheckedPlan(checked, certificate, found)
+
+
+def _unsafe(rendezvous: Rendezvous, error: UnsafeDriftsError) -> InputError:
+    """Return the error of drifts that no plan proves, with the values that one proves."""
+    safety = rendezvous.passive_safety
+    assert safety is not None
+    certificate = error.certificate
+    is_safe = certificate.distances >= safety.keep_out_m
+    changes = []
+    # Three digits, below the certain distance.
+    digits = 10.0 ** (math.floor(math.log10(max(certificate.least_distance, 1e-3))) - 2)
+    distance_m = digits * math.floor(certificate.least_distance / digits)
+    if distance_m > 0.0:
+        changes.append(f"keep_out_m = {distance_m:g}")
+    instants = certificate.tube.coasting.instants
+    by_period = is_safe.reshape(len(is_safe), -1, instants).all(axis=(0, 2))
+    periods = int(by_period.argmin())
+    if periods:
+        changes.append(f"drift_periods = {periods}")
+    impulses = int(is_safe.all(axis=1).argmin())
+    if impulses:
+        changes.append(f"until_period = {impulses - 1}")
+    advice = ""
+    if changes:
+        advice = f"; the plan with this distance is safe with {' or '.join(changes)}"
+    return InputError(f"{rendezvous.name}: passive_safety: {error}{advice}")
 
 
 def _plan_in_flight(rendezvous: Rendezvous, checked: CheckedPlan) -> ReplannedPlan:

@@ -27,6 +27,7 @@ from infoset.rendezvous.reachability.conic import NoSolutionError
 from infoset.rendezvous.reachability.drift import (
     DriftCertificate,
     PassiveSafety,
+    UnsafeDriftsError,
     drift_certificate,
     safe_plan,
 )
@@ -180,6 +181,7 @@ __all__ = [
     "TooManyVerticesError",
     "TrueMotion",
     "UnboundedCoastError",
+    "UnsafeDriftsError",
     "VertexCounts",
     "acting_controls",
     "affine_plan",

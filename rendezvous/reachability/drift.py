@@ -169,6 +169,32 @@ def _unit(vectors: Floats) -> Floats:
     return np.where(lengths > 0.0, vectors / safe, first)
 
 
+class UnsafeDriftsError(NoRobustPlanError):
+    """No plan was found whose drifts are safe.
+
+    Parameters
+    ----------
+    certificate : DriftCertificate
+        Of the plan with the largest certain distance that was found.
+    keep_out_m : float
+        Radius of the ball that its drifts may enter.
+    """
+
+    def __init__(self, certificate: DriftCertificate, keep_out_m: float) -> None:
+        coasting = certificate.tube.coasting
+        distances = certificate.distances
+        impulse, interval = np.unravel_index(distances.argmin(), distances.shape)
+        begin_s = coasting.interval_s * interval
+        self.certificate = certificate
+        super().__init__(
+            f"no plan was found whose drifts stay {keep_out_m:g} m from the target for all errors; "
+            f"the largest certain distance that was found is {certificate.least_distance:.4g} m, "
+            f"{begin_s:.5g} s to {begin_s + coasting.interval_s:.5g} s after the impulse at t = "
+            f"{impulse} ({coasting.period_s * impulse:.6g} s); reduce the keep-out distance, the "
+            "periods of drift or the errors"
+        )
+
+
 class _SafePlan(NamedTuple):
     """A certificate, and the constraints that its program had.
 
@@ -205,9 +231,9 @@ def safe_plan(
 
     Raises
     ------
-    NoRobustPlanError
+    UnsafeDriftsError
         If no safe plan was found.
-    ValueError, NoSolutionError, UnboundedCoastError
+    NoRobustPlanError, ValueError, NoSolutionError, UnboundedCoastError
         As in `affine_plan` and `drift_certificate`.
     """
     best = best_with_rows(problem, window, no_rows(problem))
@@ -261,26 +287,27 @@ def _first_safe(search: _Search, free: PlanWithRows) -> _SafePlan:
         starts = [
             free.plan.under(replace(problem, caps=caps)) for caps in (same, own, problem.limits)
         ]
-    nearest = 0.0
+    farthest = drift_certificate(free.plan, safety.coasting)
     path = free.entered
     for start in starts:
         certificate = drift_certificate(start, safety.coasting)
         found = _SafePlan(certificate, np.zeros(certificate.distances.shape, dtype=bool), path)
-        nearest = max(nearest, certificate.least_distance)
+        farthest = _farther(farthest, certificate)
         for _ in range(_MAX_ROUNDS):
             safe = _safe_with(search, found)
             if safe is not None:
                 return safe
             least = found.certificate.distances.min()
             found = _least_violation(search, found)
-            nearest = max(nearest, found.certificate.least_distance)
+            farthest = _farther(farthest, found.certificate)
             if found.certificate.distances.min() <= least + _GAIN * safety.keep_out_m:
                 break
-    raise NoRobustPlanError(
-        f"no plan was found whose drifts stay {safety.keep_out_m:g} m from the target for all "
-        f"errors; the best one stays {nearest:.3g} m away; reduce the keep-out distance, the "
-        "periods of drift or the errors"
-    )
+    raise UnsafeDriftsError(farthest, safety.keep_out_m)
+
+
+def _farther(one: DriftCertificate, other: DriftCertificate) -> DriftCertificate:
+    """Return the certificate with the larger certain distance."""
+    return other if other.distances.min() > one.distances.min() else one
 
 
 def _safe_with(search: _Search, found: _SafePlan) -> _SafePlan | None:

@@ -35,8 +35,11 @@ from infoset.rendezvous.reachability import (
     NoRobustPlanError,
     NoSolutionError,
     OutputProblem,
+    PassiveSafety,
     UnboundedCoastError,
+    UnsafeDriftsError,
     acting_controls,
+    affine_plan,
     drift_certificate,
     linear_motion,
     safe_plan,
@@ -734,7 +737,45 @@ def test_keep_out_that_no_plan_has_is_one_message(infoset: Command) -> None:
     settings = ["periods=3", "passive_safety.keep_out_m=990", "passive_safety.until_period=1"]
     code, _, err = infoset("reach", "safe-approach", *(f"--set={each}" for each in settings))
     assert code == 2
-    assert "reduce the keep-out distance" in err
+    found = re.search(r"certain distance that was found is ([\d.]+) m, 0 s to 60 s after", err)
+    assert found is not None
+    # In 60 s between two instants the craft leaves the chord by a metre or so.
+    assert 975.0 < float(found[1]) < 980.0
+    assert "after the impulse at t = 0 (0 s); reduce the keep-out distance" in err
+    assert f"is safe with keep_out_m = {int(float(found[1]))}\n" in err
+
+
+def test_unsafe_drifts_name_the_values_that_are_safe(
+    infoset: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = ["periods=5", "passive_safety.drift_periods=3", "passive_safety.keep_out_m=100"]
+    certificates = []
+
+    def refused(problem: OutputProblem, safety: PassiveSafety, *_: Any) -> DriftCertificate:
+        certificate = drift_certificate(affine_plan(problem), safety.coasting)
+        certificates.append(certificate)
+        raise UnsafeDriftsError(certificate, safety.keep_out_m)
+
+    monkeypatch.setattr(guarantee, "safe_plan", refused)
+
+    told = infoset.refused("reach", "safe-approach", *(f"--set={each}" for each in settings))
+
+    found = re.search(
+        r"found is ([\d.]+) m, (\d+) s to \d+ s after the impulse at t = (\d) \((\d+) s\); .*"
+        r"keep_out_m = ([\d.]+) or drift_periods = (\d) or until_period = (\d)\n",
+        told,
+    )
+    assert found is not None
+    nearest_m, after_s, impulse, impulse_s, keep_out_m, periods, until = map(float, found.groups())
+    # A period of 240 s has four instants.
+    distances = certificates[0].distances.reshape(5, 3, 4)
+    place = distances[int(impulse), int(after_s) // 240, int(after_s) % 240 // 60]
+    assert nearest_m == pytest.approx(distances.min(), abs=0.005)
+    assert place == distances.min()
+    assert impulse_s == 240.0 * impulse
+    assert keep_out_m <= distances.min() < keep_out_m + 1.0
+    assert distances[:, : int(periods)].min() >= 100.0 > distances[:, : int(periods) + 1].min()
+    assert distances[: int(until) + 1].min() >= 100.0 > distances[: int(until) + 2].min()
 
 
 @pytest.mark.thorough
