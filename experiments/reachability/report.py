@@ -323,11 +323,14 @@ def _flight_lines(report: ReachabilityReport) -> Iterator[str]:
     robustness = report.robustness
     if robustness is not None:
         fixed = robustness.conflict or "controls that keep the constraints exist"
-        yield f"\nwith disturbances, without feedback: {fixed}"
+        yield f"\nwith the errors of [disturbance], without feedback: {fixed}"
         bound = robustness.refusal
         if robustness.plan is not None:
             bound = f"terminal norm at most {number(robustness.worst_miss)} {NORM}"
-        yield f"with disturbances, with feedback: {bound}"
+        known = "with feedback of the exact state"
+        if report.rendezvous.navigation is not None:
+            known += ", without the errors of [navigation]"
+        yield f"with the errors of [disturbance], {known}: {bound}"
 
 
 def solution_lines(solution: Solution) -> Iterator[str]:

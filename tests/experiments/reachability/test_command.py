@@ -244,7 +244,10 @@ def test_the_cone_is_inside_its_angle_and_kept() -> None:
     report = COMMAND.report(Reach(problem="approach-cone", select="energy,analytic", replan=True))
     printed = "\n".join(map(str, COMMAND.lines(report)))
     assert "with navigation errors, 10 simulations: median" in printed
-    assert "with disturbances, with feedback: terminal norm at most" in printed
+    assert (
+        "with the errors of [disturbance], with feedback of the exact state, without the errors of "
+        "[navigation]: terminal norm at most"
+    ) in printed
     for each in report.members:
         gaps = each.linear @ problem.normals.T - problem.offsets
         assert gaps.max() < 1e-6
