@@ -184,6 +184,8 @@ def _draw_drifts(axes: Axes, report: GuaranteeReport, states: list[int], per_m: 
         axes.plot(*(per_m * drift).T, label="drifts after a failure, without errors", **_DRIFT)
     ball = Circle((0.0, 0.0), per_m * safety.keep_out_m, label="keep-out ball", **_BALL)
     axes.add_patch(ball)
+    # The ball is a disc, and distances from it can be seen.
+    axes.set_aspect("equal", adjustable="datalim")
 
 
 @style()

@@ -24,7 +24,7 @@ from infoset.experiments.reachability.guarantee import (
     guarantee_lines,
     solve_guarantee,
 )
-from infoset.experiments.reachability.guarantee_figures import draw_guarantee
+from infoset.experiments.reachability.guarantee_figures import draw_guarantee, draw_planes
 from infoset.experiments.reachability.guarantee_flights import flown_problem, motion_of_flights
 from infoset.experiments.reachability.guarantee_page import guarantee_page
 from infoset.experiments.reachability.guarantee_report import COMMAND
@@ -588,6 +588,8 @@ def test_plan_without_measurements_names_what_it_does_not_prove() -> None:
     # Plans with some measurements are not proved to have safe drifts.
     (panel,) = draw_guarantee(report).axes
     assert panel.get_xlabel().startswith("time, ")
+    # The ball is a disc in planes of positions.
+    assert [axes.get_aspect() for axes in draw_planes(report).axes[:2]] == [1.0, 1.0]
 
 
 def test_guarantee_for_nonlinear_motion_is_greater(infoset: Command) -> None:
