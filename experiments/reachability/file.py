@@ -516,7 +516,12 @@ class Rendezvous:
         box = goal.position_box_m + (goal.velocity_box_m_s or (np.inf,) * 3)
         target = np.array(goal.position_m + goal.velocity_m_s)
         return with_errors(
-            self.problem, self.errors, target, np.array(box), all_act=self.couples_all_states
+            self.problem,
+            self.errors,
+            target,
+            np.array(box),
+            all_act=self.couples_all_states,
+            at_instants=self.path_limits is None,
         )
 
     @property

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from infoset.geometry.zonotope import Zonotope
-from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous._arrays import Floats, Places
 from infoset.rendezvous.reachability.line_of_sight import SightSensor
 from infoset.rendezvous.reachability.norm_limit import acting_controls, with_norm_limit
-from infoset.rendezvous.reachability.outputs import OutputProblem, PathRows
+from infoset.rendezvous.reachability.outputs import OutputProblem, PathRows, joined
 from infoset.rendezvous.reachability.problem import ReachabilityProblem, ThrustShape
 
 
@@ -50,6 +50,7 @@ def with_errors(
     box: Floats,
     *,
     all_act: bool = False,
+    at_instants: bool = True,
 ) -> OutputProblem:
     """Return a rendezvous with bounded errors.
 
@@ -58,6 +59,7 @@ def with_errors(
     Thrust in a ball is limited by the faces of a polytope inside it (`norm_faces`), in the plane of
     the controls that act in this problem. `all_act` is needed if a plan may use the others too: if
     errors or constraints are added later, or the independent parts are not planned apart.
+    `at_instants` is for `constraint_rows`.
     """
     periods = problem.periods
     output = np.eye(len(errors.measured), problem.states)
@@ -81,19 +83,36 @@ def with_errors(
         errors.execution,
         errors.relative if errors.relative.any() else None,
         np.tile(problem.control_bounds, (periods, 1)),
-        constraint_rows(problem, largest),
+        constraint_rows(problem, largest, at_instants=at_instants),
     )
     if problem.thrust is ThrustShape.BALL:
-        acting = np.arange(problem.controls) if all_act else acting_controls(whole)
+        acting = np.arange(problem.controls) if all_act else _acting(whole, problem.further[0])
         return with_norm_limit(whole, float(problem.control_bounds[0]), acting)
     return whole
 
 
-def constraint_rows(problem: ReachabilityProblem, execution: Floats) -> PathRows:
+def _acting(whole: OutputProblem, normals: Floats) -> Places:
+    """Return the controls that a plan may use, also if it keeps constraints at all times.
+
+    Constraints with these `normals`, shape (k, n), couple their states between impulses even if
+    `whole` has no row of them, as in the first period.
+    """
+    endless = np.full(len(normals), np.inf)
+    times = np.zeros(len(normals), dtype=np.int64)
+    still = np.zeros((len(normals), whole.controls))
+    coupled = PathRows(times, normals, still, -endless, endless)
+    return acting_controls(replace(whole, path=joined(whole.path, coupled)))
+
+
+def constraint_rows(
+    problem: ReachabilityProblem, execution: Floats, *, at_instants: bool = True
+) -> PathRows:
     """Return the constraints after the start, before and after impulses and between periods.
 
     States after a control have its error too, at most `execution`, shape (m,): the ends of their
-    constraints are less by its effect.
+    constraints are less by its effect. Without `at_instants` there are none on states after an
+    impulse and between periods: `plan_within` keeps them at all times, with smaller errors if these
+    are proportional to the controls.
     """
     normals, offsets = problem.further
     rows = np.vstack([np.eye(problem.states), normals])
@@ -111,9 +130,9 @@ def constraint_rows(problem: ReachabilityProblem, execution: Floats) -> PathRows
         blocks.append(PathRows(np.full(len(states), time), states, controls, *ends))
 
     for t in range(problem.periods):
-        if problem.jump is not None:
+        if problem.jump is not None and at_instants:
             add(t, rows, rows @ problem.jump)
-        if problem.between is not None:
+        if problem.between is not None and at_instants:
             for matrix in problem.between[t]:
                 inner = rows @ matrix
                 add(t, inner[:, : problem.states], inner[:, problem.states :])

@@ -24,6 +24,8 @@ _SPARES = (1e-7, 1e-6, 1e-5)
 errors must not break a constraint. The first one is ten times the usual error."""
 _MAX_CAP_ROUNDS = 12
 """Maximum number of programs for errors proportional to the controls; most end after five."""
+_MAX_CAP_HALVINGS = 8
+"""Maximum number of halvings of the first caps: down to 0.4 % of the limits. Chosen."""
 _CAP_GAIN = 1e-3
 """Relative decrease of the guarantee below which no further program is solved: it is less than the
 last printed digit."""
@@ -150,16 +152,18 @@ def affine_plan(problem: OutputProblem, window: int | None = None) -> AffinePlan
     directions.
 
     Errors proportional to the controls are bounded at caps of the controls, which are constraints.
-    The first caps are the limits; then the certified maxima of the controls are the caps of the
-    next program, until the guarantee stays. The guarantee holds in every round and does not
-    increase, but the caps may be a local optimum.
+    The first caps are the limits, or the largest of their halves, quarters, ... that have a plan;
+    then the certified maxima of the controls are the caps of the next program, until the guarantee
+    stays. The guarantee holds in every round and does not increase, but the caps may be a local
+    optimum.
 
     Constraints of the path enter the program when they are broken.
 
     Raises
     ------
     NoRobustPlanError
-        If no affine plan satisfies the constraints for all errors.
+        If no affine plan satisfies the constraints for all errors; with errors proportional to the
+        controls, if none was found.
     ValueError
         If errors are proportional to controls without limits.
     NoSolutionError
@@ -183,7 +187,7 @@ def best_with_rows(problem: OutputProblem, window: int | None, known: Flags) -> 
     if not np.isfinite(problem.limits).all():
         raise ValueError("errors proportional to the controls need limits of all controls")
 
-    found = plan_with_rows(replace(problem, caps=problem.limits), window, known)
+    found = _with_first_caps(problem, window, known)
     for _ in range(_MAX_CAP_ROUNDS - 1):
         smaller = replace(problem, caps=found.plan.control_ranges.largest)
         try:
@@ -198,6 +202,29 @@ def best_with_rows(problem: OutputProblem, window: int | None, known: Flags) -> 
         if gain <= _CAP_GAIN * found.plan.guarantee:
             return found
     return found
+
+
+def _with_first_caps(problem: OutputProblem, window: int | None, known: Flags) -> PlanWithRows:
+    """Return the plan at the largest caps, the limits or a power of 1/2 of them, that have one.
+
+    Smaller caps leave less room for the controls, but also smaller errors.
+    """
+    limits = problem.limits
+    try:
+        return plan_with_rows(replace(problem, caps=limits), window, known)
+    except NoRobustPlanError:
+        # Without a plan for smaller errors there is none at any caps.
+        plan_with_rows(replace(problem, relative_error=None), window, known)
+
+    for halvings in range(1, _MAX_CAP_HALVINGS + 1):
+        try:
+            return plan_with_rows(replace(problem, caps=0.5**halvings * limits), window, known)
+        except NoRobustPlanError:
+            continue
+    raise NoRobustPlanError(
+        "no plan with affine feedback was found that keeps the constraints for all errors; reduce "
+        "the errors, those proportional to the controls first, or relax the limits"
+    )
 
 
 def plan_at_caps(

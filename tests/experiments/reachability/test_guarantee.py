@@ -20,6 +20,7 @@ from infoset.experiments.reachability.command import Reach
 from infoset.experiments.reachability.file import Rendezvous
 from infoset.experiments.reachability.guarantee import (
     best_plan,
+    first_measurements,
     flight_lines,
     guarantee_lines,
     solve_guarantee,
@@ -41,6 +42,7 @@ from infoset.rendezvous.reachability import (
     acting_controls,
     affine_plan,
     drift_certificate,
+    fly_plan,
     linear_motion,
     safe_plan,
 )
@@ -301,9 +303,15 @@ SENSOR = "position_error_m = 3.0"
             [0, 1, 2],
         ),
         (SENSOR, "range_error_m = 3.0\nangle_error_deg = 0.5", [0, 1, 2]),
+        # A constraint of the first period only, on both x and z.
+        (
+            "[orbit]",
+            "[[keep_in]]\nnormals = [[1, 0, 1]]\noffsets_m = [0.0]\nuntil_period = 0\n[orbit]",
+            [0, 1, 2],
+        ),
     ],
 )
-def test_norm_of_thrust_is_in_space_if_plans_are_for_all_states_together(
+def test_norm_of_thrust_is_in_space_if_a_plan_may_use_all_controls(
     old: str, new: str, acting: list[int]
 ) -> None:
     text = problem_text(ARCH).replace(old, new, 1)
@@ -387,6 +395,24 @@ def test_errors_proportional_to_impulses_cost_guarantee(infoset: Command) -> Non
     # A strategy may avoid them: they are not in the bound.
     assert relative["bound"] == pytest.approx(exact["bound"], rel=1e-6)
     assert relative["flights"]["outside"] == 0
+
+
+@pytest.mark.parametrize(("limit_m_s", "relative"), [(2.0, 0.1), (30.0, 0.05)])
+def test_limits_that_are_not_used_cost_no_plan(limit_m_s: float, relative: float) -> None:
+    """Errors at the limits break the cone, and at 30 m/s the bound of the velocity too."""
+    settings = [
+        "periods=4",
+        f"execution_error.relative={relative}",
+        "bounds.velocity_m_s=1.5",
+        f"max_impulse_m_s={limit_m_s}",
+    ]
+    rendezvous = read_text(Rendezvous, problem_text("elliptic-guaranteed"), "leo", settings)
+    problem = first_measurements(rendezvous.output_problem, 0)
+
+    plan = best_plan(rendezvous, problem)
+
+    assert np.abs(plan.nominal).max() < 1.5
+    assert fly_plan(rendezvous.problem, plan, rendezvous.errors, 200, 1).outside == 0
 
 
 def test_last_impulse_with_constraints_on_it_has_no_number(infoset: Command) -> None:

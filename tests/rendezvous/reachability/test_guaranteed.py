@@ -366,6 +366,49 @@ def test_proportional_errors_without_limits_are_refused() -> None:
         affine_plan(problem)
 
 
+def half_as_much(lower: float, upper: float) -> OutputProblem:
+    """x(2) = u(0) + u(1) + errors of half of each, without outputs, to 10; limits of x(1)."""
+    problem = scalar(2, 0.0, 0.0, 0.0)
+    return replace(
+        problem,
+        output=np.zeros((2, 1, 1)),
+        noise=np.zeros((2, 1, 0)),
+        disturbance=None,
+        target=np.array([10.0]),
+        relative_error=np.array([0.5]),
+        control_limits=np.full((2, 1), 8.0),
+        path=PathRows(
+            np.array([1]), np.ones((1, 1)), np.zeros((1, 1)), np.array([lower]), np.array([upper])
+        ),
+    )
+
+
+def test_first_caps_are_those_of_a_plan() -> None:
+    # At the limits x(1) has an error of 4, too much for its interval of +-3. At half of them it has
+    # 2, so that u(0) = 1 and u(1) = 4; their own errors are 0.5 + 2, and 5 is missing.
+    problem = half_as_much(-3.0, 3.0)
+
+    plan = affine_plan(problem)
+
+    # Caps are kept, and constraints, with 1e-7 to spare.
+    assert plan.guarantee == pytest.approx(7.5, abs=1e-5)
+    assert plan.excess <= 0.0
+
+
+@pytest.mark.parametrize(
+    ("interval", "message"),
+    [
+        # u(0) = 5 has an error of 2.5: no caps are small enough for an error of 0.25.
+        ((5.0, 5.5), "no plan with affine feedback was found that keeps"),
+        # Beyond the limits, also without errors.
+        ((9.0, 20.0), "no plan with affine feedback keeps"),
+    ],
+)
+def test_refusal_says_whether_no_plan_exists(interval: tuple[float, float], message: str) -> None:
+    with pytest.raises(NoRobustPlanError, match=message):
+        affine_plan(half_as_much(*interval))
+
+
 def slow(speed: float) -> OutputProblem:
     """The rendezvous with a limit of the velocities before each impulse but the first."""
     times = np.repeat(np.arange(1, 10), 2)
