@@ -116,10 +116,11 @@ class GuaranteeReport:
 
     @property
     def thrust_faces(self) -> NormFaces | None:
-        """The faces that replace a limit of thrust in norm; None for a limit of each axis."""
+        """The faces that replace a limit of thrust in norm; None if it is one of each axis."""
         if self.rendezvous.thrust is ThrustShape.BOX:
             return None
-        return norm_faces(len(acting_controls(self.rendezvous.output_problem)))
+        acting = acting_controls(self.rendezvous.output_problem)
+        return norm_faces(len(acting)) if len(acting) > 1 else None
 
     def tube(self, time: int, states: list[int]) -> Floats:
         """Return points in a plane whose hull are two states at a time for all errors, (k, 2).
@@ -463,7 +464,9 @@ def _best_answer(rendezvous: Rendezvous, plan: AffinePlan) -> tuple[float | None
         except NoRobustPlanError as error:
             return None, str(error)
         else:
-            return max((answer.guarantee for answer in answers), default=0.0), None
+            # The affine plan is one of the answers, and may be outside the limits of a box.
+            found = max((answer.guarantee for answer in answers), default=0.0)
+            return min(found, plan.guarantee), None
     return None, refusal
 
 

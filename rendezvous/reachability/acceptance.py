@@ -1,4 +1,4 @@
-"""What a plan of the rest of a flight must prove beyond the constraints of its problem.
+"""What plans of the remaining periods must prove beyond the constraints of their problem.
 
 Theorem 6 of `docs/guaranteed-rendezvous.md` keeps the plan before if a new one does not prove it.
 The rows of a safe plan, and of one that keeps constraints between impulses, are those of some
@@ -22,23 +22,23 @@ from infoset.rendezvous.reachability.within_periods import PathLimits
 
 
 def keeps_drifts(certificate: DriftCertificate, keep_out_m: float) -> Acceptance:
-    """Return whether all drifts of a plan of the rest stay outside a ball about the target.
+    """Return the condition that all drifts of a new plan stay outside a ball about the target.
 
     The engines may fail after the same impulses as in the `certificate` of the plan before the
     flight, whose directions are tried first. After the last of them every plan is accepted.
     """
     coasting = certificate.tube.coasting
-    rests = [_rest_of(coasting, time) for time in range(coasting.impulses)]
+    later = [_later_coasts(coasting, time) for time in range(coasting.impulses)]
 
     def accepts(plan: AffinePlan, time: int) -> bool:
-        if time >= len(rests):
+        if time >= len(later):
             return True
         normals = certificate.normals[time:]
         try:
-            distances = rests[time].tube(plan).certain_distances(normals)
+            distances = later[time].tube(plan).certain_distances(normals)
             if distances.min() >= keep_out_m:
                 return True
-            renewed = drift_certificate(plan, rests[time], normals)
+            renewed = drift_certificate(plan, later[time], normals)
         except UnboundedCoastError:
             return False
         return renewed.least_distance >= keep_out_m
@@ -47,16 +47,16 @@ def keeps_drifts(certificate: DriftCertificate, keep_out_m: float) -> Acceptance
 
 
 def keeps_distances(found: NonlinearPlan, coasting: Coasting) -> Acceptance:
-    """Return whether a plan of the rest stays within the distances that were assumed for gravity.
+    """Return the condition that a new plan stays within the distances assumed for gravity.
 
     `found` is the plan before the flight, and `coasting` that of `nonlinear_plan`.
     """
     periods = len(found.assumed)
     flight = replace(coasting, impulses=periods, periods=1, semi_major_axis_m=None)
-    rests = [_rest_of(flight, time) for time in range(periods)]
+    later = [_later_coasts(flight, time) for time in range(periods)]
 
     def accepts(plan: AffinePlan, time: int) -> bool:
-        rest = rests[time]
+        rest = later[time]
         accelerations = coasting.acceleration_m_s2 + found.accelerations[time:, None]
         tube = rest.tube_under(plan, np.broadcast_to(accelerations, rest.starts_s.shape))
         # As before the flight, a smaller bound excludes a first exit.
@@ -66,21 +66,23 @@ def keeps_distances(found: NonlinearPlan, coasting: Coasting) -> Acceptance:
 
 
 def keeps_limits(limits: PathLimits, part: ProblemPart) -> Acceptance:
-    """Return whether a plan of the rest of a part keeps constraints at all times between impulses.
+    """Return the condition that a new plan of a part keeps constraints between impulses.
 
     Each constraint that acts on the states of the part acts on no other part.
     """
     periods = limits.flight.impulses
     acting = limits.normals[:, part.states].any(axis=1)
-    rests = [
+    later = [
         PathLimits(
-            _rest_of(limits.flight, time), limits.normals[acting], limits.offsets[time:, acting]
+            _later_coasts(limits.flight, time),
+            limits.normals[acting],
+            limits.offsets[time:, acting],
         )
         for time in range(periods)
     ]
 
     def accepts(plan: AffinePlan, time: int) -> bool:
-        rest = rests[time]
+        rest = later[time]
         try:
             tube = rest.flight.tube(plan, part)
         except UnboundedCoastError:
@@ -90,9 +92,9 @@ def keeps_limits(limits: PathLimits, part: ProblemPart) -> Acceptance:
     return accepts
 
 
-def _rest_of(coasting: Coasting, time: int) -> Coasting:
-    """Return the coasts after the impulses from a period on, which is the first one of the rest."""
+def _later_coasts(coasting: Coasting, time: int) -> Coasting:
+    """Return the coasts after the impulses from a period on."""
     orbit = coasting.orbit
     anomaly = float(orbit.true_anomaly(coasting.period_s * time))
-    later = replace(orbit, true_anomaly_rad=anomaly)
-    return replace(coasting, orbit=later, impulses=coasting.impulses - time)
+    turned = replace(orbit, true_anomaly_rad=anomaly)
+    return replace(coasting, orbit=turned, impulses=coasting.impulses - time)

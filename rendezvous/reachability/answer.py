@@ -52,6 +52,12 @@ terms over all errors: rounding."""
 class LateConstraintError(ValueError):
     """A constraint of the path depends on a last control that answers all outputs."""
 
+    def __init__(self) -> None:
+        super().__init__(
+            "constraints of the path depend on the last control, and do not follow from its limits "
+            "and the guarantee"
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Multipliers:
@@ -234,10 +240,7 @@ def answered_plan(problem: OutputProblem, window: int | None = None) -> Answered
         if broken.any():
             continue
         if not _follow(found, rows.chosen(late)):
-            raise LateConstraintError(
-                "constraints of the path depend on the last control, and do not follow from its "
-                "limits and the guarantee"
-            )
+            raise LateConstraintError
         return found
     raise NoSolutionError("the solver's plan breaks constraints, also with a margin of 1e-5")
 

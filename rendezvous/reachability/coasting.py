@@ -21,9 +21,9 @@ from infoset.rendezvous.relative_motion.linear_motion import HeldSegment
 
 _MAX_RADIUS_ROUNDS = 60
 """Maximum number of assumed distances: they grow by 2 % at least, thus by a factor of three."""
-_RADIUS_RESERVE = 1.02
-"""Factor of an assumed distance beside the one that was found last: some reserve is needed, because
-the acceleration grows with the assumed distance."""
+RADIUS_RESERVE = 1.02
+"""Ratio of the next assumed distance to the one that was found last: it is above 1 because the
+acceleration of gravity, and so the plan and its distances, change with it. Chosen."""
 
 
 class UnboundedCoastError(ArithmeticError):
@@ -149,7 +149,7 @@ class Coasting:
         if self.semi_major_axis_m is None:
             return tube
 
-        assumed = _RADIUS_RESERVE * tube.radii
+        assumed = RADIUS_RESERVE * tube.radii
         for _ in range(_MAX_RADIUS_ROUNDS):
             accelerations = known + self.remainder(assumed)
             if not np.isfinite(accelerations).all():
@@ -158,7 +158,7 @@ class Coasting:
             # A bound that is smaller than the assumed one excludes a first exit.
             if (tube.radii < assumed).all():
                 return tube
-            assumed = _RADIUS_RESERVE * np.maximum(assumed, tube.radii)
+            assumed = RADIUS_RESERVE * np.maximum(assumed, tube.radii)
         raise UnboundedCoastError(
             "nonlinear motion without control is not proved to stay near the target; reduce the "
             "errors or the number of periods without control"

@@ -17,6 +17,8 @@ from infoset.rendezvous._arrays import Flags, Floats
 from infoset.rendezvous.reachability.coasting import Coasting, CoastTube
 from infoset.rendezvous.reachability.conic import NoSolutionError
 from infoset.rendezvous.reachability.guaranteed import (
+    MAX_ROUNDS,
+    MIN_GAIN,
     NoRobustPlanError,
     PlanVariables,
     PlanWithRows,
@@ -37,13 +39,8 @@ from infoset.rendezvous.reachability.sparse_program import (
 
 _NORMAL_STEPS = 60
 """Steps towards the nearest point of a set; the last ones change a distance by less than 1 %."""
-_MAX_ROUNDS = 12
-"""Maximum number of renewals of the normals; most plans end after three."""
 _MAX_CHECKS = 40
 """Maximum number of programs with the same normals: each one has more rows, or larger caps."""
-_GAIN = 1e-3
-"""Relative decrease of the guarantee below which the normals are not renewed, as for the caps of
-errors proportional to the controls; also that of a violation, relative to the keep-out distance."""
 _SPARE = 1e-6
 """Margin of the constraints in the program of the least violation, relative to their sizes."""
 _CAP_RESERVE = 1e-3
@@ -212,14 +209,14 @@ class _Search(NamedTuple):
     problem: OutputProblem
     safety: PassiveSafety
     window: int | None
-    on_program: Callable[[], None]
+    after_program: Callable[[], None]
 
 
 def safe_plan(
     problem: OutputProblem,
     safety: PassiveSafety,
     window: int | None = None,
-    on_program: Callable[[], None] = lambda: None,
+    after_program: Callable[[], None] = lambda: None,
 ) -> DriftCertificate:
     """Return the affine plan with the smallest guarantee that was found with safe drifts.
 
@@ -227,7 +224,7 @@ def safe_plan(
     and impulses in m/s. The plan's problem has the constraints of the drifts as further rows of the
     path. The normals of the constraints are those of the plan without safety at first, and are then
     renewed until the guarantee stays: the plan is a local optimum. Its distances are certificates.
-    `on_program` is called after each plan with constraints on drifts.
+    `after_program` is called after each plan with constraints on drifts.
 
     Raises
     ------
@@ -242,17 +239,17 @@ def safe_plan(
     if certificate.least_distance >= safety.keep_out_m:
         return certificate
 
-    search = _Search(problem, safety, window, on_program)
+    search = _Search(problem, safety, window, after_program)
     found = _first_safe(search, best._replace(plan=free))
-    for _ in range(_MAX_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         guarantee = found.certificate.plan.guarantee
-        if guarantee <= (1.0 + _GAIN) * free.guarantee:
+        if guarantee <= (1.0 + MIN_GAIN) * free.guarantee:
             break
         better = _safe_with(search, found)
         if better is None or better.certificate.plan.guarantee >= guarantee:
             break
         found = better
-        if guarantee - found.certificate.plan.guarantee <= _GAIN * guarantee:
+        if guarantee - found.certificate.plan.guarantee <= MIN_GAIN * guarantee:
             break
     return found.certificate
 
@@ -293,14 +290,14 @@ def _first_safe(search: _Search, free: PlanWithRows) -> _SafePlan:
         certificate = drift_certificate(start, safety.coasting)
         found = _SafePlan(certificate, np.zeros(certificate.distances.shape, dtype=bool), path)
         farthest = _farther(farthest, certificate)
-        for _ in range(_MAX_ROUNDS):
+        for _ in range(MAX_ROUNDS):
             safe = _safe_with(search, found)
             if safe is not None:
                 return safe
             least = found.certificate.distances.min()
             found = _least_violation(search, found)
             farthest = _farther(farthest, found.certificate)
-            if found.certificate.distances.min() <= least + _GAIN * safety.keep_out_m:
+            if found.certificate.distances.min() <= least + MIN_GAIN * safety.keep_out_m:
                 break
     raise UnsafeDriftsError(farthest, safety.keep_out_m)
 
@@ -334,7 +331,7 @@ def _safe_with(search: _Search, found: _SafePlan) -> _SafePlan | None:
             plan, entered = plan_with_rows(limited, search.window, known)
         except (NoRobustPlanError, NoSolutionError):
             return best
-        search.on_program()
+        search.after_program()
         path = entered[: len(path)]
         own = _at_own_caps(plan)
         tube = safety.coasting.tube(own)
@@ -346,7 +343,7 @@ def _safe_with(search: _Search, found: _SafePlan) -> _SafePlan | None:
             sagittas = np.maximum(sagittas, tube.sagittas)
             continue
 
-        if best is not None and own.guarantee >= (1.0 - _GAIN) * best.certificate.plan.guarantee:
+        if best is not None and own.guarantee >= (1.0 - MIN_GAIN) * best.certificate.plan.guarantee:
             return best
         certificate = drift_certificate(own, safety.coasting, normals)
         best = _SafePlan(certificate, intervals, path)
@@ -410,13 +407,13 @@ def _least_violation(search: _Search, found: _SafePlan) -> _SafePlan:
         plan, path = _plan_of_least_violation(
             limited, rows, search.window, path, -_AHEAD * safety.keep_out_m
         )
-        search.on_program()
+        search.after_program()
         violation = float((rows.lower - plan.ranges_of(rows).lower).max())
         tube = safety.coasting.tube(plan)
         distances = tube.certain_distances(certificate.normals)
         distances = distances + tube.sagittas - known.sagittas
         reached = min(aim, safety.keep_out_m - violation)
-        new = _lowest(distances, reached - _GAIN * safety.keep_out_m) & ~intervals
+        new = _lowest(distances, reached - MIN_GAIN * safety.keep_out_m) & ~intervals
         if not new.any():
             renewed = drift_certificate(plan, safety.coasting, certificate.normals)
             return _SafePlan(renewed, intervals, path)

@@ -22,13 +22,13 @@ from infoset.rendezvous.reachability.sparse_program import (
 _SPARES = (1e-7, 1e-6, 1e-5)
 """Margins of the constraints in the program, relative to their sizes, tried in turn: the solver's
 errors must not break a constraint. The first one is ten times the usual error."""
-_MAX_CAP_ROUNDS = 12
-"""Maximum number of programs for errors proportional to the controls; most end after five."""
+MAX_ROUNDS = 12
+"""Maximum number of rounds of a local search: of caps, normals or lines of sight. Most end after
+three to five."""
+MIN_GAIN = 1e-3
+"""Relative decrease of the guarantee in a round below which a local search ends. Chosen."""
 _MAX_CAP_HALVINGS = 8
 """Maximum number of halvings of the first caps: down to 0.4 % of the limits. Chosen."""
-_CAP_GAIN = 1e-3
-"""Relative decrease of the guarantee below which no further program is solved: it is less than the
-last printed digit."""
 
 
 class NoRobustPlanError(ValueError):
@@ -188,7 +188,7 @@ def best_with_rows(problem: OutputProblem, window: int | None, known: Flags) -> 
         raise ValueError("errors proportional to the controls need limits of all controls")
 
     found = _with_first_caps(problem, window, known)
-    for _ in range(_MAX_CAP_ROUNDS - 1):
+    for _ in range(MAX_ROUNDS - 1):
         smaller = replace(problem, caps=found.plan.control_ranges.largest)
         try:
             better = plan_with_rows(smaller, window, found.entered)
@@ -199,7 +199,7 @@ def best_with_rows(problem: OutputProblem, window: int | None, known: Flags) -> 
         if gain <= 0.0:
             return found
         found = better
-        if gain <= _CAP_GAIN * found.plan.guarantee:
+        if gain <= MIN_GAIN * found.plan.guarantee:
             return found
     return found
 

@@ -3,7 +3,7 @@
 If the norm of the goal is a maximum over parts that share no error, no control and no constraint,
 the best guarantee of the whole is the largest one of the parts: a strategy may use the strategies
 of the parts, and the errors of one part show nothing about another one. The programs of parts are
-smaller, and each part has a guarantee of its own.
+smaller, and each part has its guarantee.
 """
 
 from __future__ import annotations

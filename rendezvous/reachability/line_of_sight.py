@@ -13,7 +13,12 @@ import numpy as np
 
 from infoset.rendezvous._arrays import Flags, Floats
 from infoset.rendezvous.reachability.conic import NoSolutionError
-from infoset.rendezvous.reachability.guaranteed import NoRobustPlanError, affine_plan
+from infoset.rendezvous.reachability.guaranteed import (
+    MAX_ROUNDS,
+    MIN_GAIN,
+    NoRobustPlanError,
+    affine_plan,
+)
 from infoset.rendezvous.reachability.guided import Cuts, LinearTruth
 from infoset.rendezvous.reachability.independent_parts import independent_parts, plan_of_parts
 from infoset.rendezvous.reachability.outputs import AffinePlan, OutputProblem, PathRows, joined
@@ -21,10 +26,6 @@ from infoset.rendezvous.reachability.outputs import AffinePlan, OutputProblem, P
 _CONE_FACES = 8
 """Half-spaces that replace the cone about a measured direction in space: the edges of the pyramid
 are 8.2 % farther from its axis than the cone."""
-_MAX_ROUNDS = 12
-"""Maximum number of programs, as for errors proportional to the controls."""
-_GAIN = 1e-3
-"""Relative decrease of the guarantee below which no further program is solved."""
 
 
 class SightRows(NamedTuple):
@@ -210,7 +211,7 @@ def sighted_plan(
     first = plan_of_parts(free, parts)
     sight = sight_of(first, size)
     best = solve(sighted(blind, sensor, sight, first))
-    for _ in range(_MAX_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         renewed = sight_of(best, size)
         found = _smaller(best, sighted(blind, sensor, renewed, best), solve)
         if found is None:
@@ -222,7 +223,7 @@ def sighted_plan(
         gain = best.guarantee - found.guarantee
         best = found
         sight = renewed
-        if gain <= _GAIN * best.guarantee:
+        if gain <= MIN_GAIN * best.guarantee:
             return best
     return best
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from infoset.rendezvous._arrays import Floats
-from infoset.rendezvous.reachability.coasting import Coasting, UnboundedCoastError
+from infoset.rendezvous.reachability.coasting import RADIUS_RESERVE, Coasting, UnboundedCoastError
 from infoset.rendezvous.reachability.guaranteed import affine_plan
 from infoset.rendezvous.reachability.outputs import AffinePlan, OutputProblem
 from infoset.rendezvous.relative_motion import TschaunerHempel
@@ -21,9 +21,6 @@ _PANELS = 16
 is 0.2 % too large for straight motion."""
 _MAX_ROUNDS = 8
 """Maximum number of rounds, each with larger assumed distances; most plans end after one or two."""
-_RADIUS_RESERVE = 1.02
-"""Ratio of the assumed distances of a round to the distances that the round before found. It is
-above 1 because the plan of the next round has other distances. Chosen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +72,7 @@ def nonlinear_plan(
     flight = replace(coasting, impulses=problem.periods, periods=1, semi_major_axis_m=None)
     gravity = replace(coasting, impulses=problem.periods, periods=1)
 
-    assumed = _RADIUS_RESERVE * flight.tube(solve(problem)).radii.max(axis=1)
+    assumed = RADIUS_RESERVE * flight.tube(solve(problem)).radii.max(axis=1)
     for _ in range(_MAX_ROUNDS):
         distances = np.broadcast_to(assumed[:, None], gravity.starts_s.shape)
         remainder = gravity.remainder(distances).max(axis=1)
@@ -88,7 +85,7 @@ def nonlinear_plan(
         # A bound that is smaller than the assumed one excludes a first exit.
         if (radii < assumed).all():
             return NonlinearPlan(plan, assumed, radii, remainder)
-        assumed = _RADIUS_RESERVE * np.maximum(assumed, radii)
+        assumed = RADIUS_RESERVE * np.maximum(assumed, radii)
     raise UnboundedCoastError(
         "nonlinear motion is not proved to stay near the target; reduce the errors or the distance"
     )

@@ -181,10 +181,7 @@ def answers_within(
             last = np.minimum(last, limits.excess(backward)[-1])
         if (last <= 0.0).all():
             return answers
-        raise LateConstraintError(
-            "constraints of the path depend on the last control, and do not follow from its "
-            "limits and the guarantee"
-        )
+        raise LateConstraintError
     raise NoSolutionError("the plans break constraints between impulses")
 
 

@@ -268,6 +268,33 @@ def test_thrust_in_norm_keeps_its_limit_and_tells_its_loss(infoset: Command) -> 
     assert told in out
 
 
+def test_answer_guarantees_no_more_than_the_affine_plan_with_an_active_norm(
+    infoset: Command,
+) -> None:
+    # The best answer in a box inside the polygon is worse than the affine reaction.
+    options = ("--set", 'thrust="ball"', "--set", "periods=4", "--set", "max_impulse_m_s=0.4")
+    found = infoset.json("reach", ARCH, *options, "--flights", "0")
+
+    assert found["bound"] <= found["answered"] <= found["affine"]
+
+
+@pytest.mark.parametrize("away_m", [0.0, 100.0])
+def test_norm_of_one_control_is_its_limit(infoset: Command, away_m: float) -> None:
+    settings = (
+        'thrust="ball"',
+        "periods=2",
+        "max_impulse_m_s=0.5",
+        f"initial.position_m=[0, 0, {away_m}]",
+        "initial_error.position_m=0",
+        "initial_error.velocity_m_s=0",
+        "execution_error.absolute_m_s=0",
+    )
+    arguments = ("reach", ARCH, *(f"--set={each}" for each in settings), "--flights", "0")
+
+    assert infoset.json(*arguments)["thrust_loss"] is None
+    assert "thrust in norm" not in infoset(*arguments)[1]
+
+
 def test_thrust_in_norm_is_kept_if_only_drifts_act_along_an_axis(infoset: Command) -> None:
     settings = (
         'thrust="ball"',

@@ -80,7 +80,7 @@ def safe() -> DriftCertificate:
 def test_coasts_of_the_rest_are_those_of_the_whole_flight() -> None:
     whole = Coasting(orbit_of(0.5), PERIOD_S, PERIODS, 3)
 
-    rest = acceptance._rest_of(whole, 2)
+    rest = acceptance._later_coasts(whole, 2)
 
     assert rest.impulses == 2
     # The anomaly is rounded by 1e-16, and positions of 720 s are up to 1e3 times a velocity.

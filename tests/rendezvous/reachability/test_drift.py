@@ -253,10 +253,10 @@ def test_bounds_that_no_flight_reaches_need_no_programs() -> None:
     for path in (None, wide):
         programs.append(0)
 
-        def on_program() -> None:
+        def after_program() -> None:
             programs[-1] += 1
 
-        found = safe_plan(replace(problem, path=path), safety, 3, on_program)
+        found = safe_plan(replace(problem, path=path), safety, 3, after_program)
         assert found.plan.guarantee == pytest.approx(leo_certificate().plan.guarantee, rel=1e-12)
 
     assert programs[0] == programs[1] > 0
