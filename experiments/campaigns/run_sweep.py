@@ -46,12 +46,11 @@ def run(options: Options) -> None:
         if options.runs == NEEDED:
             options = replace(options, runs=needed_runs(options, required))
         runs = _runs(options, required)
-        most = runs
-        option = "--runs"
+        noises = noises_at_once(options)
         if isinstance(runs, RunsUntil):
-            most = runs.max_runs
-            option = "--max-runs"
-        notes += needed_notes(required, most // noises_at_once(options), option)
+            notes += needed_notes(required, runs.max_runs // noises, "--max-runs")
+        else:
+            notes += needed_notes(required, runs // noises)
         swept = Campaign(
             scenario,
             runs,

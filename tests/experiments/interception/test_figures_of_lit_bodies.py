@@ -10,6 +10,7 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
+from infoset.arrays import Floats
 from infoset.experiments import load_scenario
 from infoset.experiments.interception.figures.process import draw_process
 from infoset.experiments.interception.figures.sets import draw_sets, planes_at
@@ -33,9 +34,9 @@ def offset_m(record: Record) -> tuple[float, ...]:
     return sensor.offset_m
 
 
-def errors_urad(axes: Axes) -> list[float]:
+def errors_urad(axes: Axes) -> Floats:
     (dots,) = (line for line in axes.lines if line.get_label() == "error of the measured angle")
-    return np.asarray(dots.get_ydata(), dtype=np.float64).tolist()
+    return np.asarray(dots.get_ydata(), dtype=np.float64)
 
 
 def test_drawn_errors_are_about_the_point_that_the_images_show(record: Record) -> None:
