@@ -60,7 +60,7 @@ def relative_state(origin: Floats, craft: Floats) -> Floats:
     """The state of a craft in Hill's axes, (6,), of an orbit in the plane: `active` inverted."""
     zero = active(origin, np.zeros(6))
     columns = [(active(origin, unit) - zero).ravel() for unit in np.eye(6)]
-    return np.linalg.solve(np.column_stack(columns), (craft - zero).ravel())
+    return np.asarray(np.linalg.solve(np.column_stack(columns), (craft - zero).ravel()))
 
 
 def tilted() -> Floats:
