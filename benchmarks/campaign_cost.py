@@ -60,7 +60,8 @@ def main() -> None:
             model = scenario.set_model
             by_sections = [
                 campaign_s(
-                    replace(scenario, **of_model(replace(model, sections=count))), 64 * BATCHES
+                    replace(scenario, **of_model(replace(model, sections=count), scenario)),
+                    64 * BATCHES,
                 )
                 / (64 * BATCHES)
                 for count in SECTIONS

@@ -142,7 +142,7 @@ def great_flights(
 def guaranteed(scenario: Scenario, strategy: str) -> Scenario:
     """Return the scenario with the guaranteed model and a strategy."""
     model = replace(scenario.set_model, model=Model.GUARANTEED, initial_set=InitialSet.BOX)
-    return replace(scenario, **of_model(model), strategy=strategy)
+    return replace(scenario, **of_model(model, scenario), strategy=strategy)
 
 
 def main() -> None:

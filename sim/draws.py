@@ -12,7 +12,7 @@ import numpy as np
 from infoset.arrays import Flags, Floats, Integers
 from infoset.guidance import NoiseKind, TieRule
 from infoset.guidance.gaussian_noise import correlated_uniform
-from infoset.sensors import Camera, Sensor
+from infoset.sensors import Camera, RangeSensor, Sensor
 from infoset.sim.covariance import Covariance
 from infoset.sim.gravity import max_impulses_m_s, with_gravity
 from infoset.sim.scenario import Scenario, corners
@@ -195,9 +195,10 @@ def _wrong_images(scenario: Scenario, runs: Sequence[int], seed: int, steps: int
 def _wrong_ranges(scenario: Scenario, runs: Sequence[int], seed: int, steps: int) -> Floats | None:
     """Return the errors of wrong ranges, shape (B, steps); None without any."""
     wrong = scenario.wrong_ranges
-    if wrong is None or wrong.number == 0 or scenario.range_sensor is None:
+    sensor = scenario.sensors.get(RangeSensor.name)
+    if wrong is None or wrong.number == 0 or sensor is None:
         return None
-    before_s = _before_arrival_s(scenario, scenario.range_sensor, steps)
+    before_s = _before_arrival_s(scenario, sensor, steps)
     return np.asarray(_wrong_measurements(wrong, before_s, 1, runs, seed, WRONG_RANGES)[0])
 
 

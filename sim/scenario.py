@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from enum import Enum
 from functools import cached_property
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from infoset.limits import (
     check_fields,
     shown,
 )
-from infoset.model import SetModel, SetSettings, StateBox, check_period
+from infoset.model import SetModel, SetSettings, StateBox, check_period, steps_of_period
 from infoset.sensors import (
     AngleSensor,
     BearingSensor,
@@ -43,6 +43,8 @@ from infoset.sim.body import Body
 from infoset.sim.covariance import Covariance
 from infoset.sim.wrong_images import WrongImages, WrongRanges
 
+_OfFile = TypeVar("_OfFile", bound=AngleSensor | Camera | RangeSensor | RateSensor)
+"""A sensor of a scenario file."""
 LIGHT_M_S = 299_792_458.0
 """Speed of light, m/s: exact, by the definition of the metre."""
 
@@ -242,8 +244,9 @@ class Scenario:
     def __post_init__(self) -> None:
         check_fields(self)
         self._check_body()
-        for sensor in self.sensors.values():
-            check_period(sensor, self.step_s)
+        for sensor in (self._asked_bearing_sensor, self.range_sensor, self.rate_sensor):
+            if sensor is not None:
+                check_period(sensor, self.step_s)
         self._check_axes()
         self._check_covariance()
         # Properties that raise ValueError: if a burn may be longer than a step, if the thruster can
@@ -351,15 +354,11 @@ class Scenario:
         """Knowledge and assumptions on board, without gravity and the errors of the engine
         (`infoset.sim.gravity`).
         """
-        step_s = self.fitted_step_s
-        sensor = self.bearing_sensor
-        if step_s != self.step_s:
-            sensor = replace(sensor, period_s=sensor.period_s / self.step_s * step_s)
         return SetModel(
             closing_speed_m_s=self.closing_speed_m_s,
-            step_s=step_s,
+            step_s=self.fitted_step_s,
             bounds=self.uncertainty,
-            angle_sensor=sensor,
+            angle_sensor=self.bearing_sensor,
             aim_m=None if self.body is None else self.body.aim_m,
             **vars(self.information_set),
         )
@@ -415,24 +414,29 @@ class Scenario:
                 "the deviations"
             )
 
+    @property
+    def _asked_bearing_sensor(self) -> AngleSensor | Camera:
+        """The sensor of the line-of-sight angles as in the file."""
+        given = [sensor for sensor in (self.angle_sensor, self.camera) if sensor is not None]
+        if len(given) != 1:
+            raise ValueError(
+                "Scenario: must have one sensor of angles, the table angle_sensor, whose error "
+                "bound is linear in the range, or the table camera: got "
+                f"{'both' if given else 'neither'}"
+            )
+        return given[0]
+
     @cached_property
     def bearing_sensor(self) -> BearingSensor:
-        """The sensor of the line-of-sight angles; with a phase angle it has the offset of the
-        images.
+        """The sensor of the line-of-sight angles of flights, with `fitted_step_s`; with a phase
+        angle it has the offset of the images.
 
         Raises
         ------
         ValueError
             If the scenario has none, or two, or if a phase angle does not fit the scenario.
         """
-        fitted = [sensor for sensor in (self.angle_sensor, self.camera) if sensor is not None]
-        if len(fitted) != 1:
-            raise ValueError(
-                "Scenario: must have one sensor of angles, the table angle_sensor, whose error "
-                "bound is linear in the range, or the table camera: got "
-                f"{'both' if fitted else 'neither'}"
-            )
-        sensor = fitted[0]
+        sensor = self._fitted(self._asked_bearing_sensor)
         if not isinstance(sensor, Camera) or sensor.phase_angle_rad is None:
             return sensor
         values = {field.name: getattr(sensor, field.name) for field in fields(Camera)}
@@ -476,7 +480,7 @@ class Scenario:
         If the scenario has times before the nominal arrival, the arrival is a whole number of these
         steps after the start, so that the times are exact; otherwise it is `step_s`.
         """
-        has_times = self.thruster.has_times or self.bearing_sensor.has_times
+        has_times = self.thruster.has_times or self._asked_bearing_sensor.has_times
         if not has_times:
             return self.step_s
         return fitted_step_s(self.nominal_arrival_s, self.step_s)
@@ -526,9 +530,24 @@ class Scenario:
 
     @property
     def sensors(self) -> dict[str, Sensor]:
-        """Sensors on board by name, in the order in which a step applies their measurements."""
-        fitted = (self.range_sensor, self.bearing_sensor, self.rate_sensor)
-        return {sensor.name: sensor for sensor in fitted if sensor is not None}
+        """Sensors of flights by name, in the order in which a step applies their measurements.
+
+        Their periods are whole numbers of `fitted_step_s`.
+        """
+        sensors: dict[str, Sensor] = {}
+        if self.range_sensor is not None:
+            sensors[RangeSensor.name] = self._fitted(self.range_sensor)
+        sensors[BearingSensor.name] = self.bearing_sensor
+        if self.rate_sensor is not None:
+            sensors[RateSensor.name] = self._fitted(self.rate_sensor)
+        return sensors
+
+    def _fitted(self, sensor: _OfFile) -> _OfFile:
+        """Return a sensor of the file whose period has as many steps of flights as asked steps."""
+        if self.fitted_step_s == self.step_s:
+            return sensor
+        steps = steps_of_period(sensor.period_s, self.step_s)
+        return replace(sensor, period_s=steps * self.fitted_step_s)
 
 
 def corners(box: StateBox) -> tuple[Floats, Floats]:
@@ -541,18 +560,30 @@ def corners(box: StateBox) -> tuple[Floats, Floats]:
     return intervals[:, 0], intervals[:, 1]
 
 
-def of_model(model: SetModel) -> dict[str, Any]:
+def of_model(model: SetModel, asked: Scenario | None = None) -> dict[str, Any]:
     """Return the fields of a scenario with a set model: ``replace(scenario, **of_model(model))``.
 
     They do not contain the bounds of gravity and of the engine's errors, which follow from the
     scenario.
+
+    Parameters
+    ----------
+    model : SetModel
+        The set model.
+    asked : Scenario or None
+        Scenario whose asked step the fields keep if the model has its `fitted_step_s`, so that its
+        other sensors fit them. None: the step is that of the model.
     """
+    step_s = model.step_s
     sensor = model.angle_sensor
+    if asked is not None and asked.fitted_step_s == step_s != asked.step_s:
+        step_s = asked.step_s
+        sensor = replace(sensor, period_s=model.steps_in(sensor.period_s) * step_s)
     if isinstance(sensor, OffsetCamera):
         sensor = sensor.of_file
     return {
         "closing_speed_m_s": model.closing_speed_m_s,
-        "step_s": model.step_s,
+        "step_s": step_s,
         "uncertainty": model.bounds,
         "angle_sensor": sensor if isinstance(sensor, AngleSensor) else None,
         "camera": sensor if isinstance(sensor, Camera) else None,

@@ -153,10 +153,10 @@ def test_maximum_impulse_that_is_not_given_follows_the_thrust_and_the_step(
     engine = replace(mission.thruster, max_impulse_m_s=MAXIMUM, **THRUST)
     scenario = replace(mission, thruster=engine)
     assert mission.camera is not None
-    shorter = {"step_s": 45.0, "camera": replace(mission.camera, period_s=45.0)}
+    camera = replace(mission.camera, period_s=45.0)
     cases = {
         0.02 * 90.0: scenario,
-        0.02 * 45.0: replace(scenario, **shorter),
+        0.02 * 45.0: replace(scenario, step_s=45.0, camera=camera),
         0.04 * 90.0: replace(scenario, thruster=replace(scenario.thruster, thrust_N=20.0)),
         0.02 * 89.82: replace(scenario, nominal_range_m=0.998 * scenario.nominal_range_m),
     }

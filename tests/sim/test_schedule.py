@@ -173,11 +173,24 @@ def test_step_is_the_asked_one_without_times_or_with_a_whole_number_of_steps(
     assert changed(whole, {}, cut_off).set_model.step_s == 0.5
 
 
+def test_scenario_of_its_own_set_model_is_the_same() -> None:
+    """Flights have 197 steps until the arrival; ranges are measured every ten."""
+    settings = ["step_s=0.5065", "angle_sensor.period_s=0.5065", "range_sensor.period_s=5.065"]
+    scenario = load_scenario("own-scenario", [*settings, "thruster.last_impulse_s=15"])
+    assert scenario.fitted_step_s == pytest.approx(5801.3 / 58.0 / 197)
+    assert replace(scenario, **of_model(scenario.set_model, scenario)) == scenario
+    periods_s = {name: sensor.period_s for name, sensor in scenario.sensors.items()}
+    step_s = scenario.fitted_step_s
+    assert periods_s["range"] == pytest.approx(10.0 * step_s, rel=1e-12)
+    assert periods_s["angle"] == scenario.set_model.angle_sensor.period_s == step_s
+
+
 def test_number_of_steps_is_limited_with_the_step_of_the_flight(brief: Scenario) -> None:
     """100 000 asked steps are enough; steps that fit the nominal arrival are shorter."""
     longest_s = brief.dispersion.x_m[1] / -brief.dispersion.vx_m_s[1]
     asked_s = longest_s / 99_999.8
-    sensor = replace(brief.set_model.angle_sensor, period_s=asked_s)
+    assert brief.angle_sensor is not None
+    sensor = replace(brief.angle_sensor, period_s=asked_s)
     many = replace(
         brief,
         step_s=asked_s,
