@@ -13,7 +13,7 @@ from infoset.guidance.situation import Situation
 from infoset.guidance.thruster import modulus
 from infoset.limits import Checked, NotNegative, Positive
 from infoset.model import SetModel
-from infoset.sensors import RangeSensor
+from infoset.sensors import BearingSensor, RangeSensor
 
 Z, VZ, X, SPEED, ACCELERATION = range(5)
 """Components of a state: lateral offset, its rate, range, closing speed and lateral
@@ -117,9 +117,9 @@ class KalmanBank:
             self._set_prior(situation)
         else:
             self._predict(situation)
-        meter = situation.sensors.get("range")
-        if "range" in situation.new and isinstance(meter, RangeSensor):
-            self._measure_range(situation, meter)
+        range_sensor = situation.sensors.get("range")
+        if "range" in situation.new and isinstance(range_sensor, RangeSensor):
+            self._measure_range(situation, range_sensor)
         if "angle" in situation.new:
             self._measure_angle(situation)
 
@@ -128,10 +128,10 @@ class KalmanBank:
         nearest = situation.closing_speed_m_s * situation.step_s * MIN_RANGE_STEPS
         return np.maximum(self.mean[..., X], nearest)
 
-    def _measure_range(self, situation: Situation, meter: RangeSensor) -> None:
+    def _measure_range(self, situation: Situation, sensor: RangeSensor) -> None:
         gradient = np.zeros_like(self.mean)
         gradient[..., X] = 1.0
-        variance = (meter.relative_error * self._positive_ranges_m(situation)) ** 2 / 3.0
+        variance = (sensor.relative_error * self._positive_ranges_m(situation)) ** 2 / 3.0
         self._measure(situation, "range", self.mean[..., X], gradient, variance)
 
     def _measure_angle(self, situation: Situation) -> None:
@@ -382,15 +382,30 @@ def _independent_error_rad(model: SetModel, range_m: Floats) -> Floats:
     A bound that falls linearly with the range is positive up to the maximum possible distance, and
     an estimate can be beyond it. At least half of the bound at the maximum distance is returned.
     """
+
+    def independent(sensor: BearingSensor, distance_m: Floats) -> Floats:
+        nearest_m = np.maximum(distance_m, sensor.centroid_bound_m or 1.0)
+        return np.asarray(sensor.error_bound(distance_m) - _constant_part_m(sensor) / nearest_m)
+
     bound = np.empty_like(range_m)
     for axis, plane in enumerate(map(model.axis, model.axes)):
         sensor = plane.angle_sensor
         if sensor.has_constant_bias:
             bound[axis] = sensor.constant_error_rad
         else:
-            minimum = 0.5 * sensor.error_bound(plane.bounds.farthest_m)
-            bound[axis] = np.maximum(sensor.error_bound(range_m[axis]), minimum)
+            minimum = 0.5 * independent(sensor, np.array(plane.bounds.farthest_m))
+            bound[axis] = np.maximum(independent(sensor, range_m[axis]), minimum)
     return bound
+
+
+def _constant_part_m(sensor: BearingSensor) -> float:
+    """Return the part of the centroid's bound that is constant in a flight, m.
+
+    It is an offset that the set does not subtract, and with a constant bias also the error.
+    """
+    if sensor.has_constant_bias:
+        return sensor.centroid_bound_m
+    return sensor.centroid_bound_m - sensor.centroid_error_m
 
 
 def _constant_error_m(model: SetModel) -> Floats:
@@ -400,8 +415,7 @@ def _constant_error_m(model: SetModel) -> Floats:
     tell from the centre: the error of an estimated miss contains it unchanged.
     """
     sensors = [model.axis(axis).angle_sensor for axis in model.axes]
-    bounds_m = [each.centroid_bound_m if each.has_constant_bias else 0.0 for each in sensors]
-    return np.reshape(bounds_m, (-1, 1))
+    return np.reshape([_constant_part_m(each) for each in sensors], (-1, 1))
 
 
 @dataclass(frozen=True)

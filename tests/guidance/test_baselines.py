@@ -27,6 +27,7 @@ from infoset.guidance import (
     strategy_names,
 )
 from infoset.guidance.scripted_noise import ScriptedNoise
+from infoset.sensors import OffsetCamera
 from infoset.sim.draws import draw
 from infoset.sim.engagement import Engagements
 from infoset.sim.scenario import of_model
@@ -54,7 +55,7 @@ def set_model(
         box,
         sensor,
         disturbance_m_s2=nu,
-        range_threshold_m=10.0 * sensor.centroid_error_m,
+        range_threshold_m=10.0 * sensor.farthest_m,
         model=Model.PAPER,
     )
 
@@ -362,6 +363,27 @@ def test_deviations_with_a_camera_equal_a_line_through_the_positions(
     assert estimate.deviation_m[0, 0] == pytest.approx(expected, rel=1e-4)
     assert estimate.miss_m[0, 0] == pytest.approx(0.0, abs=1e-9)
     assert estimate.to_go_s[0, 0] == pytest.approx(T - 590.0)
+
+
+@pytest.mark.parametrize("bias", list(Bias))
+def test_offset_that_is_not_subtracted_is_a_constant_error(bias: Bias) -> None:
+    """As the constant error of a centroid, it adds its bound squared / 3 to the variance."""
+    camera = OffsetCamera(
+        10.0,
+        1e-5,
+        10.0,
+        bias=bias,
+        phase_angle_rad=1.0,
+        sun_angle_rad=0.5 * np.pi,
+        phase_correction=False,
+        offset_m=(20.0,),
+    )
+    model = set_model(camera)
+    estimator, now = measured(model, Truth(0.0, 0.0), 60)
+    independent, constant = (10.0, 20.0) if bias is Bias.RANDOM else (0.0, 30.0)
+    of_images = deviation_m(lambda x: 1e-5 + independent / x, np.arange(60.0))
+    expected = float(np.hypot(of_images, constant / np.sqrt(3.0)))
+    assert estimator.estimate(now).deviation_m[0, 0] == pytest.approx(expected, rel=1e-4)
 
 
 def test_lost_images_change_nothing_in_the_engagement_that_lost_them() -> None:
