@@ -143,6 +143,14 @@ class Body(Checked):
         along_m, across_m = _turned(np.array(self.aim_m), self.axis_angle_rad).tolist()
         return _distance_to_edge(abs(along_m), abs(across_m), longer_m, shorter_m)
 
+    @property
+    def outer_m(self) -> float:
+        """Radius of a circle around the aim point that contains the body, m.
+
+        A greater miss is no hit, whatever the direction of the ellipse is.
+        """
+        return self.longest_m + math.hypot(*(self.aim_m or ()))
+
     def contains(self, lateral_m: Floats, axis_angle_rad: ArrayLike | None) -> Flags:
         """Return whether points of the plane across the approach are inside the silhouette.
 

@@ -367,7 +367,7 @@ class Engagements:
 
     def _certain_hit(self, bound_m: MaskedFloats) -> MaskedFlags | None:
         """Return whether Phi proves each hit; None without a size, and in the paper's model."""
-        radius_m = self.scenario.radius_m
+        radius_m = self.scenario.certain_radius_m
         if radius_m is None or not self._model.is_guaranteed:
             return None
         within = bound_m.filled(np.inf) <= radius_m

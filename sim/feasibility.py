@@ -54,8 +54,8 @@ class Feasibility:
 def feasibility(scenario: Scenario) -> Feasibility | None:
     """Return the limits of the misses; None if the nominal arrival is more than `MAX_STEPS` away.
 
-    A start is beyond an engine that corrects less than its miss minus the radius of the body, which
-    is zero for a scenario without a body.
+    A start is beyond an engine that corrects less than its miss minus the outer radius of the body,
+    which is zero for a scenario without a body.
     """
     model = scenario.set_model
     thruster = scenario.engine
@@ -76,7 +76,7 @@ def feasibility(scenario: Scenario) -> Feasibility | None:
     to_go_s = np.append(arrivals_s, arrival_s)
     by_engine = max_correctable_m(times_s, thruster, to_go_s, budget=None)
     by_budget = max_correctable_m(times_s, thruster, to_go_s, budget=thruster.budget_m_s)
-    radius_m = scenario.radius_m or 0.0
+    radius_m = scenario.outer_radius_m or 0.0
     return Feasibility(
         steps=int(arrival_s / model.step_s + STEP_ROUNDING),
         images=len(image_times_s(scenario)),

@@ -25,8 +25,8 @@ class MissCause(Enum):
     """
 
     ENGINE = "engine"
-    """No critical decision: the miss without impulses exceeds the radius of the body by more than
-    all impulses, with any budget, can correct.
+    """No critical decision: the miss without impulses exceeds the outer radius of the body by more
+    than all impulses, with any budget, can correct.
     """
     BUDGET = "budget"
     """With more budget, a hit would have been possible at the start, or after the critical
@@ -178,14 +178,16 @@ class DecisionLog:
         at most its own share.
         """
         thruster = self._scenario.engine
-        radius_m = self._scenario.radius_m or 0.0
+        # A greater miss cannot hit, and a smaller one than the certain radius hits.
+        outer_m = self._scenario.outer_radius_m or 0.0
+        certain_m = self._scenario.certain_radius_m or 0.0
         corrects_m = partial(max_correctable_m, times_s, thruster, arrival_s)
         decisions = np.arange(len(times_s))[:, None]
         each = np.arange(flights.miss_m.shape[2])
         sizes = modulus(flights.miss_m.swapaxes(0, 1))
 
         possible = flights.tracking & (
-            sizes[:-1] - corrects_m(decisions, flights.budget_m_s) <= radius_m
+            sizes[:-1] - corrects_m(decisions, flights.budget_m_s) <= outer_m
         )
         exists = possible.any(axis=0)
         critical = _last(possible)
@@ -202,15 +204,15 @@ class DecisionLog:
             _unknown_m(flights, critical) - np.where(is_before_last, later_corrects_m, 0.0),
             farthest_m - corrects_m(critical),
         )
-        wide = ~exists | (left_m > radius_m)
+        wide = ~exists | (left_m > certain_m)
 
         with_budget_m = corrects_m(budget=thruster.budget_m_s)
-        by_budget = exists & is_before_last & (sizes[after, each] - later_corrects_m <= radius_m)
+        by_budget = exists & is_before_last & (sizes[after, each] - later_corrects_m <= outer_m)
         # The cause is the first of these conditions that holds.
         conditions = {
-            MissCause.ENGINE: sizes[0] - corrects_m() > radius_m,
-            MissCause.BUDGET: by_budget | (sizes[0] - with_budget_m > radius_m),
-            MissCause.KNOWLEDGE: wide & (~exists | (_unknown_m(flights, last) > radius_m)),
+            MissCause.ENGINE: sizes[0] - corrects_m() > outer_m,
+            MissCause.BUDGET: by_budget | (sizes[0] - with_budget_m > outer_m),
+            MissCause.KNOWLEDGE: wide & (~exists | (_unknown_m(flights, last) > certain_m)),
             MissCause.SATURATED: wide,
             MissCause.GUIDANCE: np.ones_like(wide),
         }

@@ -521,12 +521,17 @@ class Scenario:
         return len(self.set_model.axes) > 1
 
     @property
-    def radius_m(self) -> float | None:
+    def certain_radius_m(self) -> float | None:
         """Radius around the aim point that is certainly inside the body, m; None without a size.
 
         It is the radius of a sphere with the aim point in its centre.
         """
         return None if self.body is None else self.body.inscribed_m
+
+    @property
+    def outer_radius_m(self) -> float | None:
+        """Radius around the aim point that contains the body, m; None without a size."""
+        return None if self.body is None else self.body.outer_m
 
     @property
     def sensors(self) -> dict[str, Sensor]:

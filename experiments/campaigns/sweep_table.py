@@ -127,7 +127,7 @@ def _radius_m(scenario: Scenario) -> float | None:
     """Return the radius of a body whose hits follow from the misses, m; None for another one."""
     if scenario.body is None or not scenario.body.is_sphere_around_aim:
         return None
-    return scenario.radius_m
+    return scenario.certain_radius_m
 
 
 def _closed_forms(folder: CampaignFolder) -> list[float]:

@@ -170,7 +170,7 @@ def _facts(record: Record, kept: Sequence[int]) -> dict[str, object]:
         "wrong_image_proved_s": _proved_s(record),
         "max_impulse_m_s": scenario.engine.max_impulse_m_s,
         "budget_m_s": scenario.thruster.budget_m_s,
-        "radius_m": scenario.radius_m,
+        "radius_m": scenario.certain_radius_m,
     }
 
 

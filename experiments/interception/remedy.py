@@ -127,7 +127,9 @@ def _remedy(task: Task, results: Results, cause: MissCause, key: str) -> Remedy:
     not_enough = None
     enough: float | None
     if (cause, key) == (MissCause.ENGINE, IMPULSE):
-        needed = (results.unguided_miss_m - (scenario.radius_m or 0.0)) / results.engine_corrects_m
+        needed = (
+            results.unguided_miss_m - (scenario.outer_radius_m or 0.0)
+        ) / results.engine_corrects_m
         # The factor 1.005 lets the three digits be rounded up.
         enough = _rounded(1.005 * now * float(needed.max()))
     else:

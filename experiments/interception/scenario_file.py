@@ -549,7 +549,7 @@ def _authority_warnings(scenario: Scenario, found: Feasibility) -> Iterator[str]
 
 def _body_warnings(scenario: Scenario, found: Feasibility) -> Iterator[str]:
     """Yield lines about a radius that is small beside the possible misses, or very large."""
-    radius_m = scenario.radius_m
+    radius_m = scenario.certain_radius_m
     if scenario.body is None or radius_m is None:
         return
     size = f"body.radius_m is {radius_m:g}"

@@ -345,7 +345,7 @@ def certain_hits_text(results: Results, scenario: Scenario) -> str:
     texts = []
     if results.certain_hit is not None and (known := int(results.certain_hit.count())):
         texts.append(
-            f"hit certain in flight (Phi at most {scenario.radius_m:.4g} m): "
+            f"hit certain in flight (Phi at most {scenario.certain_radius_m:.4g} m): "
             f"{int(results.certain_hit.sum())} of {some_runs(known)}"
         )
     if results.hit_probability is not None:

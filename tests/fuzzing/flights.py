@@ -269,5 +269,7 @@ def scaled(scenario: Scenario, draws: Draws, length: float, time: float) -> tupl
             time * target.switching_period_s,
             in_units(target.acceleration_y_m_s2),
         ),
-        body=None if scenario.radius_m is None else Body(length * scenario.radius_m),
+        body=None
+        if scenario.certain_radius_m is None
+        else Body(length * scenario.certain_radius_m),
     ), replace(draws, position_m=length * draws.position_m, velocity_m_s=speed * draws.velocity_m_s)

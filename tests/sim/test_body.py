@@ -11,8 +11,9 @@ import pytest
 from infoset.covered_set import information_set
 from infoset.experiments import load_scenario
 from infoset.guidance import NoiseKind
-from infoset.sim import Body, Scenario, simulate
+from infoset.sim import Body, MissCause, Scenario, simulate
 from infoset.sim.draws import draw
+from infoset.sim.feasibility import feasibility
 
 DIMORPHOS_M = (88.5, 58.0)
 AIM_M = (12.0, -7.0)
@@ -81,6 +82,12 @@ def test_miss_beyond_which_no_hit_is_sure() -> None:
     known = Body(semi_axes_m=DIMORPHOS_M, axis_angle_rad=0.0, aim_m=(3.0, 4.0))
     assert known.certain_miss_m == 93.5
     assert Body(semi_axes_m=DIMORPHOS_M).certain_miss_m == 58.0
+
+
+def test_outer_radius_contains_the_body() -> None:
+    assert Body(60.0, aim_m=(3.0, 4.0)).outer_m == 65.0
+    assert Body(semi_axes_m=DIMORPHOS_M, aim_m=(3.0, 4.0)).outer_m == 93.5
+    assert Body(semi_axes_m=DIMORPHOS_M).outer_m == 88.5
 
 
 def test_ellipse_contains_the_points_of_its_equation() -> None:
@@ -179,6 +186,28 @@ def test_hit_is_certain_if_phi_is_at_most_the_inscribed_radius(impactor: Scenari
     without = simulate(impactor, 2, guarantee=False)
     assert without.certain_hit is not None
     assert not without.certain_hit.count()
+
+
+def test_flight_is_beyond_the_engine_if_it_cannot_come_to_the_longer_axis(
+    impactor: Scenario,
+) -> None:
+    """With impulses of 0.06 m/s, some starts can be brought to 4 km and not to 20 m."""
+    body = Body(semi_axes_m=(4000.0, 20.0), axis_angle_rad=0.4)
+    weak = replace(impactor.thruster, max_impulse_m_s=0.06)
+    scenario = replace(impactor, body=body, thruster=weak)
+    results = simulate(scenario, 20, guarantee=False)
+
+    left_m = results.unguided_miss_m - results.engine_corrects_m
+    missed = ~results.hit.filled(False)
+    by_engine = [cause is MissCause.ENGINE for cause in results.causes]
+    assert by_engine == (missed & (left_m > 4000.0)).tolist()
+    assert (missed & (left_m > 20.0) & (left_m <= 4000.0)).any()
+
+    found = feasibility(scenario)
+    sphere = feasibility(replace(scenario, body=Body(4000.0)))
+    assert found is not None
+    assert sphere is not None
+    assert 0.0 < found.beyond_engine == sphere.beyond_engine < 1.0
 
 
 def test_direction_of_an_ellipse_depends_on_seed_and_run_only(impactor: Scenario) -> None:

@@ -186,7 +186,7 @@ def _expected(
 ) -> MissCause:
     thruster = scenario.thruster
     step_s = scenario.step_s
-    radius_m = scenario.radius_m or 0.0
+    radius_m = scenario.certain_radius_m or 0.0
     delay = thruster.delay_steps
     allowed = scenario.impulse_steps or range(thruster.delay_steps, 100)
 

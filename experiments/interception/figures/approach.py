@@ -110,7 +110,9 @@ def _draw_possible(axes: Axes, record: Record) -> None:
     # The axis shows all curves and levels; of the smallest values, which may be 0, only those down
     # to `_MIN_SHOWN` and to a micrometre. Its margins are factors of 2.
     levels = [
-        level for level in (max_guarantee_m(record.result), record.scenario.radius_m) if level
+        level
+        for level in (max_guarantee_m(record.result), record.scenario.certain_radius_m)
+        if level
     ]
     top = max([*maximum, *true, *levels])
     bottom = max(min([*centred, *true, *levels]), _MIN_SHOWN * min([*centred, top]), 1e-6)
@@ -124,7 +126,7 @@ def _draw_possible(axes: Axes, record: Record) -> None:
     axes.plot(times, true, **_TRUE)
     if len(known):
         draw_end(axes, times[known[-1]], maximum[-1], record.scenario)
-    draw_levels(axes, max_guarantee_m(record.result), record.scenario.radius_m)
+    draw_levels(axes, max_guarantee_m(record.result), record.scenario.certain_radius_m)
 
 
 def _draw_moduli(axes: Axes, record: Record) -> None:

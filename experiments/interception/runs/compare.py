@@ -192,7 +192,7 @@ def _set_table(scenario: Scenario, compared: Sequence[Comparison]) -> Table:
     if scenario.body is not None:
         hit = "hit"
         if scenario.body.is_sphere_around_aim:
-            hit = f"hit: miss at\nmost {scenario.radius_m:g} m"
+            hit = f"hit: miss at\nmost {scenario.certain_radius_m:g} m"
         titles += [hit, "95 % CI\nof a hit"]
     table = number_table("noise", "strategy", *titles, left=2)
 

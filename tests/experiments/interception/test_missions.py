@@ -29,8 +29,8 @@ def test_an_impactor_hits_and_its_guarantee_holds(name: str, noise: NoiseKind) -
     assert not results.set_emptied.any()
     assert (results.miss_m <= results.guaranteed_miss_m).all()
     assert np.ma.getdata(results.hit).all()
-    assert scenario.radius_m is not None
-    assert results.guaranteed_miss_m.max() < scenario.radius_m
+    assert scenario.certain_radius_m is not None
+    assert results.guaranteed_miss_m.max() < scenario.certain_radius_m
 
 
 @pytest.mark.thorough

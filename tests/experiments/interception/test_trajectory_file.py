@@ -77,7 +77,7 @@ def test_a_scenario_as_states_and_back_has_the_same_numbers(name: str, tmp_path:
         tmp_path / "states.toml",
         scenario,
         2.0,
-        KnownTarget(scenario.radius_m, disturbance_m_s2=1e-6),
+        KnownTarget(scenario.certain_radius_m, disturbance_m_s2=1e-6),
     )
     assert read_text(Scenario, written, "written") == found
     assert (found.camera, found.thruster, found.body) == (
@@ -558,7 +558,11 @@ def test_target_of_the_options_is_taken(infoset: Command) -> None:
     _, _, err = infoset("scenarios", "from-states", "two-states", "--out", "mine.toml", *options)
 
     scenario = load_scenario("mine.toml")
-    assert (scenario.radius_m, scenario.information_set.disturbance_m_s2, scenario.target) == (
+    assert (
+        scenario.certain_radius_m,
+        scenario.information_set.disturbance_m_s2,
+        scenario.target,
+    ) == (
         50.0,
         1e-6,
         None,
