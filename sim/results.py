@@ -84,7 +84,7 @@ _SUSPECTED = (
     "are wrong than the set allows for"
 )
 _NAMED = "Time of the wrong image, if one image is suspected"
-_B_DOT_T = "B.T of the closest approach; unknown without a reference plane"
+_B_DOT_T = "B.T of the centre at its closest approach; unknown without a reference plane"
 
 _optional = partial(Column, nullable=True, optional=True)
 
