@@ -29,10 +29,10 @@ from infoset.engine.section_passes import MOVED, NO_EVENT, SUMMARISED, WITH_HEIG
 from infoset.engine.workspace import past_of
 from infoset.model import LONGEST_BURN, Recovery, SetModel
 
-MAX_LEFT_OUT = 3
-"""Maximum number of images that a member leaves out because it is not proved that they make it
+MAX_DISCARDED = 3
+"""Maximum number of images that a member discards because it is not proved that they make it
 empty: as many as may be wrong. A member in which a wrong image was not noticed contradicts nearly
-all later ones: one left out 358 in `deep-impact-2005`, and guidance followed it.
+all later ones: one discarded 358 in `deep-impact-2005`, and guidance followed it.
 """
 
 
@@ -64,8 +64,8 @@ class SetState:
     `members` sets in a row belong to one engagement; usually it is 1. A set that becomes empty is
     recovered only if no other one of its engagement lives: a set lives unless its status is EMPTY,
     that is, while it tracks, if a label of it has passed below the threshold, or if it is stopped.
-    If another one lives and the emptiness is not
-    proved, the set leaves the image out that made it empty, up to `MAX_LEFT_OUT` images.
+    If another one lives and the emptiness is not proved, the set discards the image that made it
+    empty, up to `MAX_DISCARDED` images.
 
     Attributes
     ----------
@@ -126,8 +126,8 @@ class SetState:
         # If q measured ranges may be wrong: the q + 1 largest lower limits of the label by ranges,
         # and of the upper ones with a minus sign, increasing, shape (2, q + 1, B), m.
         self._range_limits = np.empty((2, 0, batch))
-        # Images that each set has left out because it was not proved to be empty, shape (B,).
-        self._left_out = np.zeros(batch, dtype=np.int64)
+        # Images that each set has discarded because it was not proved to be empty, shape (B,).
+        self._discarded = np.zeros(batch, dtype=np.int64)
         self._none = np.zeros(batch, dtype=bool)
         self._no_angles = np.empty((len(self.laws), 0))
         # Vertices that every section may still gain.
@@ -329,9 +329,9 @@ class SetState:
         if self._members > 1 and event is not None:
             # A set without this image contains the set with it.
             doubtful = lost & self.sections.unproved & self._engagement_lives()
-            doubtful &= self._left_out < MAX_LEFT_OUT
+            doubtful &= self._discarded < MAX_DISCARDED
             if some(doubtful):
-                self._left_out += doubtful
+                self._discarded += doubtful
                 self._discard(doubtful, event, lower, upper)
                 lost &= self.status == SetStatus.EMPTY.value
         if not some(lost):
@@ -429,7 +429,7 @@ class SetState:
         self.lower_label[row] = self.lower_label[source]
         self.upper_label[row] = self.upper_label[source]
         self._range_limits[..., row] = self._range_limits[..., source]
-        self._left_out[row] = self._left_out[source]
+        self._discarded[row] = self._discarded[source]
         self.status[row] = SetStatus.TRACKING.value
         self.lost_step[row] = -1
 

@@ -201,7 +201,7 @@ def test_half_whose_set_is_not_proved_to_be_empty_is_not_cleared(
 def test_set_that_is_empty_without_a_proof_proves_no_wrong_image(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("infoset.engine.set_state.MAX_LEFT_OUT", 0)
+    monkeypatch.setattr("infoset.engine.set_state.MAX_DISCARDED", 0)
     flight = flown(FLIGHT_STEPS, {0: [21]})
     covered = CoveredSet(MODEL)
     feed(covered, Flown(*(values[:21] for values in flight)))
