@@ -120,6 +120,12 @@ FRACTION = Limits(above=0.0, below=1.0)
 PART = Limits(minimum=0.0, below=1.0)
 WHOLE = Limits(minimum=0, whole=True)
 COUNT = Limits(minimum=1, whole=True)
+WRONG = Limits(minimum=0, maximum=3, whole=True)
+"""Number q of measurements that may be wrong.
+
+With the default of 2q + 2 classes there are more than `infoset.model.MAX_SETS` sets from q = 4 on.
+The same maximum is chosen for ranges, which need no sets and would allow more (Theorem 10).
+"""
 
 LONGEST_NAME = 100
 """Maximum length of a name: files named after it stay below 255 characters, their limit."""

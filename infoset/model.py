@@ -11,7 +11,16 @@ from typing import Annotated
 import numpy as np
 
 from infoset.arrays import Floats
-from infoset.limits import NUMBER, POSITIVE, Limits, NotNegative, Part, Positive, check_fields
+from infoset.limits import (
+    NUMBER,
+    POSITIVE,
+    WRONG,
+    Limits,
+    NotNegative,
+    Part,
+    Positive,
+    check_fields,
+)
 from infoset.sensors import BearingSensor, Sensor
 
 Interval = tuple[float, float]
@@ -39,9 +48,6 @@ LONGEST_BURN = 1.0 + 1e-9
 
 _APPROACH = Limits(below=0.0)
 _SECTIONS = Limits(minimum=1, maximum=MAX_SECTIONS, whole=True)
-_WRONG_IMAGES = Limits(minimum=0, maximum=3, whole=True)
-"""Number q of wrong images. The default classes, 2q + 2, give more than `MAX_SETS` sets from q = 4
-on."""
 _IMAGE_CLASSES = Limits(minimum=3, maximum=16, whole=True)
 """Number G of classes, at least q + 2. The maximum is chosen: with q = 1 there are G sets, and the
 time of a flight grows with them."""
@@ -203,7 +209,7 @@ class SetSettings:
     sections: Annotated[int, _SECTIONS] = 29
     fewest_sections: Annotated[int, _SECTIONS] = 5
     recovery: Recovery = Recovery.WIDENED
-    wrong_images: Annotated[int, _WRONG_IMAGES] = 0
+    wrong_images: Annotated[int, WRONG] = 0
     image_classes: Annotated[int, _IMAGE_CLASSES] | None = None
     range_threshold_m: NotNegative = 0.0
     disturbance_m_s2: NotNegative = 0.0

@@ -17,14 +17,11 @@ from numpy.typing import NDArray
 
 from infoset.arrays import Flags, Floats, Integers
 from infoset.covered_set import classes_left_out
-from infoset.limits import Limits
+from infoset.limits import WRONG, Limits
 from infoset.model import MAX_SETS
 
 Values = TypeVar("Values", Floats, Integers)
 
-_WRONG_MEASUREMENTS = Limits(minimum=0, maximum=3, whole=True)
-"""Number q of wrong measurements. The default classes, 2q + 2, give more than `MAX_SETS` sets from
-q = 4 on."""
 _NEVER = np.iinfo(np.int64).max
 """Step of a member that is not empty, later than all steps."""
 
@@ -75,7 +72,7 @@ class Cover:
         TypeError, ValueError
             If a number is not possible.
         """
-        _WRONG_MEASUREMENTS.need("wrong_measurements", wrong_measurements)
+        WRONG.need("wrong_measurements", wrong_measurements)
         if wrong_measurements == 0:
             if measurement_classes is not None:
                 raise ValueError(

@@ -8,12 +8,9 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from infoset.arrays import Flags, Floats
-from infoset.limits import Checked, Fraction, Limits, Positive
+from infoset.limits import WRONG, Checked, Fraction, Positive
 from infoset.sensors.bearing import BearingSensor
 from infoset.sensors.sensor import Apart, Cuttable, Geometry, Measurements, Sensor
-
-_WRONG = Limits(minimum=0, maximum=3, whole=True)
-"""Number of wrong ranges, with the maximum of wrong images (`infoset.model`)."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +40,7 @@ class RangeSensor(Checked, Sensor):
 
     period_s: Positive
     relative_error: Fraction
-    wrong_measurements: Annotated[int, _WRONG] = 0
+    wrong_measurements: Annotated[int, WRONG] = 0
 
     def true_value(self, sight: Geometry) -> Floats:
         """Return the range, m."""
