@@ -266,10 +266,10 @@ class CoveredSet(CoveredSetView, InformationSet):
     """Information sets of a batch of engagements in which at most q images of a flight are wrong.
 
     It has the methods of `InformationSet`. A member that is proved to be empty before a label of it
-    has left is refuted, and stays empty if another one lives, which tracks or has labels that have
-    left. For q = 1 the others are then split into members that leave out as few images as possible,
-    see `Suspects`. If none lives, more than q images are wrong, and the members that became empty
-    last recover as an `InformationSet` does.
+    has left is refuted, and stays empty if another one is in use, which tracks or has labels that
+    have left. For q = 1 the others are then split into members that leave out as few images as
+    possible, see `Suspects`. If none is in use, more than q images are wrong, and the members that
+    became empty last recover as an `InformationSet` does.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ from infoset.sensors import Camera, RangeSensor, Sensor
 from infoset.sim.covariance import Covariance
 from infoset.sim.gravity import max_impulses_m_s, with_gravity
 from infoset.sim.scenario import Scenario, corners
-from infoset.sim.wrong_images import WrongImages, draw_wrong_measurements
+from infoset.sim.wrong_images import WrongMeasurements, draw_wrong_measurements
 
 START, TIE, EXECUTION, TARGET, POINTING, BIAS, IMAGES = 0, 3, 5, 6, 7, 8, 9
 MISALIGNMENT, WRONG_IMAGES, WRONG_RANGES, DRIFT, AXIS_ANGLE = 10, 11, 12, 13, 14
@@ -216,7 +216,12 @@ def _before_arrival_s(scenario: Scenario, sensor: Sensor, steps: int) -> Floats:
 
 
 def _wrong_measurements(
-    wrong: WrongImages, before_s: Floats, axes: int, runs: Sequence[int], seed: int, stream: int
+    wrong: WrongMeasurements,
+    before_s: Floats,
+    axes: int,
+    runs: Sequence[int],
+    seed: int,
+    stream: int,
 ) -> Floats:
     """Return the errors of the wrong measurements of some runs, shape (axes, B, steps)."""
     return np.stack(

@@ -119,9 +119,11 @@ class Instruments:
             angles = wrong_angles(due[camera], asked, measured[camera], wrong[..., step])
             measured[camera] = angles
         of_ranges = self._draws.wrong_ranges
-        meter = RangeSensor.name
-        if of_ranges is not None and meter in measured:
-            measured[meter] = wrong_ranges(due[meter], asked, measured[meter], of_ranges[:, step])
+        ranges = RangeSensor.name
+        if of_ranges is not None and ranges in measured:
+            measured[ranges] = wrong_ranges(
+                due[ranges], asked, measured[ranges], of_ranges[:, step]
+            )
         if self._draws.images is not None and BearingSensor.name in measured:
             seen = self._draws.images[:, step] >= self._image_loss
             return self._with_lost_images(due, measured, seen, tracking)

@@ -188,8 +188,10 @@ class KeplerMotion:
         """Change the spacecraft's lateral velocity by impulses of shape (C, B): V becomes V - k.
 
         A burn with the duration t moves the spacecraft by k t/2 less than an impulse at its start.
-        The motion is that after the burn, which ends within the step, continued to its start. The
-        gravity of the burn differs by its gradient over k t/2: of 25 m and 50 s, 1e-10 m/s at 1 au.
+        The motion is that after the burn, which ends within the step, continued to its start.
+
+        Neglected: during the burn, gravity acts at a position that differs by up to k t/2. With
+        25 m and 50 s at 1 au this changes the velocity by 1e-10 m/s (docs/guarantee.md).
         """
         self._motion[:, VELOCITY, :X, RELATIVE] -= impulse_m_s.T
         self._motion[:, VELOCITY, :X, SPACECRAFT] += impulse_m_s.T

@@ -314,17 +314,17 @@ class Scenario:
 
     def _check_wrong_ranges(self) -> None:
         """Check that wrong ranges fit the model and the sensors."""
-        meter = self.range_sensor
-        if self.wrong_ranges is not None and meter is None:
+        range_sensor = self.range_sensor
+        if self.wrong_ranges is not None and range_sensor is None:
             raise ValueError(
                 "wrong_ranges needs a range_sensor: add the table, or leave wrong_ranges out"
             )
-        if meter is None or meter.wrong_measurements == 0:
+        if range_sensor is None or range_sensor.wrong_measurements == 0:
             return
         if not self.information_set.is_guaranteed:
             raise ValueError(
                 'range_sensor.wrong_measurements must be 0 in model = "paper", which guarantees '
-                f"nothing: got {meter.wrong_measurements}"
+                f"nothing: got {range_sensor.wrong_measurements}"
             )
 
     def _check_lengths(self) -> None:

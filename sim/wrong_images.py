@@ -26,7 +26,30 @@ far beyond `MAX_ANGLE_RAD` for a bound of an angle."""
 
 
 @dataclass(frozen=True)
-class WrongImages(Checked):
+class WrongMeasurements(Checked):
+    """Measurements of one sensor with errors beyond their bound in the simulated flights.
+
+    They are simulated whatever the set allows for.
+
+    Parameters
+    ----------
+    number : int
+        Number of wrong measurements of each flight.
+    size : tuple of float
+        Minimum and maximum error of a wrong measurement in units of its bound: the logarithm is
+        uniform, and the sign of each value random.
+    when_s : tuple of float, or None
+        Minimum and maximum time of a wrong measurement before the nominal arrival, s, both
+        included; None is the whole flight.
+    """
+
+    number: Annotated[int, _NUMBER]
+    size: Annotated[tuple[float, float], _SIZE] = (2.0, 100.0)
+    when_s: Annotated[tuple[float, float], NOT_NEGATIVE] | None = None
+
+
+@dataclass(frozen=True)
+class WrongImages(WrongMeasurements):
     """Images with errors beyond their bound in the simulated flights.
 
     They are simulated whatever the set allows for: `wrong_images` of `[information_set]` is what
@@ -44,13 +67,9 @@ class WrongImages(Checked):
         is the whole flight.
     """
 
-    number: Annotated[int, _NUMBER]
-    size: Annotated[tuple[float, float], _SIZE] = (2.0, 100.0)
-    when_s: Annotated[tuple[float, float], NOT_NEGATIVE] | None = None
-
 
 @dataclass(frozen=True)
-class WrongRanges(WrongImages):
+class WrongRanges(WrongMeasurements):
     """Measured ranges with errors beyond their bound in the simulated flights.
 
     They are simulated whatever the set allows for: `wrong_measurements` of `[range_sensor]` is what
@@ -70,7 +89,7 @@ class WrongRanges(WrongImages):
 
 
 def draw_wrong_measurements(
-    wrong: WrongImages, before_arrival_s: Floats, axes: int, random: np.random.Generator
+    wrong: WrongMeasurements, before_arrival_s: Floats, axes: int, random: np.random.Generator
 ) -> Floats:
     """Return the errors of the wrong measurements of one flight.
 

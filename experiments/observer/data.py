@@ -18,8 +18,7 @@ from infoset.experiments.observer.file import ObserverProblem, WrongMeasurements
 from infoset.geometry.zonotope import Zonotope
 from infoset.limits import MAXIMUM
 from infoset.observer.sets import Set, polytope_of
-from infoset.sim import WrongImages
-from infoset.sim.wrong_images import draw_wrong_measurements
+from infoset.sim.wrong_images import WrongMeasurements, draw_wrong_measurements
 
 MAX_CSV_BYTES = 10_000_000
 """Largest size of a file of measurements: 1000 bytes for each of `MAX_STEPS` steps."""
@@ -105,7 +104,7 @@ def _wrong_errors(
     places[first : last + 1] = 0.0
     places[missing] = np.nan
     generator = np.random.default_rng([seed, _WRONG_STREAM])
-    images = WrongImages(wrong.number, wrong.size)
+    images = WrongMeasurements(wrong.number, wrong.size)
     return draw_wrong_measurements(images, places, shape[1], generator).T
 
 

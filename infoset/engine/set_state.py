@@ -62,10 +62,10 @@ class SetState:
     pass over the memory does both; a query therefore may write the sections, but changes no result.
 
     `members` sets in a row belong to one engagement; usually it is 1. A set that becomes empty is
-    recovered only if no other one of its engagement lives: a set lives unless its status is EMPTY,
-    that is, while it tracks, if a label of it has passed below the threshold, or if it is stopped.
-    If another one lives and the emptiness is not proved, the set discards the image that made it
-    empty, up to `MAX_DISCARDED` images.
+    recovered only if no other one of its engagement is in use: a set is in use unless its status is
+    EMPTY, that is, while it tracks, if a label of it has passed below the threshold, or if it is
+    stopped. If another one is in use and the emptiness is not proved, the set discards the image
+    that made it empty, up to `MAX_DISCARDED` images.
 
     Attributes
     ----------
@@ -328,7 +328,7 @@ class SetState:
         lost = empty & ~is_below_threshold
         if self._members > 1 and event is not None:
             # A set without this image contains the set with it.
-            doubtful = lost & self.sections.unproved & self._engagement_lives()
+            doubtful = lost & self.sections.unproved & self._engagement_in_use()
             doubtful &= self._discarded < MAX_DISCARDED
             if some(doubtful):
                 self._discarded += doubtful
@@ -342,15 +342,15 @@ class SetState:
             self.lost_label[b] = self._nearest_to_feasible(int(b), event, lower[b], upper[b])
         if self.model.recovery is Recovery.NONE:
             return self._none
-        lost &= ~self._engagement_lives()
+        lost &= ~self._engagement_in_use()
         if some(lost):
             self._recover(lost, event, lower, upper)
         return lost
 
-    def _engagement_lives(self) -> Flags:
-        """Whether a set of the same engagement, or the set itself, lives, shape (B,)."""
-        lives = self.status != SetStatus.EMPTY.value
-        of_engagement = lives.reshape(-1, self._members).any(axis=1)
+    def _engagement_in_use(self) -> Flags:
+        """Whether a set of the same engagement, or the set itself, is in use, shape (B,)."""
+        in_use = self.status != SetStatus.EMPTY.value
+        of_engagement = in_use.reshape(-1, self._members).any(axis=1)
         return np.repeat(of_engagement, self._members)
 
     def _refine_if_few(self, active: Flags) -> Flags:

@@ -62,7 +62,7 @@ wide.
 _MAX_FRAMES = 3
 """Number of systems of coordinates in which half-spaces are tried before integers decide: those of
 the given box, those of the set found in the first ones, and those of the set found in the second
-ones, which knows the ends of the set.
+ones, whose ends are then computed.
 """
 _LEAST_WIDTH = 64.0 * UNSURE / SNAP
 """Minimum scale of an axis, relative to the coordinates from which limits were computed: 64
