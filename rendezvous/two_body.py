@@ -14,11 +14,11 @@ from infoset.rendezvous._arrays import Floats
 _STRAIGHT = 1e-15
 """Square of the transverse speed, relative to the square of the speed, up to which a motion is
 straight. Up to the escape speed the perigee is then within 1e-15 of the distance, its rounding."""
-_NEARLY_PARABOLIC = 1e-5
+_NEARLY_PARABOLIC = 2e-8
 """Size of the binding (distance by semi-major axis) below which the time to the perigee is computed
 as for a parabola. The relative error is then up to 1.5 times the binding; the formulas for ellipses
-and hyperbolas have 6e-16 over the binding (measured). Chosen: the time decides only whether a
-flight reaches the perigee, near which the distance hardly changes."""
+and hyperbolas have up to 8e-16 over the binding (measured). Here both are equal, 4e-8: any other
+value has a greater maximum error."""
 _RADIAL = 1e-6
 """Perigee, relative to the semi-major axis, up to which an orbit is a fall through the centre.
 Chosen: far above the rounding of a perigee, some 1e-15, and far below the radius of a planet."""

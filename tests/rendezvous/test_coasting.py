@@ -163,6 +163,20 @@ def test_state_at_the_centre_is_refused() -> None:
         coast(np.zeros(6), 1.0, 1.0)
 
 
+@pytest.mark.parametrize("binding", [-9e-6, -1e-6, 1e-6, 9e-6])
+def test_flight_that_ends_before_the_perigee_of_a_near_parabola(binding: float) -> None:
+    """It ends at 2e-4 of the distance of its start, where the time to go is 3e-6 of the flight."""
+    perigee, last, duration = 1e-5, 2e-4, 0.47
+    transverse_squared = perigee * (2.0 - perigee * binding) / last**2
+    inward = np.sqrt(2.0 / last - binding - transverse_squared)
+    end = np.array([last, 0.0, 0.0, -inward, np.sqrt(transverse_squared), 0.0])
+    with mp.workdps(40):
+        start = exactly_coasted(end, -duration)
+    found = closest_approach_m(start[:3], start[3:], 1.0, duration)
+    # A rounding of the state at the start changes the end by some 1e-10 of its distance.
+    assert found == pytest.approx(last, rel=1e-8)
+
+
 @pytest.mark.parametrize("seed", range(40))
 def test_closest_approach_is_the_minimum_distance_of_coasted_states(seed: int) -> None:
     random = np.random.default_rng(seed)
