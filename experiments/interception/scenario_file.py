@@ -54,10 +54,12 @@ At 1.9 % all flights kept the true state without a model of burns, at 8 % 98.3 %
 FEW_TIMES = 3
 """Number of times of a key that a line lists; JSON has all of them. Chosen: they fit a line."""
 STEP_COST_S = 1e-5
-"""Typical time of a step of a run along one axis, s, for the warning about too many steps.
+"""Typical time of a step of a run along one axis, s, in the warning about too many steps.
 
 Measured on one core: 1.2e-5 s in dart-2022 and 1.6e-5 s in asteroid-1997, in batches of 100 and
-1000 runs. A single run takes some times as long a step.
+1000 runs; rounded to a power of ten, because other machines differ by more. A single run takes some
+times as long a step. It changes only the duration in the warning: `MANY_STEPS` decides whether
+there is one.
 """
 LARGEST_BODY_M = 20_000.0
 """Radius, m, above which a warning reports it.

@@ -219,8 +219,23 @@ class Program:
         - p . x is at most (p - C' m) . x + m . ends for multipliers m of strips C,
         - p . (A x + s + w) is at most (A' p) . x + p . s + the height of W along p.
 
-        At the stage of the state, its direction is added to p, the `costate`. All rounding errors
-        are relative to terms of bounded states, and are added.
+        At the stage of the state, its direction is added to p, the `costate`.
+
+        Notes
+        -----
+        Each step begins with the rounded p, so that the errors of its operations are added, and not
+        propagated. With X >= |x|, u = EPSILON / 2 and sums of k products, whose error is at most
+        k u sum |product| in any order, up to u^2:
+
+        - a motion: p . s, A' p and the height of W, a zonotope of g generators, have (n + g) u
+          |p| . (|A| X + |s| + sizes of W). The parts have (2 n + 2 g + 16) u of it.
+        - the direction d: u (|A' p| + |d|) . X. The part has 4 u |d| . X.
+        - r strips: r u |m| . (|C| X + |ends|), and u (|p| + |C' m|) . X of the subtraction. The
+          part has (2 r + 8) u |m| . (|C| X + |ends|).
+        - the first prior: (n + g) u |p| . X. The part has (2 n + 2 g + 16) u of it.
+
+        `fsum` rounds once, u of all terms. What a part has more than its own error, at least 2 u of
+        its terms, pays the shares of |A' p| . X, |p| . X and `fsum`, and the rounding of the part.
         """
         multipliers = self._multipliers(marginals)
         parts = list[float]()
@@ -233,6 +248,7 @@ class Program:
                 costate = costate @ motion.matrix
             if k == self._at:
                 costate = costate + direction
+                # 4 u, see Notes.
                 parts.append(2.0 * EPSILON * float(np.abs(direction) @ stage.sizes))
 
             used = multipliers[k] != 0.0
@@ -242,9 +258,11 @@ class Program:
             costate = costate - m @ normals
             parts.append(float(m @ ends))
             terms = np.abs(normals) @ stage.sizes + np.abs(ends)
+            # (2 r + 8) u, see Notes.
             parts.append((len(m) + 4) * EPSILON * float(np.abs(m) @ terms))
 
         first = self._stages[0]
+        # (2 n + 2 g + 16) u, see Notes.
         rounding = SUM_SLACK + (self._states + _count(first.prior)) * EPSILON
         parts.append(height_of(first.prior, costate))
         parts.append(rounding * float(np.abs(costate) @ first.sizes))
@@ -256,6 +274,7 @@ class Program:
         `sizes` are the maximum sizes of the coordinates of the state before the motion.
         """
         terms = motion.sums_of_terms(sizes)
+        # (2 n + 2 g + 16) u, see Notes of `_sum`.
         rounding = SUM_SLACK + (self._states + _count(motion.disturbance)) * EPSILON
         return [
             float(costate @ motion.shifts[0]),
