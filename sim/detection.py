@@ -51,7 +51,7 @@ class Magnitude(Checked):
         follows from V = H + 5 log10(r d) + q(phase), with V = `limit`, and r and d in au.
         """
         fainter = self.limit - self.absolute - phase_magnitude(self.phase_deg)
-        product_au2 = FACTOR_PER_MAGNITUDE**fainter
+        product_au2 = math.pow(FACTOR_PER_MAGNITUDE, fainter)
         return product_au2 / (sun_distance_m / AU_M) * AU_M
 
 
