@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -12,16 +12,16 @@ import pytest
 from infoset.arrays import Floats
 from infoset.experiments import load_scenario
 from infoset.experiments.common.input_file import read_text, to_toml
-from infoset.guidance import NoiseKind, Thruster
+from infoset.guidance import NoiseKind, Thruster, make_strategy
 from infoset.limits import MAXIMUM
 from infoset.sim import Results, Scenario, Sun, lower_bound, simulate
 from infoset.sim.bound.game_value import why_no_value
+from infoset.sim.bound.pair_flight import fly_pair
 from infoset.sim.draws import draw
 from infoset.sim.engagement import Engagements
 from infoset.sim.gravity import on_board_model
 from infoset.sim.kepler import KeplerMotion
 
-HAS_BENCHMARKS = importlib.util.find_spec("benchmarks") is not None
 THRUST: dict[str, Any] = {"thrust_N": 10.0, "mass_kg": 500.0}
 AU_M = 1.495978707e11
 SUN = Sun(1.32712440018e20, AU_M, 0.3)
@@ -91,7 +91,9 @@ def test_burns_that_are_flown_and_not_modelled_break_it(
     flight = Engagements(scenario, draws, truth=truth)
     while flight.flying:
         flight.advance()
-    assert not flight.results(np.arange(12)).truth_kept.all()
+    # 10 and 5 of these 12 flights keep the true state.
+    most = 0.9 if noise is NoiseKind.RANDOM else 0.6
+    assert flight.results(np.arange(12)).truth_kept.mean() < most
 
 
 @pytest.mark.parametrize("delay_steps", [0, 1])
@@ -124,26 +126,32 @@ def test_burns_in_a_plane_keep_the_guarantee(noise: NoiseKind, sensors: dict[str
     assert sound(simulate(replace(in_plane(**sensors), noise=noise), 6))
 
 
-@pytest.mark.skipif(not HAS_BENCHMARKS, reason="benchmarks are in a checkout only")
 @pytest.mark.parametrize(
-    ("first", "scenarios", "batch"),
-    [(0, 6, 16), pytest.param(10_000, 100, 80, marks=pytest.mark.thorough)],
+    ("numbers", "batch", "refused"),
+    [
+        pytest.param((0, 2, 3, 5), 16, (0, 0), id="few"),
+        # In the others no impulse is before the earliest arrival.
+        pytest.param(range(10_000, 10_100), 80, (20, 15), marks=pytest.mark.thorough, id="many"),
+    ],
 )
 @pytest.mark.parametrize(
     "rate_sensor", [False, pytest.param(True, marks=pytest.mark.thorough)], ids=["angles", "rates"]
 )
 def test_random_scenarios_with_burns_keep_the_guarantee(
-    rate_sensor: bool, first: int, scenarios: int, batch: int, monkeypatch: pytest.MonkeyPatch
+    rate_sensor: bool,
+    numbers: Sequence[int],
+    batch: int,
+    refused: tuple[int, int],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Every sensor, noise and tie rule; errors of the engine at their bounds in half of them."""
-    from benchmarks import soundness
-
+    soundness = pytest.importorskip("benchmarks.soundness", reason="only in a checkout")
     monkeypatch.setattr(soundness, "BATCH", batch)
     total = soundness.Count()
-    for number in range(first, first + scenarios):
+    for number in numbers:
         total += soundness.fly_random_batch(number, rate_sensor, seed=3, burns=True)
-    assert total == soundness.Count(total.engagements, refused=total.refused)
-    assert total.engagements > total.refused
+    left = len(numbers) - refused[rate_sensor]
+    assert total == soundness.Count(left * batch, refused=refused[rate_sensor] * batch)
 
 
 def test_maximum_impulse_that_is_not_given_follows_the_thrust_and_the_step(
@@ -226,7 +234,7 @@ def test_the_earliest_arrival_is_that_with_gravity(mission: Scenario) -> None:
 
 
 def test_the_causes_of_misses_know_that_a_burn_acts_later(mission: Scenario) -> None:
-    """Without noise and errors the miss without impulses is that of the coasting motion."""
+    """The miss without the executed impulses is that of the coasting motion."""
     scenario = burning(mission)
     results = simulate(scenario, 6)
     coasting = results.position_m[:, :2] + results.velocity_m_s[:, :2] * (
@@ -237,7 +245,7 @@ def test_the_causes_of_misses_know_that_a_burn_acts_later(mission: Scenario) -> 
     np.testing.assert_allclose(results.unguided_miss_m, np.hypot(*coasting.T), rtol=1e-6)
 
 
-def test_the_lower_bound_stays_below_the_misses_and_has_no_value_of_the_game(
+def test_lower_bound_of_burns_is_that_of_impulses_and_no_value_of_the_game(
     mission: Scenario,
 ) -> None:
     scenario = burning(mission)
@@ -245,3 +253,23 @@ def test_the_lower_bound_stays_below_the_misses_and_has_no_value_of_the_game(
     # A burn corrects less than the impulse: the bound of impulses is a bound of burns.
     found = lower_bound(scenario)
     assert found.bound_m == pytest.approx(lower_bound(mission).bound_m, rel=1e-9)
+
+
+@pytest.mark.parametrize("is_scheduled", [True, False])
+def test_one_of_a_pair_of_motions_misses_by_the_bound_with_burns(
+    mission: Scenario, is_scheduled: bool
+) -> None:
+    """Few impulses are too weak for the starts, 34 km; with one in each step until 180 s, what the
+    images cannot tell apart decides, 39 m.
+    """
+    scenario = burning(mission)
+    if not is_scheduled:
+        engine = replace(scenario.thruster, impulses_s=(), last_impulse_s=180.0)
+        scenario = replace(scenario, thruster=engine)
+    found = lower_bound(scenario)
+    assert (found.bound_m > 1e3) == is_scheduled
+    for pair in found.pairs:
+        for strategy in ("symmetric-miss", "least-effort"):
+            flight = fly_pair(scenario, pair, make_strategy(strategy))
+            assert flight.max_error_share <= 1.0
+            assert flight.results.miss_m.max() >= pair.bound_m

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -37,7 +36,6 @@ from tests.sensors import linear
 
 CASES = Path(__file__).parent / "cases"
 kernels = callable_kernels(windows)
-HAS_BENCHMARKS = importlib.util.find_spec("benchmarks") is not None
 
 
 def sound(results: Results) -> bool:
@@ -77,7 +75,6 @@ def test_scenarios_of_earlier_failures_keep_the_guarantee(
     assert Outcome.SET_EMPTY not in results.outcomes
 
 
-@pytest.mark.skipif(not HAS_BENCHMARKS, reason="benchmarks are in a checkout only")
 @pytest.mark.parametrize("rate_sensor", [False, True])
 @pytest.mark.parametrize(
     ("first", "scenarios", "batch"),
@@ -89,8 +86,7 @@ def test_random_scenarios_keep_the_guarantee(
     """Every sensor, noise and tie rule, with warnings as errors; `benchmarks/soundness.py` flies
     300 000.
     """
-    from benchmarks import soundness
-
+    soundness = pytest.importorskip("benchmarks.soundness", reason="only in a checkout")
     monkeypatch.setattr(soundness, "BATCH", batch)
     total = soundness.Count()
     for number in range(first, first + scenarios):
