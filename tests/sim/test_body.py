@@ -28,19 +28,22 @@ def impactor() -> Scenario:
 
 @pytest.mark.parametrize(
     ("distance_m", "probability"),
-    [(57.9, 1.0), (60.0, 0.7798), (70.0, 0.4685), (80.0, 0.2693), (88.6, 0.0)],
+    [(57.9, 1.0), (60.0, 0.7793), (70.0, 0.4683), (80.0, 0.2693), (88.6, 0.0)],
 )
 def test_hit_probability_is_the_share_of_the_directions(
     distance_m: float, probability: float
 ) -> None:
-    """The numbers are those of 10^6 sampled directions, with an error of 0.0005."""
+    """The numbers are shares of 10^6 sampled directions."""
     body = Body(semi_axes_m=DIMORPHOS_M)
-    assert body.hit_probability(distance_m) == pytest.approx(probability, abs=1e-4)
+    found = body.hit_probability(distance_m)
+    # A share of samples has a standard error of at most 0.0005.
+    assert found == pytest.approx(probability, abs=1e-3)
 
     turns = np.linspace(0.0, np.pi, 100_001)
     points = np.tile([[distance_m], [0.0]], len(turns))
     share = body.contains(points, turns).mean()
-    assert share == pytest.approx(probability, abs=1e-3)
+    # Of equally spaced directions, up to four are on the wrong side of an end.
+    assert share == pytest.approx(float(found), abs=4e-5)
 
 
 @pytest.mark.parametrize(
