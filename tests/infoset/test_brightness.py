@@ -67,10 +67,22 @@ def test_mean_covers_both_laws_with_six_percent_at_every_phase() -> None:
             assert abs(offset_share(phase_rad, law) - mean) <= 0.06 * mean
 
 
-@pytest.mark.parametrize("law", Brightness)
-def test_offset_is_zero_at_full_phase_and_continuous(law: Brightness) -> None:
+@pytest.mark.parametrize(
+    ("law", "slope"),
+    [
+        (Brightness.LAMBERT, 3.0 / 8.0),
+        (Brightness.LOMMEL_SEELIGER, 1.0 / 3.0),
+        (Brightness.MEAN, 17.0 / 48.0),
+        (Brightness.BINARY, 0.0),
+    ],
+)
+def test_offset_at_small_phases_is_proportional_to_them(law: Brightness, slope: float) -> None:
     assert offset_share(0.0, law) == 0.0
-    assert offset_share(1e-9, law) == pytest.approx(0.0, abs=1e-9)
+    # The next terms are at most of second order; that of `BINARY` is 2/(3 pi) of the square.
+    for phase_rad in (1e-9, 1e-4):
+        assert offset_share(phase_rad, law) == pytest.approx(
+            slope * phase_rad, abs=1e-3 * phase_rad
+        )
 
 
 def test_residual_is_the_sum_of_its_parts() -> None:
