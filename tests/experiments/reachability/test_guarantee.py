@@ -48,7 +48,7 @@ from infoset.rendezvous.reachability import (
 )
 from tests.built_in import problem_text
 from tests.experiments.command_line import Command
-from tests.rendezvous.reachability.leo_rendezvous import orbit_of, two_body
+from tests.rendezvous.reachability.leo_rendezvous import GRAVITY, orbit_of, two_body
 
 ARCH = "approach-guaranteed"
 SHORT = ("--set", "periods=4", "--set", "max_impulse_m_s=5.0")
@@ -368,8 +368,9 @@ def test_directions_and_ranges_guarantee_less_than_fixed_lines_of_sight(infoset:
 
     found = infoset.json("reach", "sight.toml", "--flights", "400")
 
-    # 8.89 m with the lines of sight of the plan without measurements, by an independent program.
-    assert found["affine"] < 8.89
+    # 8.89 m with the lines of sight of the plan without measurements, by an independent program,
+    # and 6.4601 m if the position is known to 3 m, which is about as good near the target.
+    assert found["affine"] < 6.6
     assert found["flights"]["outside"] == 0
     assert found["flights"]["largest"] > 0.6 * found["affine"]
     assert found["answered"] is found["bound"] is found["radius"] is None
@@ -652,7 +653,14 @@ def test_guarantee_for_nonlinear_motion_is_greater(infoset: Command) -> None:
     assert found["nonlinear"]
     assert found["bound"] is None
     assert found["answered_refusal"] == "only for linear motion"
-    assert linear["affine"] < found["affine"] < 1.01 * linear["affine"]
+    # Theorem 7 for the start, 1018 m away with its error, and the reserve of 2 %. An acceleration
+    # is seen after a period, and the next impulse answers it: its effect on the velocity at the
+    # end is that of two periods of 600 s at most.
+    distance_m = 1.02 * 1018.5
+    radius_m = 42124957.7
+    acceleration = 3.0 * GRAVITY * distance_m**2 / (radius_m - distance_m) ** 4
+    effect = 2.0 * 600.0 * acceleration / 0.0008333333333
+    assert linear["affine"] < found["affine"] < linear["affine"] + effect
 
 
 def test_guarantee_without_measurements_is_that_of_the_plan_that_is_flown() -> None:

@@ -17,6 +17,8 @@ START = np.array([-900.0, -400.0, 0.0, 0.0])
 START_ERROR = np.array([25.0, 25.0, 0.5, 0.5])
 GOAL = np.diag([1.0, 1.0, 20.0, 20.0])
 """A box of 1 m and 0.05 m/min."""
+ROUNDING = 1e-9
+"""A flight of ten periods rounds its states by less than this."""
 
 
 def arch(

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from infoset.arrays import Floats
 from infoset.geometry.zonotope import Zonotope
-from infoset.rendezvous.reachability import OutputProblem, impulsive
-from infoset.rendezvous.relative_motion import EllipticOrbit, TschaunerHempel
+from infoset.rendezvous.reachability import AffinePlan, OutputProblem, impulsive
+from infoset.rendezvous.relative_motion import EllipticOrbit, LinearMotion, TschaunerHempel
 
 GRAVITY = 3.986004418e14
 PERIGEE_M = 6778137.0
 PERIODS = 12
 START_ERROR = np.repeat([20.0, 0.01], 3)
+FREE = EllipticOrbit(1e-9)
+"""An orbit so slow that motion is straight, to 1e-6 m in the cases of the tests."""
 
 
 def orbit_of(eccentricity: float = 0.0) -> EllipticOrbit:
@@ -43,6 +47,50 @@ def rendezvous(
         execution_error=np.full(3, 1e-3),
         control_limits=np.full((periods, 3), limit),
     )
+
+
+def in_space(motion: LinearMotion, start: Floats) -> OutputProblem:
+    """Five impulses a minute apart, with errors along all axes; the position is known to 1 m."""
+    transition, control = impulsive(motion, 5, 60.0)
+    error = np.repeat([20.0, 0.05], 3)
+    return OutputProblem(
+        transition,
+        control,
+        np.repeat(np.eye(3, 6)[None], 5, axis=0),
+        np.repeat(np.eye(3)[None], 5, axis=0),
+        Zonotope.box(start - error, start + error),
+        np.diag(np.repeat([1.0, 50.0], 3)),
+        execution_error=np.full(3, 1e-3),
+        control_limits=np.full((5, 3), 10.0),
+    )
+
+
+def fly(
+    plan: AffinePlan, z: Floats, move: Callable[[int, Floats], Floats]
+) -> tuple[Floats, Floats]:
+    """Return states (T + 1, k, 6) and impulses (T, k, 3) with their errors of k flights.
+
+    `z`, shape (k, 6 + 6 T), are errors of the start, the execution and the measurements as parts of
+    their bounds. `move` returns the states at the end of a period from those after its impulse.
+    """
+    problem = plan.problem
+    count = len(z)
+    execution, noise = np.split(z[:, 6:].reshape(count, 2 * PERIODS, 3), 2, axis=1)
+    states = [problem.centre + START_ERROR * z[:, :6]]
+    predicted = np.tile(problem.centre, (count, 1))
+    pure = list[Floats]()
+    impulses = []
+    for t in range(PERIODS):
+        pure.append(states[t][:, :3] + noise[:, t] - predicted[:, :3])
+        command = plan.nominal[t] + sum(pure[s] @ plan.gains[t, s].T for s in range(t + 1))
+        assert (np.abs(command) <= problem.limits[t]).all()
+        impulses.append(command + 1e-3 * execution[:, t])
+        after = states[t].copy()
+        after[:, 3:] += impulses[t]
+        states.append(move(t, after))
+        predicted[:, 3:] += command
+        predicted = predicted @ problem.transition[t].T
+    return np.array(states), np.array(impulses)
 
 
 def hill(rate: float, time_s: float) -> Floats:

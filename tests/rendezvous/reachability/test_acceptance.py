@@ -29,20 +29,13 @@ from infoset.rendezvous.reachability import (
     safe_plan,
     whole_problem,
 )
+from tests.rendezvous.reachability.hops import HOP_S, HOPS, RATE, highest, hop, limits
 from tests.rendezvous.reachability.leo_rendezvous import (
     PERIGEE_M,
     hill,
     orbit_of,
     rendezvous,
 )
-from tests.rendezvous.reachability.test_within_periods import (
-    HOPS,
-    RATE,
-    highest,
-    hop,
-    limits,
-)
-from tests.rendezvous.reachability.test_within_periods import PERIOD_S as HOP_S
 
 PERIOD_S = 240.0
 KEEP_OUT_M = 100.0
@@ -50,17 +43,8 @@ PERIODS = 4
 
 
 def short() -> OutputProblem:
-    """The first four periods of the rendezvous in low orbit."""
-    problem = rendezvous(orbit_of(), limit=5.0)
-    assert problem.control_limits is not None
-    return replace(
-        problem,
-        transition=problem.transition[:PERIODS],
-        control=problem.control[:PERIODS],
-        output=problem.output[:PERIODS],
-        noise=problem.noise[:PERIODS],
-        control_limits=problem.control_limits[:PERIODS],
-    )
+    """The rendezvous in low orbit in four periods."""
+    return rendezvous(orbit_of(), limit=5.0, periods=PERIODS)
 
 
 def coasting() -> Coasting:

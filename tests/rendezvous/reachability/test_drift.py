@@ -27,15 +27,14 @@ from infoset.rendezvous.reachability import (
 from infoset.rendezvous.relative_motion import EllipticOrbit, TschaunerHempel
 from tests.rendezvous.reachability.arch_rendezvous import corners
 from tests.rendezvous.reachability.leo_rendezvous import (
+    FREE,
     PERIODS,
-    START_ERROR,
+    fly,
     hill,
     orbit_of,
     rendezvous,
 )
 
-FREE = EllipticOrbit(1e-9)
-"""An orbit so slow that motion is straight, to 1e-6 m in the cases below."""
 KEEP_OUT_M = 60.0
 
 
@@ -169,29 +168,7 @@ def errors(count: int, seed: int) -> Floats:
 
 def flights(plan: AffinePlan, z: Floats) -> tuple[Floats, Floats]:
     """States (T + 1, k, 6) and impulses (T, k, 3) with their errors, by the problem's matrices."""
-    problem = plan.problem
-    count = len(z)
-    execution = 1e-3 * z[:, 6 : 6 + 3 * PERIODS].reshape(count, PERIODS, 3)
-    noise = z[:, 6 + 3 * PERIODS :].reshape(count, PERIODS, 3)
-    states = [problem.centre + START_ERROR * z[:, :6]]
-    predicted = problem.centre
-    pure = []
-    impulses = []
-    commands = np.zeros((count, PERIODS, 3))
-    offset = np.zeros((count, 6)) + predicted
-    for t in range(PERIODS):
-        outputs = states[t][:, :3] + noise[:, t]
-        pure.append(outputs - offset[:, :3])
-        command = plan.nominal[t] + sum(pure[s] @ plan.gains[t, s].T for s in range(t + 1))
-        commands[:, t] = command
-        impulses.append(command + execution[:, t])
-        after = states[t].copy()
-        after[:, 3:] += impulses[t]
-        states.append(after @ problem.transition[t].T)
-        offset[:, 3:] += command
-        offset = offset @ problem.transition[t].T
-    assert (np.abs(commands).max(axis=0) <= problem.limits).all()
-    return np.array(states), np.array(impulses)
+    return fly(plan, z, lambda t, after: after @ plan.problem.transition[t].T)
 
 
 def after_impulses(states: Floats, impulses: Floats) -> Floats:

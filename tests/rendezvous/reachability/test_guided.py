@@ -11,7 +11,6 @@ from scipy.optimize import linprog
 
 from infoset.arrays import Floats
 from infoset.geometry.polytope import Polytope
-from infoset.geometry.zonotope import Zonotope
 from infoset.rendezvous.reachability import (
     AffinePlan,
     AnsweredPlan,
@@ -23,17 +22,21 @@ from infoset.rendezvous.reachability import (
     answered_plan,
     guided,
     guided_flight,
-    impulsive,
     lower_bound,
 )
 from infoset.rendezvous.reachability.answer import last_answer
 from infoset.rendezvous.reachability.conic import NoSolutionError
 from infoset.rendezvous.reachability.guaranteed import plan_at_caps
 from infoset.rendezvous.relative_motion import EllipticOrbit, TschaunerHempel
-from tests.rendezvous.reachability.arch_rendezvous import START, START_ERROR, arch, fly, norms
-
-ROUNDING = 1e-9
-"""A flight of ten periods rounds its states by less than this."""
+from tests.rendezvous.reachability.arch_rendezvous import (
+    ROUNDING,
+    START,
+    START_ERROR,
+    arch,
+    fly,
+    norms,
+)
+from tests.rendezvous.reachability.leo_rendezvous import in_space
 
 
 @pytest.fixture(scope="module")
@@ -447,19 +450,8 @@ def test_path_holds_in_flight() -> None:
 
 def test_six_states_keep_the_promises_and_improve_them() -> None:
     orbit = EllipticOrbit.of_size(6778137.0, 0.5, 3.986004418e14)
-    transition, control = impulsive(TschaunerHempel(orbit), 5, 60.0)
     start = np.array([0.0, -1000.0, 0.0, 0.0, 0.0, 0.0])
-    error = np.repeat([20.0, 0.05], 3)
-    problem = OutputProblem(
-        transition,
-        control,
-        np.repeat(np.eye(3, 6)[None], 5, axis=0),
-        np.repeat(np.eye(3)[None], 5, axis=0),
-        Zonotope.box(start - error, start + error),
-        np.diag(np.repeat([1.0, 50.0], 3)),
-        execution_error=np.full(3, 1e-3),
-        control_limits=np.full((5, 3), 10.0),
-    )
+    problem = in_space(TschaunerHempel(orbit), start)
     plan = affine_plan(problem, 3)
 
     witness = Witness(uniform_truth(problem, np.random.default_rng(1)))

@@ -14,45 +14,34 @@ from infoset.rendezvous.reachability import (
     PathRows,
     affine_plan,
     answered_plan,
-    impulsive,
     independent_parts,
     information_radius,
     lower_bound,
     plan_of_parts,
 )
 from infoset.rendezvous.relative_motion import ClohessyWiltshire
+from tests.rendezvous.reachability.leo_rendezvous import in_space
 
 SOLVED = 1e-6
 """Relative difference of certificates of two programs with the same optimum, solved to 1e-7."""
 
 
-def in_space(relative: bool = False) -> OutputProblem:
-    """Five impulses a minute apart in low orbit, with errors along all axes."""
-    transition, control = impulsive(ClohessyWiltshire(0.00113), 5, 60.0)
+def low_orbit(relative: bool = False) -> OutputProblem:
+    """In low orbit, 500 m behind and 30 m aside."""
     start = np.array([0.0, -500.0, 30.0, 0.0, 0.0, 0.0])
-    error = np.repeat([20.0, 0.05], 3)
-    return OutputProblem(
-        transition,
-        control,
-        np.repeat(np.eye(3, 6)[None], 5, axis=0),
-        np.repeat(np.eye(3)[None], 5, axis=0),
-        Zonotope.box(start - error, start + error),
-        np.diag(np.repeat([1.0, 50.0], 3)),
-        execution_error=np.full(3, 1e-3),
-        relative_error=np.full(3, 0.01) if relative else None,
-        control_limits=np.full((5, 3), 10.0),
-    )
+    problem = in_space(ClohessyWiltshire(0.00113), start)
+    return replace(problem, relative_error=np.full(3, 0.01)) if relative else problem
 
 
 def test_plane_and_normal_of_an_orbit_are_parts() -> None:
-    plane, normal = independent_parts(in_space())
+    plane, normal = independent_parts(low_orbit())
 
     assert [each.tolist() for each in plane[1:]] == [[0, 1, 3, 4], [0, 1], [0, 1]]
     assert [each.tolist() for each in normal[1:]] == [[2, 5], [2], [2]]
 
 
 def test_largest_number_of_the_parts_is_that_of_the_whole() -> None:
-    whole = in_space()
+    whole = low_orbit()
     parts = independent_parts(whole)
     plans = [(part, affine_plan(part.problem)) for part in parts]
 
@@ -70,7 +59,7 @@ def test_largest_number_of_the_parts_is_that_of_the_whole() -> None:
 
 
 def test_caps_of_the_whole_are_those_of_the_parts() -> None:
-    whole = in_space(relative=True)
+    whole = low_orbit(relative=True)
     plans = [(part, affine_plan(part.problem)) for part in independent_parts(whole)]
 
     plan = plan_of_parts(whole, plans)
@@ -81,7 +70,7 @@ def test_caps_of_the_whole_are_those_of_the_parts() -> None:
 
 
 def test_part_at_rest_is_left_out() -> None:
-    whole = in_space()
+    whole = low_orbit()
     start = np.array([0.0, -500.0, 0.0, 0.0, 0.0, 0.0])
     error = np.array([20.0, 20.0, 0.0, 0.05, 0.05, 0.0])
     planar = replace(
@@ -105,7 +94,7 @@ def test_part_at_rest_is_left_out() -> None:
 
 @pytest.mark.parametrize("coupled", ["path", "disturbance", "noise", "goal", "polytope"])
 def test_what_acts_on_both_parts_joins_them(coupled: str) -> None:
-    whole = in_space()
+    whole = low_orbit()
     both = np.array([0.0, 1.0, 1.0, 0.0, 0.0, 0.0])
     rows = PathRows(
         np.array([2]), both[None], np.zeros((1, 3)), np.array([-np.inf]), np.array([1e4])

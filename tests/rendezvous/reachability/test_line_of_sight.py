@@ -17,17 +17,22 @@ from infoset.rendezvous.reachability import (
     SightTruth,
     affine_plan,
     guided_flight,
+    lower_bound,
     sighted_plan,
 )
 from infoset.rendezvous.reachability.line_of_sight import SightRows, axes_of
-from tests.rendezvous.reachability.arch_rendezvous import START, START_ERROR, arch, norms
+from tests.rendezvous.reachability.arch_rendezvous import (
+    ROUNDING,
+    START,
+    START_ERROR,
+    arch,
+    norms,
+)
 
 SENSOR = SightSensor(np.radians(0.5), 3.0)
 ANGLES = SightSensor(np.radians(0.5))
 FIXED_LINES_M = 8.89
 """Guarantee of the ARCH rendezvous with lines of sight of a plan before, after ten programs."""
-ROUNDING = 1e-9
-"""A flight of ten periods rounds its states by less than this."""
 
 
 @cache
@@ -90,8 +95,9 @@ def test_flights_with_true_directions_and_ranges_are_inside(flights: int) -> Non
 
 
 def test_renewed_lines_of_sight_guarantee_less_than_fixed_ones() -> None:
-    # The angle alone is an error of 8.6 m at the start, and of 0.3 m at the last impulse.
-    assert 6.4601 - 3.0 < plan().guarantee < FIXED_LINES_M
+    # Near the target the error of the angle is below 3 m. So the sensor is about as good as
+    # positions that are known to 3 m, 6.4601 m.
+    assert lower_bound(plan().problem).value <= plan().guarantee < 6.6 < FIXED_LINES_M
     assert plan().excess <= 0.0
 
 
@@ -169,16 +175,18 @@ def last_guarantee(before: AffinePlan, sensor: SightSensor, seed: int) -> float:
 def test_angles_alone_are_known_only_in_flight() -> None:
     assert blind().guarantee == pytest.approx(116.2046, abs=1e-4)
 
-    assert max(last_guarantee(blind(), ANGLES, seed) for seed in (0, 1)) < 80.0
+    assert max(last_guarantee(blind(), ANGLES, seed) for seed in (0, 1)) < 65.0
 
 
 @pytest.mark.thorough
-def test_angles_alone_guarantee_a_third_at_the_last_impulse() -> None:
-    # In 16 other flights, of an independent program: median 15.1 m, most 62.3 m.
+def test_angles_alone_guarantee_less_at_the_last_impulse() -> None:
+    # In 16 other flights, of an independent program: median 15.1 m, most 62.3 m. The guarantees
+    # are spread by about 20 m, so the medians of two sets of 16 differ by 9 m (one standard
+    # deviation, 1.25 * 20 m * sqrt(2 / 16)).
     last = [last_guarantee(blind(), ANGLES, seed) for seed in range(16)]
 
-    assert np.median(last) < 40.0
-    assert max(last) < 80.0
+    assert np.median(last) < 15.1 + 2.0 * 9.0
+    assert max(last) < 65.0
 
 
 def test_ranges_and_directions_keep_the_promises_in_flight() -> None:

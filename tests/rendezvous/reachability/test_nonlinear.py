@@ -28,7 +28,7 @@ from tests.rendezvous.reachability.leo_rendezvous import (
     GRAVITY,
     PERIGEE_M,
     PERIODS,
-    START_ERROR,
+    fly,
     orbit_of,
     rendezvous,
     two_body,
@@ -100,35 +100,26 @@ def safe_nonlinear() -> tuple[NonlinearPlan, DriftCertificate]:
     return found, drift_certificate(found.plan, motion)
 
 
-def fly(
+def fly_about_body(
     found: NonlinearPlan, orbit: EllipticOrbit, count: int, seed: int
 ) -> tuple[Floats, Floats, Floats]:
-    """Return nonlinear states (T + 1, k, 6), impulses (T, k, 3) and distances (T,) of flights."""
-    plan = found.plan
-    problem = plan.problem
+    """Return states, impulses and the farthest distance in each period of flights about a body.
+
+    Half of the errors are at their bounds.
+    """
     size = 6 + 6 * PERIODS
     uniform = np.random.default_rng(seed).uniform(-1.0, 1.0, (count // 2, size))
     z = np.vstack([uniform, corners(count - count // 2, size, seed + 1)])
-    execution, noise = np.split(z[:, 6:].reshape(count, 2 * PERIODS, 3), 2, axis=1)
-    states = [problem.centre + START_ERROR * z[:, :6]]
-    predicted = np.tile(problem.centre, (count, 1))
-    pure = list[Floats]()
-    impulses = []
     farthest = []
-    for t in range(PERIODS):
-        pure.append(states[t][:, :3] + noise[:, t] - predicted[:, :3])
-        command = plan.nominal[t] + sum(pure[s] @ plan.gains[t, s].T for s in range(t + 1))
-        impulses.append(command + 1e-3 * execution[:, t])
-        after = states[t].copy()
-        after[:, 3:] += impulses[t]
+
+    def move(t: int, after: Floats) -> Floats:
         times = PERIOD_S * (t + np.arange(1, 7) / 6.0)
         path = two_body(orbit, PERIOD_S * t, after, times)
         farthest.append(np.linalg.norm(path[..., :3], axis=-1).max())
-        states.append(path[-1])
-        predicted[:, 3:] += command
-        predicted = predicted @ problem.transition[t].T
-        assert (np.abs(command) <= problem.limits[t]).all()
-    return np.array(states), np.array(impulses), np.array(farthest)
+        return np.asarray(path[-1])
+
+    states, impulses = fly(found.plan, z, move)
+    return states, impulses, np.array(farthest)
 
 
 def terminal_norms(problem: OutputProblem, states: Floats) -> Floats:
@@ -138,7 +129,7 @@ def terminal_norms(problem: OutputProblem, states: Floats) -> Floats:
 def check_flights(eccentricity: float, behind_m: float, count: int) -> float:
     """Return the largest terminal norm, as a part of the guarantee."""
     found = plan_of(eccentricity, behind_m)
-    states, _, farthest = fly(found, orbit_of(eccentricity), count, 11)
+    states, _, farthest = fly_about_body(found, orbit_of(eccentricity), count, 11)
     assert (farthest < found.radii).all()
     reached = float(terminal_norms(found.plan.problem, states).max() / found.plan.guarantee)
     assert reached <= 1.0
@@ -163,7 +154,13 @@ def test_nonlinear_guarantee_is_above_the_linear_one_and_grows_with_the_distance
     near = plan_of(0.0, 1000.0)
     far = plan_of(0.0, 10000.0)
 
-    assert linear.guarantee < near.plan.guarantee < far.plan.guarantee
+    # An acceleration is seen after a period, and the next impulse answers it: the velocity at the
+    # end differs by its effect of two periods at most.
+    box_m_s = 0.02
+    for found in (near, far):
+        effect = 2.0 * PERIOD_S * found.accelerations.max() / box_m_s
+        assert linear.guarantee < found.plan.guarantee < linear.guarantee + effect
+    assert near.plan.guarantee < far.plan.guarantee
     assert (near.radii < near.assumed).all()
     # 3 mu rho^2 / R^4 is 5.7e-7 m/s^2 at 1 km, and a hundred times as large at 10 km.
     assert 5.6e-7 < near.accelerations.max() < 7e-7
@@ -174,7 +171,7 @@ def check_drifts(count: int) -> float:
     """Return the least distance in nonlinear drifts after each impulse."""
     found, certificate = safe_nonlinear()
     orbit = orbit_of()
-    states, impulses, _ = fly(found, orbit, count, 13)
+    states, impulses, _ = fly_about_body(found, orbit, count, 13)
     nearest = np.inf
     for k in range(PERIODS):
         after = states[k].copy()

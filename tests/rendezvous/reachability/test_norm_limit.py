@@ -18,10 +18,8 @@ from infoset.rendezvous.reachability import (
     norm_faces,
     with_errors,
 )
-from infoset.rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, TschaunerHempel
-
-FREE = EllipticOrbit(1e-9)
-"""An orbit so slow that motion is straight, to 1e-6 m in the cases below."""
+from infoset.rendezvous.relative_motion import ClohessyWiltshire, TschaunerHempel
+from tests.rendezvous.reachability.leo_rendezvous import FREE
 
 
 def radii(controls: int) -> np.ndarray:

@@ -24,7 +24,7 @@ from infoset.rendezvous.reachability import (
     whole_problem,
     with_errors,
 )
-from tests.rendezvous.reachability.test_bounded_errors import BOX, approach, errors, problem
+from tests.rendezvous.reachability.bounded_approach import BOX, approach, errors, problem
 
 
 def test_constraints_hold_before_and_after_impulses_and_between_them_for_all_errors() -> None:

@@ -8,7 +8,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from infoset.arrays import Floats
 from infoset.geometry.zonotope import Zonotope
 from infoset.rendezvous.reachability import (
     AffinePlan,
@@ -22,70 +21,16 @@ from infoset.rendezvous.reachability import (
     impulsive,
     plan_within,
 )
-from infoset.rendezvous.relative_motion import EllipticOrbit, TschaunerHempel
-from tests.rendezvous.reachability.arch_rendezvous import corners
-from tests.rendezvous.reachability.leo_rendezvous import GRAVITY, PERIGEE_M, hill, orbit_of
+from infoset.rendezvous.relative_motion import TschaunerHempel
+from tests.rendezvous.reachability.hops import BELOW, HOP_S, RATE, highest, hop, limits
+from tests.rendezvous.reachability.leo_rendezvous import FREE, hill
 
-FREE = EllipticOrbit(1e-9)
-"""An orbit so slow that motion is straight, to 1e-6 m in the cases below."""
-PERIOD_S = 900.0
-HOPS = 3
-RATE = float(np.sqrt(GRAVITY / PERIGEE_M**3))
-"""Mean motion, rad/s."""
-BELOW = -np.eye(6)[:1]
-"""The normal of constraints on the depth below the orbit."""
 ENDLESS = np.full(2, np.inf)
-
-
-def hop() -> OutputProblem:
-    """Three impulses 15 minutes apart in low orbit, from 1000 m behind to 150 m behind."""
-    transition, control = impulsive(TschaunerHempel(orbit_of()), HOPS, PERIOD_S)
-    start = np.array([0.0, -1000.0, 0.0, 0.0, 0.0, 0.0])
-    error = np.repeat([10.0, 0.01], 3)
-    return OutputProblem(
-        transition,
-        control,
-        np.repeat(np.eye(3, 6)[None], HOPS, axis=0),
-        np.repeat(np.eye(3)[None], HOPS, axis=0),
-        Zonotope.box(start - error, start + error),
-        np.diag(np.repeat([1.0, 50.0], 3)),
-        target=np.array([0.0, -150.0, 0.0, 0.0, 0.0, 0.0]),
-        execution_error=np.full(3, 1e-3),
-        control_limits=np.full((HOPS, 3), 2.0),
-    )
-
-
-def limits(offset_m: float, normals: Floats = BELOW, instants: int = 16) -> PathLimits:
-    flight = Coasting(orbit_of(), PERIOD_S, HOPS, 1, instants)
-    return PathLimits(flight, normals, np.full((HOPS, len(normals)), offset_m))
 
 
 @cache
 def free() -> AffinePlan:
     return affine_plan(hop())
-
-
-def highest(plan: AffinePlan, normals: Floats) -> float:
-    """The largest normals . state of 200 flights at 201 instants of each period."""
-    problem = plan.problem
-    times = np.linspace(0.0, PERIOD_S, 201)
-    inner = np.array([hill(RATE, float(time_s)) for time_s in times])
-    largest = -np.inf
-    assert isinstance(problem.start, Zonotope)
-    for sign in corners(200, 6 + 2 * 3 * HOPS, 4):
-        start, execution, noise = np.split(sign, [6, 6 + 3 * HOPS])
-        state = problem.start.centre + start @ problem.start.generators
-        outputs = list[Floats]()
-        controls = list[Floats]()
-        for t in range(HOPS):
-            outputs.append(state[:3] + noise.reshape(-1, 3)[t])
-            controls.append(plan.control(np.array(outputs), np.array(controls)))
-            state = state.copy()
-            state[3:] += controls[t] + 1e-3 * execution.reshape(-1, 3)[t]
-            path = inner @ state
-            largest = max(largest, float((path @ normals.T).max()))
-            state = path[-1]
-    return largest
 
 
 def test_constraint_holds_between_impulses_for_all_errors() -> None:
@@ -157,7 +102,7 @@ def test_answer_keeps_constraints_that_follow_from_the_guarantee() -> None:
     # All states whose end is in the box, carried back by the textbook's matrices.
     deepest = -np.inf
     half_widths = max(found) * np.repeat([1.0, 0.02], 3)
-    for time_s in np.linspace(0.0, PERIOD_S, 50):
+    for time_s in np.linspace(0.0, HOP_S, 50):
         back = np.linalg.inv(hill(RATE, float(time_s)))
         deepest = max(deepest, float((np.abs(back)[0] @ half_widths) - (back @ hop().aim)[0]))
     assert 150.0 < deepest <= 220.0
