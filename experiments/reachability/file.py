@@ -327,8 +327,6 @@ class Rendezvous:
             return
         if not self.has_impulses:
             raise ValueError(f'{key}: needs engine = "impulses"')
-        if self.passive_safety is not None and self.sight is not None:
-            raise ValueError("passive_safety: needs sensor.position_error_m, not angle_error_deg")
         if self.is_frozen_ellipse:
             raise ValueError(f'{key}: needs model = "time-varying" on an ellipse')
         last = None if self.passive_safety is None else self.passive_safety.until_period

@@ -272,7 +272,7 @@ def _checked_plan(
             proved.append(certificate)
             return certificate.plan
 
-        return _within(rendezvous, problem, safe)
+        return _sighted(rendezvous, problem, lambda each: _within(rendezvous, each, safe))
 
     problem = rendezvous.output_problem
     if rendezvous.sight is None:
@@ -292,7 +292,8 @@ def _checked_plan(
     if safety is None:
         return CheckedPlan(checked, None, found)
     # Its directions prove at least the distance of its constraints.
-    certificate = drift_certificate(checked, drifts, proved[-1].normals)
+    normals = next((each.normals for each in proved if each.plan is checked), None)
+    certificate = drift_certificate(checked, drifts, normals)
     return CheckedPlan(checked, certificate, found)
 
 
@@ -399,10 +400,17 @@ def best_plan(rendezvous: Rendezvous, problem: OutputProblem) -> AffinePlan:
 
 def _feedback(rendezvous: Rendezvous, problem: OutputProblem) -> AffinePlan:
     """Return the best affine plan of a problem with the sensor of a rendezvous."""
+    return _sighted(rendezvous, problem, lambda each: best_plan(rendezvous, each))
+
+
+def _sighted(
+    rendezvous: Rendezvous, problem: OutputProblem, solve: Callable[[OutputProblem], AffinePlan]
+) -> AffinePlan:
+    """Return a plan with the outputs of a problem, or with measured directions and ranges."""
     sight = rendezvous.sight
     if sight is None or not rendezvous.has_feedback:
-        return best_plan(rendezvous, problem)
-    return sighted_plan(problem, sight, 3, lambda each: best_plan(rendezvous, each))
+        return solve(problem)
+    return sighted_plan(problem, sight, 3, solve)
 
 
 def _within(

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from infoset.rendezvous._arrays import Flags, Floats
+from infoset.rendezvous.reachability.coasting import UnboundedCoastError
 from infoset.rendezvous.reachability.conic import NoSolutionError
 from infoset.rendezvous.reachability.guaranteed import (
     MAX_ROUNDS,
@@ -198,7 +199,7 @@ def sighted_plan(
 
     Raises
     ------
-    NoRobustPlanError, NoSolutionError
+    NoRobustPlanError, NoSolutionError, UnboundedCoastError
         As `solve`, in the first round.
     """
     blind = replace(
@@ -234,7 +235,7 @@ def _smaller(
     """Return the plan of a problem if its guarantee is smaller, or None."""
     try:
         found = solve(problem)
-    except (NoRobustPlanError, NoSolutionError):
+    except (NoRobustPlanError, NoSolutionError, UnboundedCoastError):
         return None
     return found if found.guarantee < best.guarantee else None
 

@@ -15,6 +15,7 @@ from infoset.rendezvous.reachability import (
     OutputProblem,
     SightSensor,
     SightTruth,
+    UnboundedCoastError,
     affine_plan,
     guided_flight,
     lower_bound,
@@ -99,6 +100,18 @@ def test_renewed_lines_of_sight_guarantee_less_than_fixed_ones() -> None:
     # positions that are known to 3 m, 6.4601 m.
     assert lower_bound(plan().problem).value <= plan().guarantee < 6.6 < FIXED_LINES_M
     assert plan().excess <= 0.0
+
+
+def test_further_round_without_a_plan_keeps_the_plan_before() -> None:
+    found = []
+
+    def solve(problem: OutputProblem) -> AffinePlan:
+        if found:
+            raise UnboundedCoastError("no bound")
+        found.append(affine_plan(problem, window=4))
+        return found[0]
+
+    assert sighted_plan(arch(4, 10.0, 300.0), SENSOR, 2, solve) is found[0]
 
 
 @pytest.mark.parametrize("size", [2, 3])
