@@ -103,7 +103,7 @@ def test_renewed_lines_of_sight_guarantee_less_than_fixed_ones() -> None:
 
 
 def test_further_round_without_a_plan_keeps_the_plan_before() -> None:
-    found = []
+    found = list[AffinePlan]()
 
     def solve(problem: OutputProblem) -> AffinePlan:
         if found:
