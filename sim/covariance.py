@@ -61,7 +61,25 @@ class Covariance:
                 "Covariance: position_sigma_m and velocity_sigma_m_s must have as many values: "
                 f"got {positions} and {velocities}"
             )
+        self._check_exact_components()
         self._check_correlations()
+
+    def _check_exact_components(self) -> None:
+        """Raise ValueError if a component with the variance zero has another covariance.
+
+        abs(c_ij) <= sigma_i sigma_j = 0 without a tolerance: rounding leaves zeros of a file zero.
+        """
+        if not self.matrix_m2:
+            return
+        matrix = _symmetric("matrix_m2", self.matrix_m2)
+        rows, columns = np.nonzero((self.sigma == 0.0)[:, None] & (matrix != 0.0))
+        if rows.size:
+            row = rows[0]
+            column = columns[0]
+            raise ValueError(
+                f"Covariance: the variance of component {row + 1} is 0, so that its covariance "
+                f"with component {column + 1} must be 0: got {matrix[row, column]:.3g}"
+            )
 
     def _check_correlations(self) -> None:
         """Raise ValueError unless the correlations are a covariance of n components."""
@@ -106,8 +124,7 @@ class Covariance:
     def correlation(self) -> Floats:
         """Correlations, shape (n, n).
 
-        A component whose variance in `matrix_m2` is zero has zeros and one: its covariances there,
-        which can only be zero, are not used.
+        A component whose variance in `matrix_m2` is zero has zeros and one.
         """
         if self.matrix_m2:
             inverse = np.divide(1.0, self.sigma, out=np.zeros(self.size), where=self.sigma > 0.0)

@@ -80,6 +80,10 @@ def test_an_exact_component_and_one_that_follows_from_another_are_kept() -> None
             {"matrix_m2": ((1.0, 0.9, -0.9), (0.9, 1.0, 0.9), (-0.9, 0.9, 1.0))},
             "have a negative eigenvalue, -0.8: check",
         ),
+        (
+            {"matrix_m2": ((0.0, 1.0), (1.0, 4.0))},
+            "variance of component 1 is 0, so that its covariance with component 2 must be 0",
+        ),
         ({"matrix_m2": ((1.0,), (0.0, -1.0))}, "variances must not be negative"),
         ({"matrix_m2": ((1.0, 0.0), (0.0,))}, "square matrix or its lower triangle"),
         (
