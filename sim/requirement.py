@@ -152,7 +152,7 @@ def parse_requirement(text: str) -> AnyRequirement:
     The text `miss_m<10` without a quantile means the 99 % quantile, and `hit>0.95` means
     `hit>=0.95`.
     """
-    match = _FORM.fullmatch(text[:100])
+    match = _FORM.fullmatch(text)
     if match is None:
         raise ValueError(
             "must be hit>=SHARE, no-CAUSE>=SHARE or QUANTITY pLEVEL<BOUND, for example "

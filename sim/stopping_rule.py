@@ -89,7 +89,7 @@ class StoppingRule(Checked):
         ValueError
             For any other text.
         """
-        match = _RULE.fullmatch(text[:100])
+        match = _RULE.fullmatch(text)
         if match is None:
             raise ValueError(
                 'must be a quantity, a quantile and a width, for example "miss_m p99 ci<0.5"'

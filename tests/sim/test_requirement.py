@@ -170,6 +170,7 @@ def test_requirement_without_a_quantile_uses_p99(text: str) -> None:
             "miss_m<0",
             "miss_m<1e400",
             "miss_m<10 m",
+            "miss_m p99<10" + 90 * " " + "junk",
             "miss<10",
             "p99<10",
         ),

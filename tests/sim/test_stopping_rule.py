@@ -66,6 +66,7 @@ def test_the_texts_of_rules_and_requirements_are_exact(level: float, number: flo
         "miss_m p99 ci<nan",
         "miss_m p99 ci>1",
         "miss p99 ci<1",
+        "miss_m p99 ci<0.5" + 90 * " " + "junk",
     ],
 )
 def test_malformed_rule_is_refused(text: str) -> None:
