@@ -313,8 +313,8 @@ class _OptimumSearch:
         allowed = max(MAX_GAP * self.value, _ABSOLUTE * self._reach)
         if not (self._gap <= allowed and self.violation <= MAX_VIOLATION):
             raise NoSolutionError(
-                f"the minimum terminal norm was not solved to {MAX_GAP:g}: relative gap "
-                f"{self._gap / self.value:.2g}, constraints violated by {self.violation:.2g}"
+                f"the minimum terminal norm, {self.value:.2g}, was not solved to {MAX_GAP:g}: gap "
+                f"{self._gap:.2g}, constraints violated by {self.violation:.2g}"
             )
         # If zero is inside the set of terminal states, no constraint is active.
         if self.at_zero and self._bound < -_ZERO * self._reach:

@@ -26,7 +26,9 @@ from infoset.rendezvous.reachability import (
     samples,
     solve,
 )
+from infoset.rendezvous.reachability.admissible import lift
 from infoset.rendezvous.reachability.conic import CONE_TOLERANCE, MAX_GAP, NoSolutionError
+from infoset.rendezvous.reachability.optimum import _OptimumSearch
 from tests.rendezvous.reachability.conftest import Paper
 
 from .high_precision import Dense, cone_program, precise_min_norm
@@ -103,6 +105,16 @@ def test_miss_is_zero_only_above_the_minimum_bound(
     assert assert_precise(below, miss)
     above = replace(problem, control_bounds=np.full(3, minimum * (1.0 + gap)))
     assert optimal_controls(above).miss == 0.0
+
+
+def test_norm_of_zero_that_violates_a_constraint_is_refused(paper: Paper) -> None:
+    (block, *_) = paper(periods=3).blocks
+    search = _OptimumSearch(lift(block), np.ones(block.size))
+    search.value = 0.0
+    search.violation = 0.5
+
+    with pytest.raises(NoSolutionError, match=r"norm, 0, .* gap 0, constraints violated by 0\.5"):
+        search.result()
 
 
 @pytest.mark.parametrize("bound", [0.115, 0.14, 0.172])
