@@ -14,6 +14,7 @@ from infoset.experiments.pursuit.report import (
     PursuitReport,
     saddle_point,
     thrust_angles,
+    verdict_text,
 )
 from infoset.rendezvous.pursuit_evasion import CaptureHistory, history, orbital_axes
 
@@ -44,7 +45,7 @@ def pursuit_page(report: PursuitReport) -> str:
     distance = np.linalg.norm(offset, axis=1)
 
     about = [
-        f"captured after {capture.time_s:.6g} s, closing speed {capture.closing_speed_m_s:.6g} m/s",
+        f"{verdict_text(solution)}; closing speed at the end {capture.closing_speed_m_s:.6g} m/s",
         saddle_point(report.certificate),
         f"axes: {INERTIAL_AXES}; relative to the evader, {AXES}",
     ]

@@ -123,7 +123,7 @@ def thrust_angles(player: PlayerHistory) -> Floats:
 def report_lines(report: PursuitReport) -> Iterator[Part]:
     """Yield the verdict, the players, the certificate and the simulations, for the screen."""
     solution = report.solution
-    yield f"{report.problem.name}: {_verdict(solution)}"
+    yield f"{report.problem.name}: {verdict_text(solution)}"
     yield f"axes: {INERTIAL_AXES}"
     if solution.capture is not None:
         yield from _capture_lines(solution.capture, solution)
@@ -170,7 +170,8 @@ def _capture_lines(capture: Capture, solution: CaptureSolution) -> Iterator[Part
     yield f"changes to a branch that keeps the evader farther away: {solution.branch_changes}"
 
 
-def _verdict(solution: CaptureSolution) -> str:
+def verdict_text(solution: CaptureSolution) -> str:
+    """Return the verdict of a game with its time."""
     if solution.capture is not None and solution.verdict is CertificateVerdict.CAPTURED:
         return (
             f"captured at {solution.capture.time_s:.6f} s "

@@ -7,13 +7,20 @@ from dataclasses import replace
 import pytest
 
 from infoset.experiments.common.input_file import load_problem
+from infoset.experiments.pursuit.page import pursuit_page
 from infoset.experiments.pursuit.report import (
     PursuitReport,
     report_json,
     report_lines,
     saddle_point,
 )
-from infoset.rendezvous.pursuit_evasion import CaptureSolution, Certificate, certify, solve
+from infoset.rendezvous.pursuit_evasion import (
+    CaptureSolution,
+    Certificate,
+    CertificateVerdict,
+    certify,
+    solve,
+)
 
 PROBLEM = load_problem("leo-pursuit")
 
@@ -55,3 +62,13 @@ def test_screen_and_json_agree_on_the_claim(
     assert isinstance(printed, dict)
     assert printed["saddle_point"] is is_claimed
     assert printed["failures"] == ()
+
+
+def test_page_has_the_verdict(solved: CaptureSolution) -> None:
+    not_certified = replace(solved, verdict=CertificateVerdict.BRANCH_NOT_CERTIFIED)
+
+    page = pursuit_page(PursuitReport(PROBLEM, not_certified, None, None))
+
+    assert "branch-not-certified: the extremals are a saddle up to" in page
+    assert "captured at" not in page
+    assert "captured at" in pursuit_page(PursuitReport(PROBLEM, solved, None, None))
