@@ -83,8 +83,10 @@ def simulate(problem: ObserverProblem, errors: Errors, seed: int) -> Data:
     missing = [step for step in problem.simulation.missing if step < len(measured)]
     if problem.wrong_measurements is not None:
         sizes = _wrong_errors(problem.wrong_measurements, missing, measured.shape, seed)
-        is_wrong = (sizes != 0.0).any(axis=1)
-        measured[is_wrong] = (true @ c.T + sizes * problem.noise.half_width)[is_wrong]
+        wrong = sizes * problem.noise.half_width
+        # Outputs whose bound is zero are exact.
+        is_wrong = (wrong != 0.0).any(axis=1)
+        measured[is_wrong] = (true @ c.T + wrong)[is_wrong]
         steps = np.flatnonzero(is_wrong).tolist()
         origin += f", wrong measurements at {steps_text(steps)}"
     measured[missing] = np.nan

@@ -380,6 +380,18 @@ def test_simulation_without_the_table_is_the_same_but_for_wrong_measurements(
     assert all(10 <= k <= 30 and not 14 <= k <= 22 for k in is_wrong)
 
 
+def test_exact_measurements_are_not_listed_as_wrong(infoset: Command) -> None:
+    Path("exact.toml").write_text(
+        FOUR_STATES.replace("[0.2, 0.2]", "[0.0, 0.0]") + "[wrong_measurements]\nnumber = 2\n"
+    )
+
+    data = simulate(load_problem("exact.toml"), Errors.EXTREMAL, 0)
+
+    assert data.states is not None
+    np.testing.assert_array_equal(data.measured, data.states[:, [0, 2]])
+    assert data.origin.endswith("wrong measurements at no step")
+
+
 def test_wrong_measurements_of_eight_states_have_bounds_and_a_page(infoset: Command) -> None:
     Path("eight.toml").write_text(
         EIGHT_STATES.replace(
