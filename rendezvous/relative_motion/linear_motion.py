@@ -95,10 +95,10 @@ def even_breaks(start_s: float, end_s: float, radians: float) -> Floats:
     return np.linspace(start_s, end_s, max(1, int(np.ceil(radians))) + 1)
 
 
-def need_panels(start_s: float, end_s: float, radians: float) -> None:
-    """Raise `ValueError` if a motion turns by more than 200 000 radians between two times."""
-    if not radians <= MAX_PANELS:
+def need_panels(start_s: float, end_s: float, panels: float) -> None:
+    """Raise `ValueError` if a motion has more than 200 000 panels between two times."""
+    if not panels <= MAX_PANELS:
         raise ValueError(
-            f"the motion turns by {radians:.3g} rad from {start_s:g} s to {end_s:g} s; at most "
-            f"{MAX_PANELS} rad can be divided into panels; check the units"
+            f"the motion from {start_s:g} s to {end_s:g} s has {panels:.3g} panels of at most a "
+            f"radian; at most {MAX_PANELS} are possible; check the units"
         )
