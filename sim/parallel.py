@@ -21,6 +21,7 @@ from concurrent.futures import (
 )
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from functools import partial
 from multiprocessing.synchronize import Lock
 from typing import NamedTuple
 
@@ -89,7 +90,7 @@ class Task:
         Number of the scenario in a sweep.
     progress, observe : callable or None
         As for `simulate`; for threads only. With MIXED noise, random runs are simulated before game
-        runs: the fraction goes from 0 to 1 for each, and the index counts the runs of one noise.
+        runs, and the index counts the runs of one noise.
     versions : dict of str to str
         Versions of the packages that must simulate the runs.
     """
@@ -174,16 +175,17 @@ def simulate_task(task: Task, stopped: Callable[[], bool] | None = None) -> Resu
     """
     need_versions(task.versions)
 
-    def progress(share: float) -> None:
+    def progress(before: int, number: int, share: float) -> None:
         if stopped is not None and stopped():
             raise InterruptedError
         if task.progress is not None:
-            task.progress(share)
+            task.progress((before + share * number) / len(task.runs))
 
     noise = task.noise or CampaignNoise(task.scenario.noise.value)
     own_noise = None if isinstance(noise, CampaignNoise) else noise
     campaign_noise = noise if isinstance(noise, CampaignNoise) else CampaignNoise.OWN
-    parts = []
+    parts: list[Results] = []
+    before = 0
     for kind in campaign_noise.kinds:
         runs = [run for run in task.runs if campaign_noise.of_run(run) is kind]
         if runs:
@@ -194,10 +196,11 @@ def simulate_task(task: Task, stopped: Callable[[], bool] | None = None) -> Resu
                 strategy=task.strategy,
                 noise=own_noise,
                 guarantee=task.guarantee,
-                progress=progress,
+                progress=partial(progress, before, len(runs)),
                 observe=task.observe,
             )
             parts.append(results_of_kind)
+            before += len(runs)
 
     results = join(parts)
     if not is_finite(results):

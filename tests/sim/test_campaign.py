@@ -347,6 +347,17 @@ def test_versions_of_packages_must_be_the_same(brief: Scenario, tmp_path: Path) 
         simulate_task(task)
 
 
+def test_progress_of_runs_with_two_noises_does_not_go_back(brief: Scenario) -> None:
+    shares: list[float] = []
+
+    simulate_task(Task(brief, range(5), 0, CampaignNoise.MIXED, progress=shares.append))
+
+    assert shares == sorted(shares)
+    # Three of the five runs have random noise.
+    assert 0.6 in shares
+    assert shares[-1] == 1.0
+
+
 def test_scenario_read_from_a_manifest_equals_the_written_one(
     brief: Scenario, ranging: Scenario, comet: Scenario
 ) -> None:
