@@ -291,11 +291,10 @@ class Scenario:
             return
         step_s = self.fitted_step_s
         steps = self.impulse_steps
-        first_arrival_s = model.label_limits_m[0] / self.closing_speed_m_s
-        last_step = math.floor((first_arrival_s - longest_s) / step_s)
+        last_step = self.last_burn_step(model)
         if steps is not None and steps[-1] <= last_step:
             return
-        earliest_s = self.nominal_arrival_s - first_arrival_s
+        earliest_s = self.nominal_arrival_s - model.label_limits_m[0] / self.closing_speed_m_s
         key = "last_impulse_s"
         asked_s = self.thruster.last_impulse_s
         if asked_s is None and self.thruster.impulses_s:
@@ -311,6 +310,13 @@ class Scenario:
             f"{earliest_s:.4g} s earlier than the nominal one, and may last {longest_s:.4g} s: "
             f"write at least {self.nominal_arrival_s - last_step * step_s:.6g}: got {got}"
         )
+
+    def last_burn_step(self, model: SetModel) -> int:
+        """Return the last step in which the longest burn ends before the earliest possible arrival
+        in a set model.
+        """
+        first_arrival_s = model.label_limits_m[0] / self.closing_speed_m_s
+        return math.floor((first_arrival_s - self.engine.longest_burn_s) / self.fitted_step_s)
 
     def _check_wrong_ranges(self) -> None:
         """Check that wrong ranges fit the model and the sensors."""

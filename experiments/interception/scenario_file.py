@@ -446,10 +446,8 @@ def latest_impulse_s(scenario: Scenario) -> float:
     """Return the time before the nominal arrival, s, of the last step in which every burn ends
     before the earliest possible arrival.
     """
-    step_s = scenario.fitted_step_s
-    first_arrival_s = on_board_model(scenario).label_limits_m[0] / scenario.closing_speed_m_s
-    last_step = math.floor((first_arrival_s - scenario.thruster.longest_burn_s) / step_s)
-    return scenario.nominal_arrival_s - last_step * step_s
+    last_step = scenario.last_burn_step(on_board_model(scenario))
+    return scenario.nominal_arrival_s - last_step * scenario.fitted_step_s
 
 
 def _span(before_s: Sequence[float]) -> str:
