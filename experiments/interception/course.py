@@ -23,11 +23,12 @@ from infoset.sim.schedule import schedule
 MAX_SHOWN_STEPS = 400
 """Number of steps above which a flight is long: more cannot be told apart in a figure or a page.
 
-Its time axis is logarithmic in the time before the arrival, and not all steps are shown.
+The time axis of a long flight is logarithmic in the time before the arrival. Pages (`kept_steps`)
+and corridors (`Courses`) do not show all of its steps; figures of single engagements do.
 """
 
 MAX_COURSES = 1000
-"""Maximum number of runs whose courses are kept: with `MAX_SHOWN_STEPS` steps, 6 MB."""
+"""Maximum number of runs of a curve whose courses are kept: with `MAX_SHOWN_STEPS` steps, 6 MB."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class Clock:
     def of(cls, records: Sequence[Record]) -> Clock:
         """Return the time axis for records.
 
-        It is logarithmic for long flights, and if times before the arrival are scheduled.
+        It is logarithmic if one of them is a long flight, or has a time of the schedule (`marks`).
         """
         return cls(
             any(record.steps > MAX_SHOWN_STEPS or marks(record.scenario) for record in records)
@@ -86,9 +87,10 @@ def min_to_go_s(scenario: Scenario) -> float:
 
 
 def evenly(places: NDArray[Any], count: int) -> Integers:
-    """Return at most `count` indices of rising values, evenly distributed over the values.
+    """Return at most `count` indices of `places`, evenly distributed over their values.
 
-    The first and the last index are among them.
+    `places` rises, and is not empty. With a `count` of 2 or more the first and the last value are
+    among the values of the indices. Of equal values the first one is taken.
     """
     wanted = np.linspace(places[0], places[-1], count)
     return np.unique(np.abs(places - wanted[:, None]).argmin(axis=1))
@@ -99,7 +101,8 @@ def kept_steps(record: Record) -> list[int]:
 
     They are all steps, or of a long flight at most `MAX_SHOWN_STEPS`: the first and the last step
     and image, up to a quarter of `MAX_SHOWN_STEPS` impulses, and others that are evenly
-    distributed, half over the steps and half over the logarithm of the time before arrival.
+    distributed, half over the steps and half over the logarithm of the time before arrival. Steps
+    after the arrival have equal logarithms, of which `evenly` takes the first.
     """
     count = record.steps
     if count <= MAX_SHOWN_STEPS:
@@ -124,7 +127,8 @@ def marks(scenario: Scenario) -> dict[str, float]:
     """Return the times of the first and the last image and of the last impulse.
 
     Each is a time before the nominal arrival, s, of the schedule that will happen. A time that the
-    scenario leaves open is left out.
+    scenario leaves open is left out, and one that is not between the start and the arrival. There
+    are none if the flight has no schedule (`schedule`).
     """
     sensor = scenario.set_model.angle_sensor
     thruster = scenario.thruster
@@ -145,12 +149,14 @@ def marks(scenario: Scenario) -> dict[str, float]:
 
 
 def true_predicted_misses(record: Record) -> Floats:
-    """Return the miss of the true state without further impulses at each step, m, shape (N, C).
+    """Return the miss of the true state on a straight line, m, shape (N, C).
+
+    It is that at each step before the impulse of this step, from the aim point.
 
     Notes
     -----
     omega (x^2 + a^2) = V_a x - V_x a for the coordinate a of an axis, and a + V_a x / |V_x| is the
-    miss.
+    miss of the centre. |V_x| is that at the start: its change by gravity is neglected.
     """
     slopes = np.tan(record.true_angle_rad)
     x_squared = record.true_range_m**2 / (1.0 + (slopes**2).sum(axis=1))
@@ -162,13 +168,17 @@ def true_predicted_misses(record: Record) -> Floats:
 def complete_steps(record: Record) -> Integers:
     """Return the indices of the steps with a complete set.
 
-    A set is complete until its nearest section reaches the range threshold and leaves.
+    A set is complete until its nearest section reaches the range threshold and leaves. The last
+    step is the one after whose measurement it leaves. Steps without a predicted miss are left out:
+    their sets are empty.
     """
     model = record.scenario.set_model
     min_range_m = model.range_threshold_m + model.closing_speed_m_s * model.step_s
     end = record.steps
     for step, sections in enumerate(record.sections):
-        if sections and sections[0].range_m < min_range_m:
+        # Members of a set that allows for wrong images follow each other.
+        nearest_m = min((section.range_m for section in sections), default=math.inf)
+        if nearest_m < min_range_m:
             end = step + 1
             break
     return np.flatnonzero(np.isfinite(record.predicted_miss_m[:end, 0, 0]))
@@ -177,18 +187,18 @@ def complete_steps(record: Record) -> Integers:
 class Courses:
     """Possible misses and impulses of many runs of a scenario over time, an observer of `simulate`.
 
-    At most `MAX_COURSES` runs are kept.
+    The first `MAX_COURSES` runs are kept. `observe` is called with rising steps of a batch.
 
     Attributes
     ----------
     steps : ndarray of int, shape (n,)
-        Steps until the nominal arrival; of a long flight at most about `MAX_SHOWN_STEPS`, the
-        steps of scheduled impulses among them.
+        Steps until the nominal arrival; of a long flight at most `MAX_SHOWN_STEPS`, and the steps
+        of scheduled impulses.
     possible_m : ndarray, shape (runs, n)
-        Maximum possible miss without further impulses, m; NaN if the set is empty, or after its
-        first section left.
+        Maximum possible miss without further impulses, m; NaN from the first of the steps on in
+        which the set is empty or its nearest section leaves, also if it recovers.
     impulse_m_s : ndarray, shape (runs, n)
-        Modulus of the maximum impulse since the step before, m/s.
+        Maximum modulus of the impulses after the step before in `steps`, and in this one, m/s.
     """
 
     def __init__(self, scenario: Scenario, runs: int) -> None:
@@ -215,7 +225,10 @@ class Courses:
         )
 
     def observe(self, first: int, step: Step) -> None:
-        """Store a step of the batch whose first run has this index."""
+        """Store a step of the batch whose first run has this index.
+
+        Steps after the last one in `steps` are not stored.
+        """
         column = int(np.searchsorted(self.steps, step.step))
         batch = slice(first, first + len(step.tracking))
         impulse = self.impulse_m_s[batch]
@@ -254,7 +267,8 @@ def noise_title(record: Record) -> str:
 def record_titles(records: Sequence[Record]) -> list[str]:
     """Return a title for each record.
 
-    Records with the same noise are distinguished by run, seed, strategy, model, tie or scenario.
+    Records with the same title are distinguished by run, seed, strategy, model, tie and scenario:
+    by the first of these that differ, until all titles differ. Two and more have letters, too.
     """
     titles = [noise_title(record) for record in records]
     candidates = (

@@ -40,12 +40,13 @@ from infoset.sim.statistics import shows
 _MAX_COLUMNS = 3
 """Maximum number of panels in a row of the sheet; chosen: three fit the width of a page."""
 _FLAT = 1e-12
-"""Ratio of the variances at which points are on a line: the square of a rounding error of 1e-6."""
+"""Ratio of the variances up to which points are on a line: a ratio of widths of 1e-6, which can be
+rounding errors of the positions."""
 _OWN_LIMITS_FROM = 3.0
-"""Ratio of the maximum and the minimum median above which each panel has its own limits; chosen."""
+"""Ratio of the maximum to the minimum median above which each panel has its own limits; chosen."""
 RADIUS_SHOWN = 2.0
-"""The axes extend to the radius of the body if it is at most this multiple of the maximum miss
-shown; chosen: the points then still fill half of the panel.
+"""The axes extend to the longer semi-axis of the body, and to the guaranteed miss, if it is at most
+this multiple of the maximum miss shown; chosen: the points then still fill half of the panel.
 """
 _PANEL_MM = (56.0, 68.0)
 _BESIDE_MM = (22.0, 40.0)
@@ -105,7 +106,8 @@ class Cloud:
 def cloud(title: str, samples: Sequence[Results]) -> Cloud:
     """Return the misses of runs in space.
 
-    With several results of the same runs, the worst result of each run is taken.
+    With several results of the same runs, for each run all values are those of the result with its
+    maximum miss. The guaranteed miss is the maximum of all results.
     """
     misses = np.array([results.miss_m for results in samples])
     t_rad = samples[0].b_plane_t_rad
@@ -128,9 +130,9 @@ def cloud(title: str, samples: Sequence[Results]) -> Cloud:
 def ellipse(across_m: Floats, level: float, within_m: float = np.inf) -> Floats | None:
     """Return the outline, m, shape (2, 181), of the ellipse that contains a share of the points.
 
-    It has the centre (y, z) and the axes of the covariance of the points; its size is the quantile
-    of their Mahalanobis radii. None if the points are on a line, or a part of it is beyond a
-    distance that no point has.
+    It has the mean of the points as centre, and the axes of their covariance; its size is the
+    quantile of their Mahalanobis radii. None if there are less than three points, they are on a
+    line, or a part of the ellipse is farther than `within_m` from the origin, as no point is.
     """
     if len(across_m) <= 2:
         return None
@@ -198,8 +200,9 @@ def draw_b_plane(clouds: Sequence[Cloud], body: Body | None = None) -> Figure:
 def _half_width(clouds: Sequence[Cloud], size_m: float | None, aim_m: float) -> float:
     """Return half the length of the axes, so that all misses are visible.
 
-    The longer semi-axis of the body and Φ are visible, too, if they are not much greater. Misses
-    and Φ are around the aim point, which is at the distance `aim_m` from the middle of the axes.
+    A few that are far beyond the others need not be (`axis_limit`). The longer semi-axis of the
+    body and Φ are visible, too, if they are not much greater. Misses and Φ are around the aim
+    point, which is at the distance `aim_m` from the middle of the axes.
     """
     maximum = aim_m + (axis_limit([each.miss_m for each in clouds]) or 1.0)
     bounds_m = [aim_m + each.guaranteed_m for each in clouds if each.guaranteed_m is not None]
@@ -274,6 +277,11 @@ def _draw_points(axes: Axes, each: Cloud, aim_m: Floats) -> list[str]:
     if each.guaranteed_m is not None:
         within_m = each.guaranteed_m
     for level, name, dashes in _ELLIPSES:
-        if shows(count, level) and (outline := ellipse(each.across_m, level, within_m)) is not None:
-            axes.plot(*outline, label=name, color=TRUTH, linestyle=dashes, **line)
+        if not shows(count, level):
+            continue
+        # The guaranteed miss is a distance from the aim point.
+        outline = ellipse(each.across_m - aim_m, level, within_m)
+        if outline is not None:
+            outline_m = outline + aim_m[:, None]
+            axes.plot(*outline_m, label=name, color=TRUTH, linestyle=dashes, **line)
     return known

@@ -40,7 +40,7 @@ from infoset.sensors import BearingSensor
 from infoset.sim import Record
 
 RANGE_SHARE = 0.1
-"""Share of the first range below which values do not set the limits.
+"""Share of the maximum range, the first one, below which values do not set the limits.
 
 Angle and rate grow as 1/x and 1/x^2 there. Chosen: the limits then contain ten times the first
 angle.
@@ -211,7 +211,8 @@ def _sensor(trace: Trace) -> BearingSensor:
 def _level_errors(row: Sequence[Axes], traces: Sequence[Trace]) -> None:
     """Give axes of angle errors the same limits.
 
-    They are logarithmic beyond the power of ten of the first bound.
+    They are linear to the power of ten at or above the greatest bound at a start, and logarithmic
+    beyond.
     """
     bounds = [np.abs(axes.dataLim.intervaly).max() for axes in row]
     firsts = [1e6 * float(_sensor(trace).error_bound(trace[0].true_range_m[0])) for trace in traces]
@@ -223,9 +224,17 @@ def _level_errors(row: Sequence[Axes], traces: Sequence[Trace]) -> None:
 
 
 def _level_moduli(row: Sequence[Axes]) -> None:
-    """Give axes of moduli of rates the same logarithmic limits."""
+    """Give axes of moduli of rates the same logarithmic limits.
+
+    Zeros are left out: a rate can be 0.
+    """
     moduli = np.concatenate(
-        [np.asarray(line.get_ydata(), dtype=np.float64) for axes in row for line in axes.lines]
+        [
+            np.asarray(line.get_ydata(), dtype=np.float64)
+            for axes in row
+            for line in axes.lines
+            if line.get_transform() == axes.transData  # not the times of the schedule
+        ]
     )
     known = np.ones(1)
     if moduli.any():

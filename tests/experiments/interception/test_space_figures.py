@@ -112,6 +112,25 @@ def test_ellipses_contain_their_share_of_the_runs_within_the_guaranteed_miss() -
         assert sum(name.startswith("ellipse") for name in legend(figure)) == count
 
 
+def test_ellipses_are_within_the_guaranteed_miss_of_the_aim_point() -> None:
+    across = np.random.default_rng(3).normal(size=(400, 2))
+    body = Body(100.0, aim_m=(60.0, 0.0))
+    # Closest approaches without a miss are opposite to the aim point.
+    closest = -np.array([60.0, 0.0])
+    around_aim = Cloud("many", across + closest, np.hypot(*across.T), 9.0)
+    around_centre = Cloud("many", across, np.hypot(*(across - closest).T), 9.0)
+    for each, count in ((around_aim, 2), (around_centre, 0)):
+        names = legend(draw_b_plane([each], body))
+        assert sum(name.startswith("ellipse") for name in names) == count
+
+
+def test_times_of_the_schedule_do_not_limit_the_axis_of_the_rates() -> None:
+    record = fly_one(load_scenario("haiv-2013"))
+    slow = replace(record, true_rate_rad_s=np.full_like(record.true_rate_rad_s, 1e-9))
+    axes = next(axes for axes in draw_process([slow]).axes if "ω" in axes.get_ylabel())
+    assert axes.get_ylim() == pytest.approx((0.5e-3, 2e-3))  # half and twice the rate in µrad/s
+
+
 def test_wide_misses_have_a_panel_at_the_scale_of_the_body() -> None:
     across = 1e3 * np.random.default_rng(5).normal(size=(50, 2))
     across[:4] *= 1e-3

@@ -11,7 +11,7 @@ import pytest
 from matplotlib.lines import Line2D
 
 from infoset import Model
-from infoset.experiments.interception.course import true_predicted_misses
+from infoset.experiments.interception.course import complete_steps, true_predicted_misses
 from infoset.experiments.interception.figures.members import draw_members
 from infoset.experiments.interception.member_course import MemberCourse, member_courses
 from infoset.experiments.interception.page import interception_page
@@ -66,6 +66,18 @@ def test_interval_of_the_set_is_that_of_all_members(
             continue
         assert np.min(intervals_m) == record.predicted_miss_m[step].min()
         assert np.max(intervals_m) == record.predicted_miss_m[step].max()
+
+
+def test_complete_steps_do_not_depend_on_the_order_of_the_members() -> None:
+    scenario = load_scenario("asteroid-1997-single")
+    settings = replace(scenario.information_set, model=Model.GUARANTEED, wrong_images=1)
+    record = fly_one(replace(scenario, information_set=settings))
+    complete = complete_steps(record)
+    assert 0 < len(complete) < record.steps
+
+    others_first = tuple(sections[::-1] for sections in record.sections)
+    reordered = replace(record, sections=others_first)
+    np.testing.assert_array_equal(complete_steps(reordered), complete)
 
 
 def test_set_without_wrong_images_has_no_members() -> None:
