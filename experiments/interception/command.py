@@ -21,14 +21,18 @@ from infoset.experiments.common.options import (
 )
 
 MAX_RUNS = 10_000_000
-"""Maximum number of runs: one miss in so many runs shows a probability of 99.99999 %."""
+"""Maximum number of runs: one miss in so many runs is a share of hits of 99.99999 %, the last of
+`study.WANTED_SHARES`."""
 
 NEEDED = 0
 """Value of ``runs`` for ``--runs needed``: no study has zero runs."""
 
 
 def run_count(text: Any) -> int:
-    """Return the number of runs of the option ``--runs``; `NEEDED` for the word ``needed``."""
+    """Return the number of runs of the option ``--runs``; `NEEDED` for the word ``needed``.
+
+    `text` is the default value, a number, if the option is not given.
+    """
     if text == "needed":
         return NEEDED
     try:

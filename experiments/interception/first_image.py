@@ -25,11 +25,12 @@ class FirstImage:
     first_image_s : float
         The time, s, at the nominal closing speed.
     sun_distance_au : float
-        Distance of the body from the Sun: that of [sun], or 1 au without this table.
+        Distance of the body from the Sun: the distance in [sun], whichever body attracts there, or
+        1 au without this table.
     limit : float
         The limiting magnitude.
     before_start : bool
-        Whether the time is before the start of the flight: all images are bright enough.
+        Whether the time is not after the start of the flight: all images are bright enough.
     key : str
         Key of the file for this time, with its table.
     """
@@ -86,7 +87,8 @@ def first_image(scenario: Scenario, text: str) -> FirstImage:
 def read_magnitude(text: str, phase_rad: float | None = None) -> Magnitude:
     """Read `H=23.8,limit=11,phase=40`; without `phase` it is the phase angle of a file, rad.
 
-    Raise `InputError` for another text, and for a phase that is not the one of the file.
+    Raise `InputError` for another text, and for a phase whose six digits are not those of the phase
+    of the file.
     """
     numbers = _numbers(text)
     if phase_rad is not None:

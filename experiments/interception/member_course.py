@@ -75,11 +75,16 @@ def member_courses(record: Record) -> list[MemberCourse]:
 
 
 def _is_refuted(course: MemberCourse, member: int, information: CoveredSetView) -> bool:
-    """Whether a member that ended is refuted, and not divided, nor without a label."""
+    """Whether a member that ended is refuted, and not divided, nor without a label.
+
+    `information` is the set after the first measurement without it.
+    """
     groups = information.groups()
     if groups is None:
         return bool(information.refuted[0, member])
 
+    # After a split: a member that is not refuted, and leaves out only images that the ended one
+    # leaves out, is a part of it, or the ended one itself, whose labels have left.
     every = information.model.steps_in(information.model.angle_sensor.period_s)
     classes = information.left_out[member]
 

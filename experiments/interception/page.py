@@ -66,7 +66,7 @@ def interception_page(records: Sequence[Record]) -> str:
 def _kept_steps_of(records: Sequence[Record]) -> list[list[int]]:
     """Return the steps of each record that the page has.
 
-    Records with steps at the same times have the same ones.
+    Records whose steps have equal durations have the same ones, as far as they reach.
     """
     kept = [kept_steps(record) for record in records]
     if len({record.scenario.set_model.step_s for record in records}) > 1:
@@ -98,8 +98,9 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
 class _Sets(NamedTuple):
     """The sets of an engagement on a page: states of the set, each a tuple of sections.
 
-    `of_step` has three numbers of states for each step: the set before the measurement, after it,
-    and predicted from it. The predicted set is the set before the next measurement, too.
+    `of_step` has three indices in `states` for each step: of the set before the measurement, after
+    it, and predicted from it. The predicted set is also the set before the measurement of the next
+    step, if the page has this step.
     """
 
     states: list[tuple[Section, ...]]
@@ -116,7 +117,8 @@ def _sets_of(
 ) -> _Sets:
     """Return the sets of the steps `kept`; `before` has the sets predicted to a step.
 
-    The set before a measurement is stored once: after a step that is kept it is its predicted set.
+    The set before a measurement is stored once: if the step before is kept, it is the predicted set
+    of that step. `kept` rises.
     """
     sets = _Sets([], [])
     for previous, step in zip([-2, *kept], kept, strict=False):
@@ -183,7 +185,11 @@ def _proved_s(record: Record) -> float | None:
 
 
 def _step_data(record: Record, kept: Sequence[int]) -> dict[str, object]:
-    """Return times, ranges and moduli of impulses of the steps; `fired` are all with an impulse."""
+    """Return times, ranges and moduli of impulses of the steps `kept`.
+
+    The keys `fired_...` are of all steps with an impulse, and `complete_steps` is the number of the
+    steps `kept` until the last complete set.
+    """
     modulus_m_s = modulus(record.impulse_m_s.T)
     fired = np.flatnonzero(modulus_m_s)
     budget_left_m_s = record.scenario.thruster.budget_m_s - np.cumsum(modulus_m_s)
@@ -288,7 +294,7 @@ def _member_data(
 
 
 def _known(values: Floats) -> list[Any]:
-    """Return the values of steps; None where they are not known."""
+    """Return the values of steps; None for a step of which any number is not finite."""
     known: list[Any] = values.tolist()
     is_known = np.isfinite(values.reshape(len(values), -1)).all(axis=1)
     for step in np.flatnonzero(~is_known):

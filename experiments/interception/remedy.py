@@ -33,7 +33,7 @@ KEYS = {
 }
 """Keys whose change can remove a cause; another strategy is not a key."""
 MAX_DOUBLINGS = 10
-"""Maximum number of doublings, or halvings, of a value: a factor of 1000 is another mission."""
+"""Maximum number of doublings, or halvings, of a value: a factor of 1024 is another mission."""
 NEAR = 1.02
 """Ratio of a value that is enough and one that is not, at which the search ends.
 
@@ -50,10 +50,11 @@ class Remedy:
     now : float
         Value of the scenario; 1 of `angle_sensor.scale`, a factor of all error bounds.
     not_enough : float or None
-        Nearest value found at which the cause occurs; None if `enough` follows in closed form.
+        Value farthest from `now` found at which the cause occurs; None if `enough` follows in
+        closed form.
     enough : float or None
-        Value nearest to `now`, of three digits, at which it does not; None if no value up to
-        `not_enough` is enough.
+        Value nearest to `now` found, of three digits, at which it does not; its ratio to
+        `not_enough` is at most `NEAR`. None if no value up to `not_enough` is enough.
     hits : HitEstimate or None
         Hits of as many other runs with `enough`. The value was chosen for the first ones, so their
         share of hits is biased.
@@ -92,8 +93,8 @@ def find_remedies(task: Task, results: Results, progress: Progress) -> list[Reme
     """Return the remedies of all causes in the results of a task.
 
     Keys that its scenario does not have are left out. A maximum impulse for the cause `engine`
-    follows in closed form, because its authority is proportional to it. The other values are found
-    by bisection: all runs are simulated again with each value.
+    follows in closed form, because the miss that the engine corrects is proportional to it. The
+    other values are found by bisection: all runs are simulated again with each value.
     """
     wanted = [
         (cause, key)
@@ -130,7 +131,7 @@ def _remedy(task: Task, results: Results, cause: MissCause, key: str) -> Remedy:
         needed = (
             results.unguided_miss_m - (scenario.outer_radius_m or 0.0)
         ) / results.engine_corrects_m
-        # The factor 1.005 lets the three digits be rounded up.
+        # The factor 1.005 is greater than the rounding to three digits: the value is no smaller.
         enough = _rounded(1.005 * now * float(needed.max()))
     else:
         # A greater impulse or budget can be a remedy: these are doubled. Of the errors and of the
@@ -150,7 +151,7 @@ def _remedy(task: Task, results: Results, cause: MissCause, key: str) -> Remedy:
 def _values(scenario: Scenario, key: str) -> dict[str, float]:
     """Return the values that a key changes in proportion, by their keys.
 
-    There are none if the scenario does not have the key.
+    There are none if the scenario does not have the key, or it is 0: a factor does not change it.
     """
     table, name = key.split(".")
     part = getattr(scenario, table)
@@ -171,7 +172,10 @@ def _values(scenario: Scenario, key: str) -> dict[str, float]:
 def _search(
     occurs: Callable[[float], bool], now: float, factor: float
 ) -> tuple[float, float | None]:
-    """Return the nearest values found at which something occurs and does not, from `now` on."""
+    """Return the nearest values found at which something occurs and does not, from `now` on.
+
+    It occurs at `now`. The second value is None if it occurs at all values up to the first.
+    """
     not_enough = now
     for _ in range(MAX_DOUBLINGS):
         enough = _rounded(not_enough * factor)

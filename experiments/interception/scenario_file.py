@@ -31,7 +31,8 @@ from infoset.sim.scenario import MAX_STEPS, Scenario, Target
 from infoset.sim.schedule import Schedule, images_until, schedule
 
 FAR = 10.0
-"""Ratio of the nominal range to the possible ranges from which a warning reports it.
+"""Ratio of the nominal range to the nearest possible range, greater or less than it, above which a
+warning reports it.
 
 Wrong units differ by more, usually by 1000.
 """
@@ -87,7 +88,10 @@ def load_scenario(
 
 
 def with_model(scenario: Scenario, model: Model) -> Scenario:
-    """Return a scenario with another set model, and with its default initial set."""
+    """Return a scenario with another set model and its default initial set.
+
+    With the model that the scenario has it is the scenario itself, with its initial set.
+    """
     settings = scenario.information_set
     if model is settings.model:
         return scenario
@@ -103,8 +107,8 @@ def scenario_with(options: Any) -> Scenario:
     """Read the scenario of a command and replace the values that its options set.
 
     The command may have the options `strategy`, `model` and `range_sensor`; None keeps the value of
-    the scenario, and a strategy of a Python file keeps its strategy. Raise `InputError` if an
-    option does not fit the scenario.
+    the scenario, and a strategy of a Python file does not change the scenario. Raise `InputError`
+    if an option does not fit the scenario.
     """
     strategy, model, range_sensor = (
         getattr(options, name, None) for name in ("strategy", "model", "range_sensor")
@@ -342,7 +346,7 @@ def schedule_lines(scenario: Scenario) -> list[str]:
 def brightness_lines(scenario: Scenario) -> list[str]:
     """Return lines about the centre of brightness and the residual of its correction.
 
-    There are none without a phase angle.
+    There are none without a phase angle, or without a body.
     """
     camera = scenario.bearing_sensor
     residual = _residual(scenario)
@@ -375,7 +379,7 @@ def brightness_lines(scenario: Scenario) -> list[str]:
 
 
 def brightness_json(scenario: Scenario) -> dict[str, Any] | None:
-    """Return the key `centre_of_brightness` of JSON; None without a phase angle."""
+    """Return the key `centre_of_brightness` of JSON; None without a phase angle or a body."""
     camera = scenario.bearing_sensor
     residual = _residual(scenario)
     if not isinstance(camera, OffsetCamera) or residual is None:
@@ -392,7 +396,10 @@ def brightness_json(scenario: Scenario) -> dict[str, Any] | None:
 
 
 def _residual(scenario: Scenario) -> CorrectionResidual | None:
-    """Return the residual of a correction of the centre of brightness."""
+    """Return the residual of a correction of the centre of brightness.
+
+    None without a phase angle, or without a body.
+    """
     camera = scenario.bearing_sensor
     if not isinstance(camera, OffsetCamera) or scenario.body is None:
         return None
@@ -415,7 +422,11 @@ def _arrivals_line(scenario: Scenario, times: Schedule) -> str:
 
 
 def _burn_lines(scenario: Scenario) -> list[str]:
-    """Return a line about the duration of burns, and whether they may be taken for impulses."""
+    """Return lines about the duration of burns, whether they may be taken for impulses, and the
+    latest last impulse; none for impulses without a duration.
+
+    With a thrust, at least one impulse is possible: a scenario without one is refused.
+    """
     engine = scenario.engine
     times = schedule(scenario)
     if engine.acceleration_m_s2 is None or times is None:
@@ -443,8 +454,8 @@ def _burn_lines(scenario: Scenario) -> list[str]:
 
 
 def latest_impulse_s(scenario: Scenario) -> float:
-    """Return the time before the nominal arrival, s, of the last step in which every burn ends
-    before the earliest possible arrival.
+    """Return the time before the nominal arrival, s, of the last step from which a burn of any
+    impulse ends before the earliest possible arrival.
     """
     last_step = scenario.last_burn_step(on_board_model(scenario))
     return scenario.nominal_arrival_s - last_step * scenario.fitted_step_s
@@ -463,7 +474,8 @@ def _span(before_s: Sequence[float]) -> str:
 def schedule_json(scenario: Scenario) -> dict[str, Any] | None:
     """Return the key `schedule` of JSON: times before the nominal arrival, s.
 
-    None if the arrival is too far away.
+    True arrivals are times after the nominal one. None if the nominal arrival is more than
+    `MAX_STEPS` away.
     """
     times = schedule(scenario)
     if times is None:
@@ -496,7 +508,8 @@ def schedule_json(scenario: Scenario) -> dict[str, Any] | None:
 def possible_miss_json(scenario: Scenario) -> PossibleMiss | None:
     """Return the key `possible_miss` of JSON.
 
-    None with fewer than two images, or if the arrival is too far away.
+    None with fewer than two images until the last decision, or if the nominal arrival is more than
+    `MAX_STEPS` away.
     """
     found = feasibility(scenario)
     if found is None:
@@ -516,7 +529,8 @@ def feasibility_warnings(scenario: Scenario) -> list[str]:
     """
     found = feasibility(scenario)
     if found is None:
-        # The nominal range is too large, which `scenario_warnings` reports.
+        # The flight has more than `MAX_STEPS`. `scenario_warnings` reports its nominal range if it
+        # is more than `FAR` times the greatest possible one.
         return []
     return [
         *_authority_warnings(scenario, found),
@@ -536,7 +550,7 @@ def _authority_warnings(scenario: Scenario, found: Feasibility) -> Iterator[str]
         (found.beyond_engine, found.engine_corrects_m, "engine", "max_impulse_m_s"),
         (found.beyond_budget, found.budget_corrects_m, "budget", "budget_m_s"),
     ):
-        # The budget has a line only if it excludes more starts than the engine.
+        # The budget, the second one, has a line only if it excludes more starts than the engine.
         if share > before:
             yield (
                 f"the {name} corrects at most {length_text(corrected_m)}, and the starts of "
@@ -601,7 +615,8 @@ def _timing_warnings(scenario: Scenario) -> list[str]:
     model = scenario.set_model
     arrival_s = scenario.nominal_arrival_s
     if arrival_s > FAR * MAX_STEPS * model.step_s:
-        # The nominal range has a warning, and the steps are too many to be searched.
+        # The steps are too many to be searched. A true flight has at most `MAX_STEPS`, and the
+        # nominal range has a warning if [uncertainty] is not much wider than [dispersion].
         return []
 
     sensor = model.angle_sensor

@@ -89,8 +89,9 @@ def chosen_noises(names: str) -> Mapping[str, NoiseSource | None]:
 def load_strategy(text: str, option: str = "--strategy", version: str | None = None) -> Strategy:
     """Import a file and return a strategy of one of its classes, from a text ``FILE.py:CLASS``.
 
-    The folder of the file is searched for the modules that it imports. The strategy is pickled as
-    this text with its version: another process imports the same file, or refuses it.
+    The folder of the file is searched for the modules that it imports, after all other folders. The
+    strategy is pickled as this text with its version: another process imports the same file, or
+    refuses it. For this the class gets the attributes `version` and `__reduce__`.
     """
     kind, again = _load(text, option, ("start", "decide"), version)
     kind.version, kind.__reduce__ = again[2], lambda _self: (load_strategy, again)
@@ -179,14 +180,16 @@ def _load(
 def own_code_errors() -> Iterator[None]:
     """Turn an exception of the code in a loaded file into a message with its line.
 
-    The message is also about a wrong value that the code returned.
+    A wrong value that the code returned, or a class that needs arguments, gives a message without a
+    line. Other exceptions pass.
     """
     try:
         yield
     except (InputError, MemoryError):
         raise
     except (Exception, SystemExit) as error:
-        trace = "".join(traceback.format_exception(error))  # contains a trace of another process
+        # A trace of another process is a part of it.
+        trace = "".join(traceback.format_exception(error))
         for (file, name), option in reversed(_LOADED.items()):
             where = os.path.relpath(file)
             lines = re.findall(rf'File "{re.escape(str(file))}", line (\d+)', trace)

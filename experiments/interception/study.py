@@ -229,7 +229,7 @@ class SetCounts:
 
 
 def set_counts(truth_kept: Flags, set_emptied: Flags) -> SetCounts:
-    """Return the counts of some runs, from arrays of shape (N,)."""
+    """Return the counts of N runs, from arrays of shape (N,)."""
     failed = ~truth_kept | set_emptied
     return SetCounts(
         len(truth_kept), int(truth_kept.sum()), int(set_emptied.sum()), int(failed.sum())
@@ -377,8 +377,8 @@ def needed_notes(required: AnyRequirement, runs: int, option: str = "--runs") ->
 def outlook_text(hits: HitEstimate | None) -> str:
     """Return a line about what the hits show, and the runs that would show more.
 
-    The next probability is the first of 99 %, 99.9 % and so on that the sample does not show yet.
-    The text is empty if the sample excludes it.
+    The next probability is the first of 99 %, 99.9 % and so on that is greater than the lower end
+    of the interval. The text is empty if it is greater than the upper end, too.
     """
     if hits is None:
         return ""
@@ -437,7 +437,7 @@ def miss_text(missed: Mapping[str, Any], runs: int, scenario: Scenario) -> str:
 
 
 def redrawn_text(share: float | None) -> str:
-    """Return the share of normal starts that were drawn again; an empty text for uniform starts."""
+    """Return the share of normal starts that were drawn again as text; empty for uniform starts."""
     if share is None:
         return ""
     return f"normal starts: {percent(share)} were outside the dispersion and drawn again"
@@ -461,7 +461,10 @@ def wrong_images_text(results: Results, scenario: Scenario) -> str:
 
 
 def max_guarantee_m(results: Results) -> float | None:
-    """Return the maximum guaranteed miss of runs, m; None if a run has no guarantee."""
+    """Return the maximum guaranteed miss of runs, m.
+
+    None if a run has no guarantee; in the model `paper` no run has one.
+    """
     bounds = results.guaranteed_miss_m
     if not results.guarantees or np.ma.getmaskarray(bounds).any():
         return None

@@ -52,7 +52,8 @@ class SunDirection(NamedTuple):
 def direction_of(sun: Sun | None) -> SunDirection | None:
     """Return the direction of the Sun at the start; None if the attracting body is not the Sun.
 
-    It is seen from the spacecraft; the range is a negligible part of the distance of the Sun.
+    It is seen from the spacecraft and taken for that from the object: the range is a negligible
+    part of the distance of the Sun.
     """
     if sun is None:
         return None

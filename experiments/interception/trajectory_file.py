@@ -153,13 +153,14 @@ def scenario_of(
     file : str or path
         The trajectory file, or the name of a built-in one.
     like : Scenario
-        The scenario from which sensors, engine and settings are taken; nothing of its target is.
+        The scenario in space from which sensors, engine and settings are taken. Of its target only
+        values of the camera are: the centroid error, and how the body reflects.
     sigmas : float
         Number of standard deviations that uncertainty and dispersion contain.
     target : KnownTarget or None
         The size of the target, and the bound of its acceleration.
     folders : sequence of Path
-        Folders whose files the trajectory file may name; it may always name files below its
+        Folders below which the trajectory file may name files; it may always name files below its
         own folder.
 
     Raises
@@ -383,7 +384,10 @@ def _oem(name: str, folder: Path, folders: Sequence[Path]) -> list[OemSegment]:
 
 
 def _epoch(trajectory: Trajectory, *, is_needed: bool) -> Epoch | None:
-    """Return the epoch; None if it is not needed, or only SPICE reads it."""
+    """Return the epoch; None without one, or if only SPICE may be able to read it.
+
+    `is_needed` refuses the latter.
+    """
     if trajectory.epoch is None:
         return None
     try:
@@ -404,7 +408,7 @@ def _spice_craft(
 ) -> CraftState:
     """Return the state of a body of SPICE kernels.
 
-    SPICE reads the epochs that `parse_epoch` does not know.
+    Without an `epoch`, SPICE reads the text, which `parse_epoch` does not know.
     """
     files = kernels.kernel_files(trajectory.kernels, folder, folders)
     with kernels.loaded(files) as spice:

@@ -38,10 +38,10 @@ def animate(
 ) -> bytes:
     """Return a GIF animation of engagements, side by side, of about eight seconds and 16 colours.
 
-    Frames are evenly distributed over the time axis of the lower panels, which is logarithmic for
-    long flights, and take about 0.2 s of computing each. A frame is 425 pixels wide, or 320 for
-    each of several planes: the file stays small enough for a web page. `max_frames` is chosen: 40
-    frames are five a second.
+    Frames are evenly distributed over the time axis of the lower panels if it is logarithmic,
+    otherwise over the steps, and take about 0.2 s of computing each. A frame is 425 pixels wide, or
+    320 for each of several planes: the file stays small enough for a web page. `max_frames` is
+    chosen: 40 frames are five a second.
     """
     clock = Clock.of(records)
     chosen = _frame_times(records, clock, max_frames)
@@ -106,7 +106,8 @@ def animate(
 def _frame_times(records: Sequence[Record], clock: Clock, most: int) -> Floats:
     """Return at most `most` times of steps.
 
-    They are evenly distributed over the time axis, or over the steps.
+    They are evenly distributed over a logarithmic time axis, or on a linear one over the times of
+    all records.
     """
     times = np.unique(np.concatenate([record.time_s for record in records]))
     places: Floats = np.arange(len(times), dtype=np.float64)

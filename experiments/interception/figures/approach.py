@@ -67,9 +67,9 @@ def draw_approach(records: Sequence[Record]) -> Figure:
     """Draw possible misses and impulses over the time before the nominal arrival.
 
     In space the B-plane is drawn, too. Each record has a row. The possible miss is the maximum
-    distance of a point of the box of predicted misses, which contains the predicted misses of all
-    sections. After an impulse that centres the box it is half the diagonal of the box. Both end
-    when the first section leaves at the range threshold.
+    distance from zero of a point of the box of predicted misses, which contains the predicted
+    misses of all sections. After an impulse that centres the box it is half the diagonal of the
+    box. Both end with the last complete set (`complete_steps`).
     """
     # Millimetres: the legend, and each record; chosen.
     figure = new_figure(25.0 + 75.0 * len(records))
@@ -108,7 +108,8 @@ def _draw_possible(axes: Axes, record: Record) -> None:
     true = modulus(true_predicted_misses(record).T)
 
     # The axis shows all curves and levels; of the smallest values, which may be 0, only those down
-    # to `_MIN_SHOWN` and to a micrometre. Its margins are factors of 2.
+    # to the share `_MIN_SHOWN` and to a micrometre, the greater of both. Its margins are factors of
+    # 2. Levels of 0 are not drawn.
     levels = [
         level
         for level in (max_guarantee_m(record.result), record.scenario.certain_radius_m)
@@ -146,7 +147,10 @@ def _draw_moduli(axes: Axes, record: Record) -> None:
 
 
 def _draw_b_plane(axes: Axes, record: Record) -> None:
-    """Draw the B-plane: the possible misses at the last decision, and the true predicted miss."""
+    """Draw the B-plane: the box of predicted misses of the last complete set, and the true ones.
+
+    If impulses end before, the box is smaller than at the last decision.
+    """
     known = complete_steps(record)
     end = record.result.lateral_miss_m[0]
     guaranteed = max_guarantee_m(record.result)

@@ -37,7 +37,7 @@ _CORRECTED: dict[str, Any] = {"linewidth": 0.8, "linestyle": ":"}
 _COLUMN_MM = 88.0
 """Width of the figure: one column of a page."""
 _WIDE = 8.0
-"""Ratio of the maximum miss to the bound from which the axis of misses is logarithmic.
+"""Ratio of the maximum miss to the bound, if it is not 0, above which the axis is logarithmic.
 
 On a linear axis the bound would be in the first tenth.
 """
@@ -156,7 +156,7 @@ def _draw_pair(axes: Axes, scenario: Scenario, lower: LowerBound) -> None:
 
 
 def _direction(pair: TruthPair) -> Floats:
-    """Return the direction of the difference of the two states at x = 0."""
+    """Return the direction of the difference of the two states at x = 0; zeros if there is none."""
     end = pair.track_m[:, -1]
     return np.divide(end, np.linalg.norm(end), out=np.zeros_like(end), where=end != 0.0)
 
@@ -194,7 +194,8 @@ def _draw_equal_measurements(
 ) -> float:
     """Draw the limits of the offset of each state with equal measurements.
 
-    Return the largest limit, m.
+    Return the largest limit, m, which is at the time `shown` before the arrival: it grows with the
+    range. The band ends at the last image before the wrong ones.
     """
     model = scenario.set_model
     fine = np.linspace(0.0, shown, 200)  # for smooth curves

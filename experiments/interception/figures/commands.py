@@ -1,6 +1,6 @@
 """The figures of the commands, in the order of their names, and `plot`.
 
-Each is drawn when the last one is written.
+Each is drawn after the one before it is written.
 """
 
 from __future__ import annotations
@@ -86,7 +86,8 @@ def draw_flights(records: Sequence[Record], times_s: Sequence[float]) -> Iterato
 def _default_times(records: Sequence[Record]) -> tuple[float, ...]:
     """Return the times of figure 3, s.
 
-    In a long flight, they are evenly distributed over the logarithm of the time before arrival.
+    On a logarithmic time axis (`Clock`), they are evenly distributed over the logarithm of the time
+    before the arrival of the first record.
     """
     if not Clock.of(records).counts_down:
         return DEFAULT_TIMES

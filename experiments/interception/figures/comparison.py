@@ -81,10 +81,10 @@ def draw_comparison(compared: Sequence[Comparison], radius_m: float | None = Non
 def _logarithmic(samples: Sequence[Floats]) -> Floats:
     """Return the edges of the bins of misses.
 
-    The first edge is the smallest 2 % quantile of a sample, or a tenth of the last edge if that is
-    smaller: misses can be arbitrarily small, and the axis spans at least a decade. Both, and the
-    margin of a quarter beyond the maximum, are chosen. Values below the first edge are counted in
-    the first bin.
+    The first edge is the smallest 2 % quantile of the positive values of a sample, or a tenth of
+    the last edge if that is smaller: misses can be arbitrarily small, and the axis spans at least a
+    decade. Both, and the margin of a quarter beyond the maximum, are chosen. Values below the first
+    edge are counted in the first bin.
     """
     positive = [sample[sample > 0.0] for sample in samples if (sample > 0.0).any()]
     if not positive:
@@ -97,7 +97,8 @@ def _logarithmic(samples: Sequence[Floats]) -> Floats:
 def _draw_strategy(axes: Axes, place: int, sample: Floats, edges: Floats) -> None:
     """Draw a histogram on the line of its strategy, and below it a bar of quantiles.
 
-    Quantiles that the runs do not show are left out.
+    Quantiles that the runs do not show are left out, but not the median. Quantiles below the first
+    edge are drawn at it.
     """
     counts, _ = np.histogram(np.clip(sample, edges[0], edges[-1]), bins=edges)
     heights = place - _HILL * counts / counts.max()

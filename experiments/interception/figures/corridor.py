@@ -53,8 +53,8 @@ def draw_corridor(curves: Sequence[Curve], courses: Sequence[Courses]) -> Figure
 
     The possible miss is the maximum without further impulses. Its quantiles are taken over the
     runs that still have a complete set (see `Courses`), and end when these are less than half of
-    the runs. Quantiles for which the runs are too few are not drawn; of a single run its impulses
-    are drawn.
+    the runs. Quantiles for which all runs are too few are not drawn, but the median and the maximum
+    of the possible miss always are; of a single run its impulses are drawn.
     """
     rows = -(-len(curves) // 2)
     columns = min(2, len(curves))

@@ -106,7 +106,7 @@ def draw_samples(
     They have their 95 % confidence bands.
 
     Where a few values are far beyond the others, the axis ends before them and its label says how
-    many; where the curves or the radius lie decades apart, the axis of the miss is logarithmic. The
+    many; where the curves or the radius lie far apart, the axis of the miss is logarithmic. The
     radius of the body, m, is a line in (a). Single runs are marks on the axes.
     """
     figure, (panels,) = subplots(85.0, 1, 2, sharey=True)
@@ -147,9 +147,10 @@ def draw_samples(
 
 
 def scale_misses(axes: Axes, samples: Sequence[Floats], radius_m: float | None) -> None:
-    """Scale the axis of the misses so that every sample and the radius are visible.
+    """Scale the axis of the misses so that every sample is visible, and a radius within the axis.
 
-    It is logarithmic if they lie decades apart.
+    The axis does not extend to a greater radius. It is logarithmic if the smallest median or the
+    radius is small beside its end (`_LOGARITHMIC_FROM`), and linear if one of them is 0.
     """
     sizes = [float(np.median(sample)) for sample in samples]
     if radius_m is not None:
@@ -169,9 +170,9 @@ def axis_limit(samples: Sequence[Floats]) -> float:
 
     The upper fence of a sample is its upper quartile plus three times the distance between its
     quartiles, beyond which values are far out (Tukey). If the maximum of all values is at most
-    twice the farthest fence, the axis ends there; otherwise at the greatest value within 1.5 times
-    this fence. The factors are chosen: the axis is not cut off for a few values that would only
-    double it.
+    twice the farthest fence, the axis ends at this maximum; otherwise at the greatest value within
+    1.5 times this fence. Values are not negative. The factors are chosen: the axis is not cut off
+    for a few values that would only double it.
     """
     quartiles = [np.quantile(sample, (0.25, 0.75)) for sample in samples]
     fence = max(float(upper + 3.0 * (upper - lower)) for lower, upper in quartiles)

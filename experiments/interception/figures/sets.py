@@ -61,7 +61,8 @@ _VISIBLE = 0.3
 All planes of its lateral axis in the row then have their own limits.
 """
 _FAR = 1.5
-"""Distance of a measured angle from its set, in heights of the set, above which it is not shown.
+"""Distance of a measured angle from the box of its set and the true state, in heights of this box,
+above which it is not shown.
 
 Chosen: nearer ones leave the set at least two fifths of the panel.
 """
@@ -73,8 +74,8 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
 
     There is one row per time, and one column per record and lateral axis.
 
-    At most five sections are drawn, evenly chosen over the range. The planes of a row have the same
-    limits for each lateral axis, unless a set would then be too small to see.
+    At most five sections are drawn, evenly chosen over the range (`choose_sections`). The planes of
+    a row have the same limits for each lateral axis, unless a set would then be too small to see.
 
     Parameters
     ----------
@@ -148,7 +149,8 @@ class Plane:
     def box(self) -> Floats:
         """The least and the greatest omega and alpha, shape (2, 2).
 
-        They are of the set, of the true state, and of a measurement near them.
+        They are of the set, of the true state, and of a measurement near them; of any measurement
+        if set and true state have one angle.
         """
         points = np.vstack([*self.outlines, self.true])
         low = points.min(axis=0)
@@ -195,7 +197,9 @@ def _km(section: Section) -> str:
 def choose_sections(sections: Sequence[Section], most: int) -> list[Section]:
     """Return at most `most` sections in their order, evenly distributed over the range.
 
-    The first and the last section are among them.
+    `sections` are in ascending order of range, and the first and the last one are chosen. If there
+    are more than `most` in a set that allows for wrong images, whose members follow each other, the
+    first member of each range is taken.
     """
     if len(sections) <= most:
         return list(sections)

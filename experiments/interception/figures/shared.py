@@ -35,14 +35,14 @@ _BEFORE_START = 1.1
 Chosen.
 """
 _MIN_DISC = 0.02
-"""Share of the axes below which the disc of a body is not drawn.
+"""Share of half the axes below which a body with this longer semi-axis is not drawn.
 
 The mark of its centre would hide it.
 """
 
 
 def draw_levels(axes: Axes, guaranteed_m: float | None, radius_m: float | None) -> None:
-    """Draw the guaranteed miss and the radius of the body, if known, as horizontal lines."""
+    """Draw the guaranteed miss and the radius of the body, if known and not 0, as level lines."""
     if guaranteed_m:
         axes.axhline(guaranteed_m, label="guaranteed miss Φ", **GUARANTEE)
     if radius_m:
@@ -76,7 +76,8 @@ def draw_body(
 ) -> None:
     """Draw the B-plane around the centre of the body: its outline, guaranteed miss and labels.
 
-    The axes extend by `half_m` in each direction. They are y and z, or with `t_rad` B.T and B.R.
+    The axes extend by `half_m` in each direction. They are y and z, or with `t_rad` B.T and B.R,
+    which the caller names. A guaranteed miss beyond the axes is not drawn.
     """
     aim_m = aim_in_plane(body, t_rad)
     if body is not None and body.longest_m >= _MIN_DISC * half_m:
@@ -120,7 +121,7 @@ def _draw_outline(axes: Axes, half_m: float, body: Body, t_rad: float | None) ->
 
     outline = ring(shorter_m)
     if body.axis_angle_rad is not None:
-        # A point of the plane of y and z and its opposite are both on the outline.
+        # B.T and B.R are opposite to y and z, which does not matter: an ellipse is symmetric.
         angle_rad = body.axis_angle_rad - (t_rad or 0.0)
         along, across = ring(1.0)
         outline = np.stack(
@@ -137,7 +138,7 @@ def aim_in_plane(body: Body | None, t_rad: float | None = None) -> Floats:
     """Return where closest approaches without a miss are in the B-plane, m, shape (2,).
 
     In the axes y and z of the body's position it is opposite to the aim point, in those of B.T and
-    B.R it is the aim point.
+    B.R it is the aim point. It is the origin without an aim point.
     """
     if body is None or body.aim_m is None:
         return np.zeros(2)

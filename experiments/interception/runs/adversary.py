@@ -102,7 +102,10 @@ def _rows(scenario: Scenario, found: WorstEngagement) -> dict[str, str]:
 
 
 def _lateral_m(found: WorstEngagement) -> dict[str, float]:
-    """Return the position of the true state at the closest approach by lateral axis, m."""
+    """Return the position of the true state at the closest approach by lateral axis, m.
+
+    It is from the spacecraft, without the aim point.
+    """
     values_m = found.result.lateral_miss_m[0].tolist()
     return dict(zip(found.scenario.set_model.axes, values_m, strict=True))
 
@@ -116,7 +119,7 @@ def _parts(
 ) -> Iterator[Part]:
     """Yield the table of the engagements found, and lines that explain it."""
     first = worst.engagements[0]
-    # At most the resolution of the clock; it keeps the rate finite.
+    # 1e-9 s, at most the resolution of the clock, keeps the rate finite.
     rate = worst.evaluations / max(elapsed_s, 1e-9)
     yield (
         f"{scenario_title(scenario)}, strategy {first.strategy}: "

@@ -195,7 +195,7 @@ def _without_wrong_images(scenario: Scenario) -> Scenario:
 def _nominal(scenario: Scenario) -> TruthPair:
     """Return the best pair at the nominal range and closing speed.
 
-    If these are impossible, the nearest possible ones are taken.
+    If these are outside the uncertainty, its nearest values are taken.
     """
     box = scenario.set_model.bounds
     label_m = float(np.clip(scenario.nominal_range_m, *box.x_m))
@@ -291,7 +291,11 @@ def _by_axis(quantity: str, values_m: NDArray[np.float64], scenario: Scenario) -
 
 
 def _equal_until_s(pair: TruthPair, scenario: Scenario) -> float:
-    """Return the time from the last equal measurement to arrival, s."""
+    """Return the time from the last equal measurement to arrival, s.
+
+    Without an equal measurement it is one step more than the flight; for a single motion, whose
+    measurements are all equal, the time from the last step.
+    """
     return pair.arrival_s - pair.last_common_step * scenario.set_model.step_s
 
 
@@ -304,7 +308,7 @@ def _before_arrival_s(
 class _GameValue(NamedTuple):
     """The reserve up to which the bound is the value of the game; None if it is not proved.
 
-    `reasons` say why it is not proved.
+    `reasons` say why it is not proved, and are empty otherwise.
     """
 
     reserve: ValueReserve | None
@@ -444,7 +448,7 @@ def _body_line(body: Body, bound_m: float) -> str:
 
 
 def _starts_nearer(scenario: Scenario) -> bool:
-    """Whether the starts of simulated runs are in a part of the uncertainty only."""
+    """Whether the uncertainty extends beyond the dispersion, from which simulated runs start."""
     for field in fields(StateBox):
         known = getattr(scenario.uncertainty, field.name)
         true = getattr(scenario.dispersion, field.name)

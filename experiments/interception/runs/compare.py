@@ -63,7 +63,7 @@ COLUMNS = (
     "b_dot_t_m",
     "b_dot_r_m",
 )
-"""Columns of the CSV; in a plane there are no components of the miss."""
+"""Columns of the CSV after strategy, noise and tie rule; those that results lack are left out."""
 
 
 def run(options: Compare) -> None:
@@ -218,7 +218,8 @@ def _set_counts(comparison: Comparison) -> SetCounts:
 def _by_noise(compared: Sequence[Comparison], noises: Sequence[str]) -> Table:
     """Return a table of the 90 % quantile of the miss by strategy and noise.
 
-    The last column is the ratio of the extremes of a strategy.
+    The last column is the ratio of the extremes of a strategy; unknown if the minimum is 0, or the
+    runs are too few to show the quantile.
     """
     table = number_table("strategy", *noises, "maximum / minimum")
     for name in dict.fromkeys(comparison.strategy for comparison in compared):
@@ -236,7 +237,8 @@ def _by_noise(compared: Sequence[Comparison], noises: Sequence[str]) -> Table:
 def _best(compared: Sequence[Comparison], noises: Sequence[str]) -> str:
     """Return a line with the strategies whose 90 % quantile of the miss is near the least.
 
-    For each noise, if they differ.
+    They are those that are near with every noise; if there are none, the strategies of each noise.
+    A quantile counts here also if the runs are too few to show it.
     """
     near = {}
     for noise in noises:

@@ -18,7 +18,10 @@ FIGURE_OF_MEMBERS = "figure-wrong-images"
 """Name of the figure of engagements whose set allows for wrong images."""
 
 MAX_LISTED_TIMES = 8
-"""Maximum number of times of suspected images in a line of the screen; chosen."""
+"""Number of suspected images up to which a line of the screen has all their times; chosen.
+
+With more, it has the times of so many first ones and of the last one.
+"""
 
 PRINTED_NOTE = (
     "the paper prints impulses of one run with each noise, from z = -8 km and without a range "
@@ -40,7 +43,8 @@ def engagement_figures(*scenarios: Scenario) -> Sequence[str]:
 def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
     """Yield the results of engagements side by side, for the screen.
 
-    Engagements of the paper's scenario are beside its printed numbers.
+    If one of them is of a scenario of the paper, a row has the impulses that the paper prints,
+    unknown for other scenarios and noises.
     """
     printed: Mapping[str, tuple[float, float]] = {}
     if any(is_of_paper(record.scenario) for record in records):
@@ -72,7 +76,10 @@ def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
 
 
 def _wrong_image_line(record: Record) -> str:
-    """Return whether a wrong image is proved, and the images one of which is wrong."""
+    """Return whether a wrong image is proved, and the images at least one of which is wrong.
+
+    With one wrong image allowed and one suspected image, this image is wrong.
+    """
     allowed = some_wrong_images(record.scenario.information_set.wrong_images)
     head = f"at most {allowed} assumed"
     proved = record.result.wrong_image_proved_s

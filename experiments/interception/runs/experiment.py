@@ -79,7 +79,7 @@ MAX_IMPULSE_ROWS = 20
 class _ChosenNoise(NamedTuple):
     """The noise of the curves 1 and 2: its name, and the noise of a Python file or None.
 
-    `kind` is the noise of the scenario, which a noise of a Python file replaces.
+    `kind` is the noise of the scenarios of these curves, which a noise of a Python file replaces.
     """
 
     name: str
@@ -322,8 +322,9 @@ def _heading(scenario: Scenario) -> str:
 def impulses_key(scenario: Scenario, results: Results) -> dict[str, list[dict[str, float | None]]]:
     """Return the key `impulses` of a curve in JSON; no key without a schedule of impulses.
 
-    Each impulse has its time, quantiles of its size, and its share of all impulses of all runs,
-    None without any impulse.
+    Each impulse has its time, quantiles of its size over all runs, zeros included, and its share of
+    the sum of all impulses of all runs, None if this sum is 0. A quantile that the runs do not show
+    is None.
     """
     if results.burns_m_s is None:
         return {}

@@ -91,7 +91,8 @@ def work_of(
     """Check the files of a command, and print notes and the warnings of its scenario.
 
     `names` are the files that the command writes into the folder of ``--out`` in addition to the
-    scenario and the results; `files` are single files by option.
+    scenario and the results; `files` are single files by option, None where the option is not
+    given. Errors in the block that the code of a Python file raises become messages.
     """
     wanted = ("scenario.toml", "results.json", *names)
     with (
@@ -168,9 +169,9 @@ class WorstMisses:
     """The engagements with the maximum values of a strategy.
 
     `set_kept` is the worst engagement whose set never became empty; None if there was none.
-    `overall` is the worst of all; None if no miss was finite. `evaluations` is the number of
-    engagements of all searches, also of one whose worst engagement is neither, and `sets_emptied`
-    the number of engagements of one search whose set became empty, of the search with the most.
+    `overall` is the worst of all, which can be `set_kept`; None if no miss was finite.
+    `evaluations` is the number of engagements of one search or two, also if one found nothing.
+    `sets_emptied` is the number of engagements whose set became empty, in the search with more.
     """
 
     set_kept: WorstEngagement | None
