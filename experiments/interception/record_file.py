@@ -132,7 +132,8 @@ def record_bytes(record: Record) -> bytes:
 def write_record(record: Record, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
     """Write a record, completely or not at all.
 
-    Raise `InputError` if the file cannot be written, or exists already.
+    Raise `InputError` if the file is not named ``.npz``, cannot be written, or exists already and
+    `overwrite` is not set, or if the record is too large to be read again.
     """
     file = Path(path)
     if file.suffix.lower() != ".npz":
@@ -202,7 +203,10 @@ def _check_archive(archive: zipfile.ZipFile, size: int) -> None:
 
 
 def _check(arrays: Arrays, axes: int) -> None:
-    """Raise ValueError if arrays do not have their declared types, shapes and values."""
+    """Raise ValueError if arrays do not have their declared types, shapes and values.
+
+    `axes` is the number of lateral axes.
+    """
     steps = arrays["time_s"].size
     sizes: dict[str | int, int] = {
         "steps": steps,
@@ -233,7 +237,10 @@ def _check(arrays: Arrays, axes: int) -> None:
 
 
 def _check_size(scenario: Scenario, steps: int) -> None:
-    """Raise ValueError if the sets of a record take too much memory."""
+    """Raise ValueError if the sets of a record take too much memory.
+
+    They are counted with the most sections that a set can have, also after a new grid.
+    """
     settings = scenario.information_set
     sets = math.comb(settings.classes, settings.wrong_images)
     sections = sets * max(settings.sections, 2 * settings.fewest_sections + 1)

@@ -48,7 +48,7 @@ _SQUARE: dict[str, Any] = {
     "markersize": 5.5,
 }
 _SECTIONS = 5
-"""Maximum number of sections of a plane: more would hide each other."""
+"""Maximum number of sections of a plane; chosen: more would hide each other."""
 _RATES = ("µrad/s", "nrad/s")
 """Units of rates; the second one is for small numbers."""
 _ANGLES = ("mrad", "µrad")
