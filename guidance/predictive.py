@@ -10,6 +10,7 @@ import numpy as np
 from infoset.arrays import Floats
 from infoset.guidance.kalman import KalmanBank
 from infoset.guidance.situation import Situation
+from infoset.guidance.thruster import modulus
 from infoset.limits import Checked, Limits
 
 
@@ -44,7 +45,7 @@ class Predictive(Checked):
     engine can give an impulse, and each further one at 1/s of the time to go at which the one
     before ended. One also begins at the last time that the engine allows. A manoeuvre that is
     greater than the maximum impulse of the engine continues in the next steps. In space each axis
-    has its own manoeuvres and is compared with the maximum impulse alone.
+    has its own manoeuvres, and the modulus of both is compared with the maximum impulse.
 
     After a manoeuvre, its miss is the error of its estimate. With independent errors of angles this
     falls in proportion to the time to go, or faster, so geometric times make the impulses after the
@@ -83,6 +84,8 @@ class Predictive(Checked):
 
         state.due_s = np.where(np.isinf(state.due_s), estimate.to_go_s / self.spacing, state.due_s)
         is_due = (estimate.to_go_s <= state.due_s) | (estimate.to_go_s <= next_s)
-        is_done = is_due & (np.abs(whole) <= situation.thruster.max_impulse_m_s)
+        wanted = np.where(is_due, whole, 0.0)
+        # The engine limits the modulus of both axes (`Thruster.give`).
+        is_done = is_due & (modulus(wanted) <= situation.thruster.max_impulse_m_s)
         state.due_s = np.where(is_done, estimate.to_go_s / self.spacing, state.due_s)
-        return np.where(is_due, whole, 0.0)
+        return wanted

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -32,6 +33,8 @@ from infoset.guidance import (
     ZeroEffortMiss,
     strategy_names,
 )
+from infoset.guidance.estimate import MissEstimate
+from infoset.guidance.predictive import ManoeuvreState
 from infoset.guidance.strategy import checked_impulses
 from infoset.sim import Scenario, simulate
 
@@ -124,6 +127,42 @@ def test_built_in_strategies_decide_along_each_axis_as_in_its_plane(strategy: St
         for number, plane in enumerate(planes):
             assert np.array_equal(wanted[number], strategy.decide(plane, planar[number])[0])
     assert np.abs(wanted).max(axis=1).min() > 0.0
+
+
+class KnownMiss:
+    """An estimator whose correction along both axes is known, with 10 s to go."""
+
+    def __init__(self, impulse_m_s: float) -> None:
+        self._miss_m = 10.0 * np.full((2, BATCH), impulse_m_s)
+
+    def update(self, situation: Situation) -> None:
+        """Do nothing."""
+
+    def estimate(self, situation: Situation) -> MissEstimate:
+        """Return the known miss."""
+        to_go_s = np.full((2, BATCH), 10.0)
+        return MissEstimate(self._miss_m, np.zeros((2, BATCH)), to_go_s)
+
+
+@pytest.mark.parametrize(
+    ("along_axis_m_s", "next_s"),
+    [
+        # The modulus, 7.07, is below the maximum impulse, 7.5 m/s: the next one is at 10 s / 1.5.
+        (5.0, 10.0 / 1.5),
+        # The modulus, 8.49, is above it: the manoeuvre continues.
+        (6.0, 20.0),
+    ],
+)
+def test_manoeuvre_is_done_if_its_modulus_is_within_the_maximum_impulse(
+    along_axis_m_s: float, next_s: float
+) -> None:
+    (now, _) = situations(MODEL)[0]
+    state = ManoeuvreState(cast("Any", KnownMiss(along_axis_m_s)), np.full((2, BATCH), 20.0))
+
+    wanted = Predictive(spacing=1.5).decide(now, state)
+
+    np.testing.assert_array_equal(wanted, along_axis_m_s)
+    np.testing.assert_array_equal(state.due_s, next_s)
 
 
 def test_an_impulse_need_be_finite_only_where_a_set_is_tracked() -> None:
