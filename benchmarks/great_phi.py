@@ -1,8 +1,10 @@
 """Search for flights with a great Phi, and compare Phi with the maximum miss of exact sections over
 the same labels.
 
-    python -m benchmarks.great_phi                      # without and with the range sensor, 2000
-    engagements each python -m benchmarks.great_phi --budget 400 --rate-error 1e-6
+    python -m benchmarks.great_phi
+    python -m benchmarks.great_phi --budget 400 --rate-error 1e-6
+
+The first line searches without and with the range sensor, 2000 engagements each.
 
 The search is that of `infoset adversary`, with Phi in place of the miss. For the flights with the
 maximum Phi, the section of 200 labels among those that leave in each step is computed at that step,

@@ -1,7 +1,9 @@
 """Measure pages: time to write, size, time until the first drawing, and frames per second.
 
-Run: python benchmarks/page_speed.py It needs Chromium and the extra `browser`, and prints a table
-in Markdown. docs/replay.md contains such a table.
+    python benchmarks/page_speed.py
+
+It needs Chromium and the extra `browser`, and prints a table in Markdown. docs/replay.md contains
+such a table.
 """
 
 from __future__ import annotations

@@ -1,5 +1,6 @@
-"""Compare every number that the commands write, between two checkouts: `python -m
-benchmarks.same_numbers OLD NEW`.
+"""Compare every number that the commands write, between two checkouts.
+
+    python -m benchmarks.same_numbers OLD NEW
 
 Each command runs in both checkouts with ``--json``, with the built-in scenarios and problems and
 fixed seeds. The script prints the keys that only one checkout writes, and for each number that

@@ -1,16 +1,21 @@
 """Test the guaranteed model: simulate all kinds of noise with starts in all of B x D, and count
 violations.
 
-    python -m benchmarks.soundness --engagements 200000 python -m benchmarks.soundness --engagements
-    200000 --hostile      # execution errors of 2 %, a manoeuvring target python -m
-    benchmarks.soundness --engagements 200000 --random rate  # random scenarios, each with a rate
-    sensor python -m benchmarks.soundness --engagements 100000 --random       # random scenarios
-    without one python -m benchmarks.soundness --engagements 200000 --space        # out of the
-    plane, Sun anywhere python -m benchmarks.soundness --engagements 40000 --camera        # random
-    scenarios with a camera python -m benchmarks.soundness --engagements 40000 --camera scheduled  #
-    with a cut-off or times of impulses python -m benchmarks.soundness --engagements 20000 --gravity
-    # random scenarios in strong gravity python -m benchmarks.soundness --engagements 20000 --random
-    --burns       # burns of up to a step, also with --random rate and --camera
+    python -m benchmarks.soundness --engagements 200000
+    python -m benchmarks.soundness --engagements 200000 --hostile
+    python -m benchmarks.soundness --engagements 200000 --random rate
+    python -m benchmarks.soundness --engagements 100000 --random
+    python -m benchmarks.soundness --engagements 200000 --space
+    python -m benchmarks.soundness --engagements 40000 --camera
+    python -m benchmarks.soundness --engagements 40000 --camera scheduled
+    python -m benchmarks.soundness --engagements 20000 --gravity
+    python -m benchmarks.soundness --engagements 20000 --random --burns
+
+`--hostile` has execution errors of 2 % and a manoeuvring target, `--random` random scenarios, each
+with a rate sensor or without one. `--space` is out of the plane, with the Sun anywhere. `--camera`
+has random scenarios with a camera, also with a cut-off or times of impulses, and `--gravity` random
+scenarios in strong gravity. `--burns` has burns of up to a step, also with `--random rate` and
+`--camera`.
 
 Counted are engagements whose true state left its section (by any amount), whose set was lost, whose
 true miss exceeded Phi, and those without a Phi. All counts must be zero; a warning ends the run.

@@ -1,5 +1,6 @@
-"""Random encounters from OEM tables: `python -m benchmarks.trajectory_tables [--encounters 200]
-[--first 0]`.
+"""Random encounters from OEM tables.
+
+    python -m benchmarks.trajectory_tables [--encounters 200] [--first 0]
 
 Each encounter has two orbits around the Sun, tables of both as OEM files, and an epoch beside a
 change of the step. The script makes the scenario of each (`infoset scenarios from-states`) and

@@ -1,10 +1,12 @@
 """Print lower bounds, worst misses found, and misses with random and game errors, for strategies on
 the set.
 
-    python -m benchmarks.value_of_the_game                                  # asteroid-1997, five
-    searches each python -m benchmarks.value_of_the_game --scenarios built-in --budget 2000 --seeds
-    1 python -m benchmarks.value_of_the_game --scenarios variants --budget 2000 --seeds 1 python -m
-    benchmarks.value_of_the_game --scenarios random --budget 2000 --seeds 1
+    python -m benchmarks.value_of_the_game
+    python -m benchmarks.value_of_the_game --scenarios built-in --budget 2000 --seeds 1
+    python -m benchmarks.value_of_the_game --scenarios variants --budget 2000 --seeds 1
+    python -m benchmarks.value_of_the_game --scenarios random --budget 2000 --seeds 1
+
+The first line is `asteroid-1997` with five searches for each strategy.
 
 Searches start anywhere in the uncertainty of the scenario, the other runs in its dispersion. The
 model is `guaranteed`. Each row has the maximum value found, that of any state of the set, and the

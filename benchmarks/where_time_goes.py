@@ -1,8 +1,10 @@
 """Print the time of an engagement by part and per section-step, and the number of vertices of the
 sections.
 
-    python benchmarks/where_time_goes.py                     # random noise, 50 and 200 engagements
-    at once python benchmarks/where_time_goes.py --noise game --together 400
+    python benchmarks/where_time_goes.py
+    python benchmarks/where_time_goes.py --noise game --together 400
+
+The first line has random noise, and 50 and 200 engagements at once.
 
 Kernels and methods are wrapped in timers. The time of a part does not include other parts that it
 calls. The output is that of the fastest round. The timers take a few per cent, which are counted as

@@ -1,8 +1,8 @@
 """Misses and bounds with wrong images, for docs/wrong-images.md.
 
-python -m benchmarks.wrong_images table [--runs 60] [--seed 1]
-python -m benchmarks.wrong_images placings [--runs 480] [--seed 1]
-python -m benchmarks.wrong_images soundness [--flights 4000] [--seed 1]
+    python -m benchmarks.wrong_images table [--runs 60] [--seed 1]
+    python -m benchmarks.wrong_images placings [--runs 480] [--seed 1]
+    python -m benchmarks.wrong_images soundness [--flights 4000] [--seed 1]
 
 `table` prints the table of the page, `placings` the misses with one wrong image by the set and by
 Kalman filters with and without an innovation gate. `soundness` counts violations of the guarantee

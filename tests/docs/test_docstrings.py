@@ -35,6 +35,8 @@ PACKAGES = (
 RAISES_CHECKED = ("infoset", "infoset.guidance", "infoset.sim", "infoset.rendezvous")
 """Packages in which public functions document the exceptions that they raise."""
 
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+
 WITHOUT_UNITS = (
     *(
         "infoset.ConvexPolygons",
@@ -277,3 +279,19 @@ def test_every_number_has_its_unit(package: str) -> None:
         if (found := without_unit(name, thing))
     }
     assert bare == {}
+
+
+@pytest.mark.skipif(not BENCHMARKS.is_dir(), reason="only a checkout has the benchmarks")
+def test_commands_of_benchmarks_are_lines_of_an_indented_block() -> None:
+    """A tool that wraps docstrings may run the lines of a block together."""
+    wrapped = []
+    for file in sorted(BENCHMARKS.glob("*.py")):
+        text = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or ""
+        # A command within a sentence stands between backquotes.
+        lines = re.sub(r"`[^`]+`", "", text).splitlines()
+        wrapped += [
+            line
+            for line in lines
+            if re.search(r"^(?!    python).*\bpython |python .*python", line)
+        ]
+    assert wrapped == []
