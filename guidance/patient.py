@@ -57,6 +57,8 @@ class Patient(Checked):
     theirs.
     """
 
+    # Chosen: the middle of the values from 0.2 to 0.9, which give nearly the same misses and
+    # impulses (docs/measured/strategies.md).
     share: Annotated[float, Limits(minimum=0.0, maximum=1.0)] = 0.5
 
     name: ClassVar[str] = "patient"
