@@ -190,7 +190,7 @@ def commands() -> Any:
 
 @contextlib.contextmanager
 def _agg_backend() -> Iterator[None]:
-    """Let Matplotlib use Agg while a command runs.
+    """Let Matplotlib use Agg while a command runs; then restore the variable.
 
     A backend of the user's that is missing would stop the import of Matplotlib. A notebook, for
     example, sets its backend for all processes that it starts.
@@ -209,8 +209,9 @@ def _agg_backend() -> Iterator[None]:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command `infoset`, and exit with its code; None takes the arguments from the process.
 
-    It always raises `SystemExit`: 0 done, 1 a published number disagrees, 2 wrong input, 130
-    interrupted.
+    It raises `SystemExit`: 0 done; 1 a published number disagrees, or stdout was closed early; 2
+    wrong input, an error of files or memory, or a library of an extra is missing; 130 interrupted.
+    Any other error is a mistake of the program, and is raised as it is.
     """
     try:
         with _agg_backend():

@@ -28,7 +28,9 @@ Like = Annotated[str, typer.Option("--like", metavar="NAME", help="The built-in 
 LikeScenario = Annotated[
     str,
     typer.Option(
-        "--like", metavar="NAME", help="The scenario whose sensors, engine and settings it takes."
+        "--like",
+        metavar="NAME",
+        help="The scenario whose sensors, engine and settings the new one takes.",
     ),
 ]
 Sigmas = Annotated[
@@ -37,7 +39,7 @@ Sigmas = Annotated[
         "--sigma",
         min=0.1,
         max=10.0,
-        help="Standard deviations that uncertainty and dispersion contain.",
+        help="Number of standard deviations to which uncertainty and dispersion extend.",
     ),
 ]
 MagnitudeText = Annotated[
@@ -59,7 +61,7 @@ BodyRadius = Annotated[
         metavar="M",
         min=1e-3,
         max=1e9,
-        help="Radius of the target, m; without it no run hits.",
+        help="Radius of the target, m; without it hits are not counted.",
     ),
 ]
 Disturbance = Annotated[
@@ -121,7 +123,7 @@ ProblemOut = Annotated[
     Path, typer.Option("--out", metavar="FILE", help="The problem file to write; - is stdout.")
 ]
 _NAME = r"\w[\w .-]{0,99}"
-"""Stems of files that are names of their problems; that of stdout, "-", is none."""
+"""Stems of files that can be the `name` in the file; "-", which is stdout, cannot."""
 NewFile = Annotated[Path, typer.Argument(metavar="FILE", help="The file to write; - is stdout.")]
 
 
@@ -174,7 +176,7 @@ def _commands(noun: str, of_what: str, example: str) -> typer.Typer:
 
     command = app.command(
         "check",
-        help=f"Check a {noun} file. The exit code is 2 if it has errors; all are listed.",
+        help=f"Check a {noun} file. If it has errors, they are listed, and the exit code is 2.",
         epilog=f"Example: {name} check mine.toml",
     )
     command(_check_scenario if noun == SCENARIO else _check_problem)
@@ -198,7 +200,10 @@ def _check_problem(
 
 
 def _named(text: str, name: str, like: str) -> str:
-    """Return the text of a copy with another name and description, which its results have."""
+    """Return the text of a copy with another name and description, which its results have.
+
+    The text is unchanged if the name is not one that a file can have (`_NAME`).
+    """
     if not re.fullmatch(_NAME, name):
         return text
     description = f'description = "Copy of {like}, changed"'
@@ -281,7 +286,10 @@ def _checked_problem(file: str, settings: Sequence[str] | None) -> _Checked:
 
 
 def _print_check(checked: _Checked, json: bool, quiet: bool) -> None:
-    """Print the name, fingerprint, schedule and warnings of a file without errors."""
+    """Print the name, fingerprint, facts and warnings of a file without errors.
+
+    With `json` the keys are printed even if `quiet`, and the warnings are among them.
+    """
     from infoset.experiments.common.output import to_json
     from infoset.experiments.common.screen import say_warnings
     from infoset.sim.versions import versions

@@ -61,7 +61,11 @@ def _results_of_command(paper: Paper, progress: Progress) -> dict[str, list[floa
 
 
 def _value(results: Any, key: str) -> float:
-    """Return the number at a key such as `nodes.0.velocity_m_s.1`; NaN if there is none."""
+    """Return the number at a key such as `nodes.0.velocity_m_s.1`.
+
+    NaN if the value, or one of the values that contain it, is None. A key that does not exist is a
+    mistake in the file of the paper, and raises.
+    """
     for part in key.split("."):
         if isinstance(results, list):
             results = results and results[int(part)]
@@ -205,6 +209,9 @@ def _row(each: NumberComparison, notes: Sequence[str]) -> _Row:
 
 
 def _digits(number: PrintedNumber, value: float) -> str:
-    """Return a computed number with at least two digits more than the printed one."""
+    """Return a computed number with two significant digits more than the published one.
+
+    The published number is the corrected one of a misprint.
+    """
     digits = len(Decimal(number.corrected or number.printed).as_tuple().digits) + 2
     return f"{value:#.{digits}g}"

@@ -31,7 +31,7 @@ def workers_of(
 ) -> Iterator[tuple[Executor | None, int | None]]:
     """Start the workers that the options choose for a number of runs.
 
-    Yield the arguments of `Campaign.run`. `note` prints a line.
+    Yield the arguments `executor` and `workers` of `Campaign.run`. `note` prints a line.
     """
     if options.dask is not None and options.workers is not None:
         raise InputError(

@@ -190,7 +190,7 @@ class Sweep(FlightOptions):
         typer.Option(
             metavar="KEY=VALUES,...",
             help=(
-                "Keys of the scenario file and their values, in the units of the file; the forms "
+                "Keys of the scenario file and their values, in the units of the keys; the forms "
                 "are above. Can be repeated."
             ),
         ),
@@ -231,7 +231,7 @@ class ReportOptions(FileOptions):
     worst runs, each with the command that simulates it again; with --out, figures of the
     distributions, of the convergence of the quantiles, and of the miss against the initial state.
     For a sweep: the values that meet the requirement; with --out, the table and the figures.
-    --require is for sweeps. Without --out or --json no file is written.
+    --require is for sweeps. Without --out, --json or --csv no file is written.
     """
 
     folder: Annotated[

@@ -35,7 +35,8 @@ MAX_WARNINGS = 5
 def scenario_of(options: FlightOptions) -> tuple[Scenario, list[str]]:
     """Return the scenario of the options, and lines about it for the screen.
 
-    It has the campaign's noise.
+    It has the campaign's noise, unless this is the user's own. With --resume it has the model of
+    the stored campaign, if there is one.
     """
     resumed = None
     if options.resume and (options.out / MANIFEST).is_file():
@@ -74,7 +75,8 @@ def fly(
 
     Messages are printed on stderr.
 
-    Return the folder, the warnings about the scenarios, and the time of this session, s.
+    Return the folder, the warnings about the scenarios, all of them although a sweep shows few, and
+    the time of the simulation in this session, s.
     """
     need_free(options.out, resume=options.resume)
     need_writable(options.out)

@@ -124,7 +124,8 @@ def _report_campaign(
 
     table = summary(folder)
     related = correlations(folder)
-    worst = worst_runs(folder, _scenario_file(folder, options.out))
+    scenario_file = _scenario_file(folder, options.out)
+    worst = worst_runs(folder, scenario_file)
     report = {
         **heading(folder),
         "samples": records(table.drop(columns="cell")),
@@ -138,13 +139,14 @@ def _report_campaign(
 
         with progress_bar(options.quiet) as begin:
             written.draw(_figures(folder), draw_all(folder), begin("figures"))
-    return _parts(folder, table, related, worst)
+    return _parts(folder, table, related, worst, scenario_file)
 
 
 def _scenario_file(folder: CampaignFolder, out: Path | None) -> Path:
     """Return the scenario file that the commands of single runs name.
 
-    It is the file of the folder or, if that is missing, the file that the report writes.
+    It is the file of the folder or, if that is missing, the file that the report writes. Without
+    --out it writes none; the file of the folder is then named although it is missing.
     """
     stored = folder.path / SCENARIO_FILE
     if out is None or stored.is_file():
@@ -153,8 +155,17 @@ def _scenario_file(folder: CampaignFolder, out: Path | None) -> Path:
 
 
 def _parts(
-    folder: CampaignFolder, table: pd.DataFrame, related: pd.DataFrame, worst: pd.DataFrame
+    folder: CampaignFolder,
+    table: pd.DataFrame,
+    related: pd.DataFrame,
+    worst: pd.DataFrame,
+    scenario_file: Path,
 ) -> Iterator[Part]:
+    """Yield the report for the screen.
+
+    `scenario_file` is the file that the commands of the worst runs name; a file that the report
+    writes exists when the last line is yielded.
+    """
     manifest = folder.manifest
     runs = some_runs(folder.finished_runs)
     if manifest.stopped_after is not None:
@@ -178,5 +189,5 @@ def _parts(
         how = ending(row["outcome"], row["hit"], row["cause"])
         yield f"  miss {miss} m, impulse {impulse} m/s, {how}: {row['replay']}"
 
-    if not (folder.path / SCENARIO_FILE).is_file():
+    if not scenario_file.is_file():
         yield f"(the folder has no {SCENARIO_FILE}, which these commands need; --out writes one)"

@@ -78,7 +78,10 @@ def run(options: Options) -> None:
 
 
 def _runs(options: Options, required: AnyRequirement) -> int | RunsUntil:
-    """Return the number of runs of a cell; with --until, the requirement with the limits."""
+    """Return the number of runs of a cell; with --until, the requirement with the limits.
+
+    A --max-runs below --runs counts as --runs.
+    """
     if options.until is not None:
         max_runs = max(options.max_runs or MAX_RUNS_A_CELL, options.runs)
         return RunsUntil(required, max_runs, min_runs=options.runs)

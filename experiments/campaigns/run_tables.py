@@ -51,7 +51,7 @@ OUTCOMES = {outcome.value.replace("-", "_"): outcome.value for outcome in Outcom
 
 
 _SIGNED_ONLY = ("start_x_m", "start_vx_m_s")
-"""Components along the approach; their moduli have no correlations."""
+"""Components along the approach: the correlations of their moduli are not computed."""
 CI = ("95 % CI\nfrom", "\nto")
 """Titles of the ends of an interval in a table for the screen."""
 
@@ -63,9 +63,10 @@ def summary(
 
     The columns are the varied keys; the numbers of all runs, of those with each outcome, and of
     those in which the sets and the bound Phi held; the share of hits; the misses by cause, and what
-    explains them; and for each quantity the maximum and the quantiles at some levels. Shares and
-    quantiles have the ends of their 95 % confidence intervals. NaN is unknown: the share of hits of
-    a body without a size, and a quantile that so few runs do not show.
+    explains them; the share of starts drawn again; and for each quantity the maximum and the
+    quantiles at some levels. The share of hits and the quantiles have the ends of their 95 %
+    confidence intervals. NaN is unknown: the share of hits of a body without a size, a quantile
+    that so few runs do not show, and the results of a cell without runs.
     """
     steps = [
         Step(("outcome", "hit", "truth_kept", "set_emptied", "phi_held"), _counts),
@@ -102,7 +103,7 @@ def _counts(runs: pd.DataFrame) -> dict[str, Any]:
 def _hits(hit: pd.Series[bool]) -> dict[str, Any]:
     """Return the number of hits, and their share with its interval.
 
-    All are NaN if it is not known of any run whether it hit (a body without a size).
+    All are NaN if it is not known of any run whether it hit (a body without a size, or no runs).
     """
     sized = int(hit.count())
     if not sized:
@@ -218,7 +219,7 @@ def _correlations_with_miss(runs: pd.DataFrame) -> dict[str, Any]:
 
 
 def worst_runs(folder: CampaignFolder, scenario_file: Path) -> pd.DataFrame:
-    """Return the runs with the largest miss, the worst first.
+    """Return the `WORST` runs of a campaign with the largest miss, the worst first.
 
     The column `replay` has the command that simulates the run again.
     """
@@ -241,7 +242,10 @@ def worst_runs(folder: CampaignFolder, scenario_file: Path) -> pd.DataFrame:
 
 
 def _rows_of_worst(folder: CampaignFolder) -> pd.DataFrame:
-    """Return some columns of the runs with the largest miss, from the files that contain them."""
+    """Return some columns of the runs with the largest miss, from the files that contain them.
+
+    The folder is of a campaign, which has one cell.
+    """
     (chunks,) = folder.stored_chunks()
     miss_m = folder.read_chunks(chunks, ["miss_m"])["miss_m"]
     positions = miss_m.nlargest(WORST).index.to_numpy()
@@ -289,7 +293,7 @@ def heading(folder: CampaignFolder) -> dict[str, Any]:
 
 
 def campaign_notes(folder: CampaignFolder) -> list[str]:
-    """Return a line for each noise that says how its results are to be read."""
+    """Return lines that say how the results are to be read, at most one for each noise."""
     return noise_notes(folder.manifest.scenario, noises_of(folder))
 
 

@@ -14,7 +14,7 @@ from infoset.sim.storage import CampaignFolder
 
 PASS_BYTES = 160_000_000
 """Memory of the columns that are read together, bytes: of ten million runs two columns of numbers,
-of a million runs all columns.
+of 700 000 runs all columns.
 
 A pass needs up to four times as much, with the Parquet files and the work on one column. Every pass
 opens all files, which takes as long as reading a few of their columns, so the columns of small
@@ -31,7 +31,7 @@ _BYTES_A_RUN = {column.name: _BYTES.get(column.kind, _TEXT_BYTES) for column in 
 class Step:
     """A part of the rows of a table.
 
-    `keys_of` returns the keys and values of a sample from these columns.
+    `keys_of` returns the keys and values of a sample, which may be empty, from these columns.
     """
 
     columns: tuple[str, ...]

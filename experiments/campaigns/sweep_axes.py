@@ -1,6 +1,6 @@
 """The keys of a scenario file that a sweep varies, each over a range of values.
 
-The values are in the unit of the file.
+The values are in the unit at the end of the key.
 
 A cell is valid exactly when a file with its values is, and has the same error messages.
 """
@@ -15,7 +15,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from infoset.experiments.common.errors import InputError, input_errors, shown
-from infoset.experiments.common.input_file import changed, keys_of, numeric_key, similar_key
+from infoset.experiments.common.input_file import (
+    changed,
+    field_key,
+    keys_of,
+    numeric_key,
+    similar_key,
+)
 from infoset.experiments.common.units import split_unit
 from infoset.sim.scenario import Scenario
 from infoset.sim.storage import MAX_CELLS, Axis
@@ -50,12 +56,12 @@ def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
 
     axes = tuple(_axis(piece.strip(), scenario) for piece in pieces)
 
-    # A key may be varied once, also by the factor of its sensor.
+    # A key may be varied once, also in another unit and by the factor of its sensor.
     bounds = _error_bounds(scenario)
     varied: dict[str, list[str]] = {}
     for axis in axes:
         for tied in tied_keys(axis.key):
-            for key in bounds.get(tied, {tied: 0.0}):
+            for key in bounds.get(tied, {field_key(Scenario, tied): 0.0}):
                 varied.setdefault(key, []).append(tied)
 
     for names in varied.values():
@@ -102,7 +108,8 @@ def sweep_cells(scenario: Scenario, axes: Sequence[Axis]) -> tuple[Scenario, ...
 def _error_bounds(scenario: Scenario) -> dict[str, dict[str, float]]:
     """Return the error bounds of each sensor by key, under the name of their common factor.
 
-    The name is for example `angle_sensor.scale`.
+    The name is for example `angle_sensor.scale`. Bounds that are zero, which a factor does not
+    change, are left out.
     """
     factors: dict[str, dict[str, float]] = {}
     for sensor in scenario.sensors.values():
@@ -141,7 +148,8 @@ def _axis(piece: str, scenario: Scenario) -> Axis:
             f"{match[2]}"
         )
 
-    # The ends are exactly as written; the values between them have 12 digits.
+    # The ends are exactly as written; the values between them have 12 digits. For a key of whole
+    # numbers all values are rounded, also the ends.
     spaced = np.geomspace if is_log else np.linspace
     between = spaced(first, last, count)[1:-1]
     values = [first, *(float(f"{value:.12g}") for value in between), last]

@@ -251,7 +251,7 @@ def _draw_decisions(axes: Axes, table: SweepTable, cells: pd.DataFrame) -> None:
 def _draw_zero(
     axes: Axes, table: SweepTable, cells: pd.DataFrame, column: str, **look: Any
 ) -> None:
-    """Draw the line on which a quantile equals its bound."""
+    """Draw the line on which a quantile equals its bound, if some cells are on each side of it."""
     above = _grid(table, above_bound(cells, column))
     if (above < 0.0).any() and (above > 0.0).any():
         dashes = look.get("linestyle", "-")
@@ -264,7 +264,8 @@ def _draw_zero(
 def _draw_heat(figure: Figure, axes: Axes, values: Floats) -> None:
     """Draw a quantile as a heat map.
 
-    The scale of colours is logarithmic if it varies by more than a factor of 10.
+    The scale of colours is logarithmic if the values are positive and vary by more than a factor of
+    10. NaN is a cell whose runs do not show the quantile; at least one value is known.
     """
     low = float(np.nanmin(values))
     high = float(np.nanmax(values))
@@ -281,7 +282,10 @@ def _draw_heat(figure: Figure, axes: Axes, values: Floats) -> None:
 
 
 def _grid(table: SweepTable, values: Any) -> Floats:
-    """Return a column of cells as a map, shape (values of the second axis, values of the first)."""
+    """Return a column of the cells of one noise, in the order of the table, as a map.
+
+    Its shape is (values of the second axis, values of the first).
+    """
     shape = tuple(len(axis.values) for axis in table.axes)
     return np.asarray(values, dtype=np.float64).reshape(shape).T
 

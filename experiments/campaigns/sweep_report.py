@@ -161,7 +161,7 @@ class SweepReport:
         yield "decisions:"
         yield self._screen_table(self._printed(rows.head(MAX_ROWS)))
         if len(rows) > MAX_ROWS:
-            yield f"{len(rows) - MAX_ROWS} more cells are in {TABLE}, --json and --csv"
+            yield f"{len(rows) - MAX_ROWS} more cells are in {TABLE} and in the file of --json"
 
         runs = int(rows["runs"].sum())
         known = int(rows["required_known"].sum())

@@ -25,7 +25,8 @@ from infoset.sim.storage import Axis, CampaignFolder
 _LOG_FROM = 30.0
 """Ratio of the maximum to the minimum value from which the values have a logarithmic axis.
 
-On a linear axis the smallest value would be at most 3 % of the axis above its end.
+On a linear axis from zero the smallest value would be less than a thirtieth of the axis above its
+end.
 """
 _ESTIMATE = ("required_value", "required_lower", "required_upper", "required_known")
 """Columns of the estimate that decides."""
@@ -133,7 +134,7 @@ def _radius_m(scenario: Scenario) -> float | None:
 def _closed_forms(folder: CampaignFolder) -> list[float]:
     """Return the closed form of the guaranteed miss of each cell, m.
 
-    NaN in cells with fewer than two images.
+    NaN in cells with fewer than two images, or with a camera that can lose images.
     """
     values = []
     for cell in sweep_cells(folder.manifest.scenario, folder.manifest.axes):
@@ -204,7 +205,8 @@ def _between(axis: Axis, left: int, right: int, share: float) -> float:
 def above_bound(cells: pd.DataFrame, quantile: str = "limit_quantile") -> Floats:
     """Return the difference of a quantile and its bound in each cell; NaN if it is unknown.
 
-    If the quantiles span decades, it is the difference of the logarithms.
+    If the `limit_quantile` of these cells spans decades, it is the difference of the logarithms,
+    also for another `quantile`.
     """
     values = cells[quantile].to_numpy(np.float64)
     bounds = cells["limit_bound"].to_numpy(np.float64)
@@ -214,5 +216,5 @@ def above_bound(cells: pd.DataFrame, quantile: str = "limit_quantile") -> Floats
 
 
 def spans_decades(values: pd.Series) -> bool:
-    """Return whether values are positive and need a logarithmic axis."""
+    """Return whether values are positive and need a logarithmic axis; NaN is left out."""
     return bool(values.max() > _LOG_FROM * values.min() > 0.0)

@@ -85,7 +85,8 @@ def built_in(name: str, kinds: Collection[str]) -> BuiltIn:
 def kind_of(document: Mapping[str, Any]) -> str | None:
     """Return the kind of a parsed file: a kind of problem, or `SCENARIO`.
 
-    None for other files. A scenario is known by its tables.
+    None for other files. A scenario has no key `kind`; it is known by its tables `uncertainty` and
+    `dispersion`.
     """
     kind = document.get("kind")
     if isinstance(kind, str) and kind in PROBLEMS:

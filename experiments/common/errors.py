@@ -14,7 +14,7 @@ time of the comparison grows as the square of this number."""
 
 
 def on_a_screen(message: str) -> str:
-    """Return a message with a question mark for each unprintable character.
+    """Return a message with a question mark for each unprintable character but line breaks.
 
     Parts of a message may come from a hostile file.
     """
@@ -63,6 +63,6 @@ def shown(value: object) -> str:
 
 
 def nearest(word: str, known: Sequence[str]) -> str | None:
-    """Return the most similar known word, or None if none is similar."""
+    """Return the most similar known word; None if none is similar, or no word is known."""
     similar = difflib.get_close_matches(word[:_LONGEST_WORD], known, n=1, cutoff=0.6)
     return next(iter(similar), None)

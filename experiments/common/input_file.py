@@ -104,12 +104,13 @@ def read_file(
     owner : type
         The dataclass; its class variable ``kind``, if any, is the ``kind`` of such files.
     name_or_path : str or path
-        A built-in name wins over a file of that name, unless the argument has a path separator or
-        ends in ``.toml``.
+        A built-in name wins over a file of that name, unless the argument is a `Path`, has a path
+        separator or ends in ``.toml``.
     settings : sequence of str or None
         KEY=VALUE: values that replace values of the file, for example
         ``thruster.budget_m_s=500``. A key of an array of tables has the number of its table,
-        ``craft.2.weight``; ``.min`` and ``.max`` are the ends of an interval.
+        ``craft.2.weight``; ``.min`` and ``.max`` are the ends of an interval. The value is in the
+        unit at the end of KEY. The settings are appended to the description of the result.
 
     Raises
     ------
@@ -150,7 +151,10 @@ def load_problem(
 def read_text(
     owner: type[Kind], text: str, source: str, settings: Sequence[str] | None = None
 ) -> Kind:
-    """Return the dataclass of the text of a file, as `read_file`; messages name `source`."""
+    """Return the dataclass of the text of a file, as `read_file`; messages name `source`.
+
+    The settings do not change the description.
+    """
     document = parse(text, source)
     wanted = kind_name(owner)
     kind = kind_of(document)
@@ -399,6 +403,7 @@ class _Reading:
         parts = [f"#{int(part) + 1}" if part.isdecimal() else part for part in path[:-1]]
         parts.append(key if key.isidentifier() else shown(key))
         line = f"{'.'.join(parts)}: {text}"
+        # A message without a number, or with the limit zero, is the same in all units.
         if key != path[-1] and re.search(r"[1-9]", text):
             line += f" (in {quantity_and_unit(path[-1])[1]})"
         if value is not None and not isinstance(value, dict):
@@ -445,7 +450,10 @@ def keys_of(owner: type, prefix: str = "") -> list[str]:
 
 
 def similar_key(key: str, known: Sequence[str]) -> str | None:
-    """Return the most similar known key, or up to three keys with the same last part, or None."""
+    """Return up to three known keys with the same last part, in any unit, joined by "or".
+
+    If there are none: the most similar known key, or None.
+    """
     last = key.rsplit(".", 1)[-1]
     alike = [
         name
@@ -464,7 +472,7 @@ def _is_table(value: object) -> bool:
 def _with_wrong_unit(key: str, known: Iterable[str]) -> str | None:
     """Return the known key that a key is except for its unit.
 
-    For example `pixel_error_rad` for `pixel_error_mas`.
+    For example `max_impulse_m_s` for the key `max_impulse_km`, or `max_impulse` without a unit.
     """
     for name in known:
         quantity, unit = quantity_and_unit(name)
@@ -485,7 +493,8 @@ def _units_text(name: str) -> str:
 def numeric_key(owner: type, key: str) -> type[int] | type[float] | None:
     """Return the type of the number that the value of a key may be.
 
-    None if it is not a number, or there is no such key.
+    None if it is not a number, there is no such key, or it is in an array of tables, whose
+    numbers exist only in a file.
     """
     found = _found({}, owner, key)
     if found is None:
@@ -494,6 +503,16 @@ def numeric_key(owner: type, key: str) -> type[int] | type[float] | None:
     if field.pair:
         return float
     return field.numeric
+
+
+def field_key(owner: type, key: str) -> str:
+    """Return a known key in the unit of its field: `body.radius_m` for `body.radius_km`."""
+    found = _found({}, owner, key)
+    if found is None:
+        return key
+    path = key.split(".")
+    path[-1 if found.end is None else -2] = found.name
+    return ".".join(path)
 
 
 class _FoundKey(NamedTuple):
@@ -555,7 +574,7 @@ def _value(literal: str) -> Any:
 def _scaled(value: Any, factor: Decimal) -> Any:
     """Return a value with its numbers times a factor, each rounded once.
 
-    Whole numbers without a unit stay whole.
+    Whole numbers stay whole if the factor is 1.
     """
     if isinstance(value, list):
         return [_scaled(item, factor) for item in value]

@@ -33,8 +33,8 @@ Settings = Annotated[
         "--set",
         metavar="KEY=VALUE",
         help=(
-            "Replace a value of the file, in the unit of the file; a key of a table is written "
-            "TABLE.KEY. May be given several times."
+            "Replace a value of the file, in the unit at the end of KEY; a key of a table is "
+            "written TABLE.KEY. May be given several times."
         ),
     ),
 ]
@@ -92,7 +92,7 @@ class FileOptions:
 
 
 def choice(option: str, name: str, valid: Sequence[str]) -> str:
-    """Return a valid name; raise `InputError`, with the nearest valid name, for any other."""
+    """Return a valid name; raise `InputError`, with the nearest valid name, if any, for others."""
     if name in valid:
         return name
     message = f"{option}: there is no {shown(name)}; "

@@ -36,11 +36,10 @@ def check_angle(key: str, duration_s: float, rate_rad_s: float) -> None:
 
 
 def check_orbit(key: str, state: tuple[ArrayLike, ArrayLike], mu_m3_s2: float) -> None:
-    """Raise ValueError if the orbit of a state meets its planet.
+    """Raise ValueError unless the orbit of a state is an ellipse outside its planet.
 
-    The state is position and velocity, SI. The message begins with `key`.
-
-    The orbit is an ellipse; the planet has the radius `densest_m`.
+    The state is position and velocity, SI. The message begins with `key`. The planet has the radius
+    `densest_m`.
     """
     position, velocity = (np.asarray(vector, dtype=float) for vector in state)
     fault = orbit_fault(position, velocity, mu_m3_s2, densest_m(mu_m3_s2))
@@ -51,13 +50,14 @@ def check_orbit(key: str, state: tuple[ArrayLike, ArrayLike], mu_m3_s2: float) -
 def check_flight(key: str, state: Floats, mu_m3_s2: float, before_s: float, after_s: float) -> None:
     """Raise ValueError if a body that coasts through a state meets its planet.
 
-    The state is position and velocity, SI. The message begins with `key`.
+    The message begins with `key`.
 
-    It coasts along any conic, from `before_s` before the `state`, shape (6,), to `after_s` after
-    it; the planet has the radius `densest_m`.
+    It coasts along any conic, from `before_s` before the `state` (position and velocity, SI), shape
+    (6,), to `after_s` after it; the planet has the radius `densest_m`.
     """
     position = state[:3]
     velocity = state[3:]
+    # With the reversed velocity the body moves backward in time along the same conic.
     for direction, duration_s in ((-1.0, before_s), (1.0, after_s)):
         try:
             fault = flight_fault(
@@ -72,16 +72,16 @@ def check_flight(key: str, state: Floats, mu_m3_s2: float, before_s: float, afte
 def densest_m(mu_m3_s2: float) -> float:
     """Return the radius of a planet with the density of the Earth.
 
-    No planet or moon is denser, or smaller.
+    No planet or moon is denser, so none with this gravitational parameter is smaller.
     """
     return float(EARTH_RADIUS_M * (mu_m3_s2 / EARTH_M3_S2) ** (1.0 / 3.0))
 
 
 def check_rate(rate_rad_s: float, eccentricity: float = 0.0) -> None:
-    """Raise ValueError if there is no orbit of this mean motion about the Earth, see `check_orbit`.
+    """Raise ValueError if no orbit about the Earth has this mean motion and eccentricity.
 
-    The rate at the surface of a planet depends on its density only, so that the Earth stands for
-    all of them.
+    See `check_orbit`; `rate_rad_s` is positive. The rate at the surface of a planet depends on its
+    density only, so that the Earth stands for all of them.
     """
     axis_m = (EARTH_M3_S2 / rate_rad_s**2) ** (1.0 / 3.0)
     state = OrbitalElements(axis_m, eccentricity, 0.0, 0.0, 0.0, 0.0).state(EARTH_M3_S2)

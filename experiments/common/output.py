@@ -28,16 +28,17 @@ if TYPE_CHECKING:
 
 STDOUT = "-"
 ENDINGS = {"--html": (".html", ".htm"), "--gif": (".gif",), "--record": (".npz",)}
-"""Endings of the files of options.
+"""Endings of the files of options; other options take any ending.
 
-Other programs open these files by their endings: browsers, viewers, `infoset replay`.
+Browsers and viewers recognize a file by its ending; `write_record` writes only `.npz`.
 """
 
 
 class Output:
     """The files of one command, listed when the command ends.
 
-    Single files are named by the option that gives them; the path ``-`` is stdout.
+    Single files are named by the option that gives them; the path ``-`` is stdout. After an error
+    no files are listed.
     """
 
     def __init__(self, folder: Path | None, files: Mapping[str, Path], overwrite: bool) -> None:
@@ -96,7 +97,7 @@ class Output:
     def enter(self, folder: Path, *names: str) -> None:
         """Continue in a folder into which another function has written these files.
 
-        Files there are replaced.
+        From now on existing files are replaced; `output_of` has checked those of the options.
         """
         self.folder = folder
         self._overwrite = True
@@ -114,7 +115,8 @@ def output_of(
     """Yield the output of a command, and list the written files on stderr at the end.
 
     Single files are the files of the options ``json``, ``csv`` and ``html``, and of `files`, by
-    option; `names` are the files that the command writes into the folder of ``--out``. Raise
+    option; `names` are the files that the command writes into the folder of ``--out``; without
+    `names` this folder is not used. Only ``json``, ``csv`` and ``html`` may be stdout. Raise
     `InputError` before the work if a file exists and ``--overwrite`` is not given, two files have
     the same path, a file has the ending of another kind, or a folder cannot be written.
     """
@@ -153,7 +155,10 @@ def output_of(
 def _check_paths(
     paths: Sequence[Path], not_printed: Sequence[Path | None], overwrite: bool
 ) -> None:
-    """Raise `InputError` if a path is given twice or exists, or stdout is not possible for it."""
+    """Raise `InputError` if a path is given twice or exists, or stdout is not possible for it.
+
+    With `overwrite` files may exist, but not folders.
+    """
     for number, path in enumerate(paths):
         if path in paths[:number]:
             raise InputError(

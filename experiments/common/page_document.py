@@ -58,10 +58,9 @@ def page(
 def embedded_json(value: object) -> str:
     """Return a value as JSON that can stand inside a script element of HTML.
 
-    It is read as the same value.
-
     It contains no ``<``, ``>`` and ``&``, and no line separators that are not allowed in scripts.
-    The value is one for `infoset.experiments.common.output.to_json`.
+    A parser of JSON reads the same value from it. The value is one for
+    `infoset.experiments.common.output.to_json`.
     """
     text = json.dumps(
         value, allow_nan=False, ensure_ascii=False, separators=(",", ":"), default=json_value

@@ -143,7 +143,8 @@ def motion_page(
 def faces_of(points: Floats) -> list[Floats]:
     """Return the faces of the convex hull of points in space.
 
-    Points in a plane, or of a flat set, have their outline as the only face.
+    Points in a plane, or of a flat set, have their outline as the only face. There is at least one
+    point; those of a flat set in space must be its vertices, see `outline`.
     """
     if points.shape[1] == 2 or len(points) < 4:
         return [outline(points)]
@@ -167,7 +168,11 @@ def faces_of(points: Floats) -> list[Floats]:
 
 
 def outline(points: Floats) -> Floats:
-    """Return the vertices of a flat convex set in order; in a plane, without interior points."""
+    """Return the vertices of a flat convex set in the order in which an outline connects them.
+
+    Of points in a plane, shape (n, 2), the interior ones are left out. All points in space, shape
+    (n, 3), are returned, so these must be the vertices: by their angle about their mean.
+    """
     if points.shape[1] == 2 and len(points) > 3:
         try:
             # 1e-300 as in `faces_of`: an axis without extent keeps the division defined.

@@ -25,7 +25,9 @@ class NumberVerdict(Enum):
     """Result of the comparison of a printed number with ours."""
 
     AGREED = "agreed"
-    """Ours is the printed number, to the last digit."""
+    """Ours is the printed number, to the last digit (`PrintedNumber.tolerance`) or in its interval
+    `agrees`; or the printed number is of one run, and a narrow interval of our runs contains it.
+    """
     POSSIBLE = "possible"
     """The printed number is of one run, and lies in an interval of our runs that is too wide to
     confirm it.
@@ -37,7 +39,7 @@ class NumberVerdict(Enum):
     NOT_EXPLAINED = "not explained"
     """The numbers differ for an unknown reason."""
     DISAGREED = "disagreed"
-    """The numbers should agree and do not."""
+    """The numbers should agree and do not, or the computation has no result."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +98,7 @@ class Ours:
     spread : (float, float) or None
         Interval of most of our values, if ours is the median of many runs and the printed number is
         one run. The printed number must then lie in this interval, which confirms it if its ends
-        differ by less than a factor of 2.
+        differ by less than a factor of 2. Its ends are positive.
     """
 
     value: float
@@ -114,7 +116,11 @@ class NumberComparison:
 
     @property
     def band(self) -> tuple[float, float]:
-        """Return the interval in which the numbers agree."""
+        """Return the interval in which the numbers agree.
+
+        With `spread` it must contain the printed number, otherwise ours. It is about the printed
+        digits even if they are a misprint; the verdict then uses the corrected digits.
+        """
         number = self.number
         ours = self.ours
         return (
@@ -148,7 +154,10 @@ class NumberComparison:
         return NumberVerdict.DISAGREED
 
     def _verdict_of_misprint(self, corrected: str) -> NumberVerdict:
-        """Return whether our number, or the number of the other model, is the correct one."""
+        """Return whether our number is the correct one.
+
+        If there is a number of another model, it is compared instead of ours.
+        """
         value = self.ours.value
         if self.ours.other is not None:
             value = self.ours.other

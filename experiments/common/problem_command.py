@@ -47,7 +47,7 @@ class ProblemCommand(Generic[Problem, Report]):
         Module whose function ``draw_all`` yields the figures of a report, or None for a figure that
         it lacks.
     figure_names : tuple of str
-        Their names.
+        Names of these figures, in the order in which ``draw_all`` yields them.
     """
 
     owner: type[Problem]

@@ -109,8 +109,8 @@ def number_table(*titles: str, left: int = 1) -> Table:
 class RowByRow:
     """A table of numbers whose rows are printed one after another, as they are known.
 
-    The first column is as wide as the longest name, and the others as the longest number or as the
-    longest word of their titles, because the later rows are not known yet.
+    The first column is as wide as its title or the longest name. All others have one width, of the
+    longest number or of the longest word of their titles, because the later rows are not known yet.
     """
 
     def __init__(self, titles: Sequence[str], names: Iterable[str], quiet: bool) -> None:
@@ -178,7 +178,7 @@ def progress_bar(quiet: bool, clock: Clock | None = None) -> Iterator[BeginProgr
 
 
 class _Report:
-    """Report the progress of bars, and once the time that all take together, if it is long.
+    """Report the progress of bars, and once the time that all begun bars take, if it is long.
 
     The time follows from the rate after the first report: kernels are loaded or compiled before it.
     """
@@ -247,7 +247,7 @@ def parts_of(progress: Callable[[float], None], count: int) -> list[Callable[[fl
 def number(value: float | None) -> str:
     """Return a number for tables, with three significant digits.
 
-    From 100 to 1e9 it has one decimal.
+    From 100 to 1e9, of either sign, it has one decimal. None is ``-``.
     """
     if value is None:
         return "-"

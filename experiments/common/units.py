@@ -66,7 +66,8 @@ def units_like(name: str) -> list[str]:
 def si_factor(name: str, si_name: str) -> Decimal | None:
     """Return the factor from a name's unit to the unit of another name.
 
-    None unless both names are of the same quantity.
+    It is 1 for equal names, also without units. None if the quantities differ, or a name has no
+    unit, or the units have different dimensions.
     """
     if name == si_name:
         return Decimal(1)

@@ -111,10 +111,11 @@ def oem_craft(
 ) -> CraftState:
     """Return the state of an OEM file at an epoch in a time scale.
 
-    The covariance is read if it is wanted.
+    The covariance is None if it is not wanted, or the segment has none.
 
-    `InputError` if no segment holds the epoch, its frame rotates or is unknown, the epoch is in a
-    gap, or the segment has covariances and none of them is of the epoch.
+    `InputError` if no segment holds the epoch or two overlap there, its frame rotates or is
+    unknown, the epoch is in a gap, or if the covariance is wanted and the segment has covariances,
+    but none of the epoch or one in unknown axes.
     """
     segment = _segment_at(segments, source, epoch, scale)
     where = f"{source}: segment {segment.number}"
@@ -201,7 +202,8 @@ def _segment_at(
 ) -> OemSegment:
     """Return the segment that holds an epoch.
 
-    Of two segments that meet at the epoch it is the later one, after a manoeuvre.
+    Of two segments that meet at the epoch it is the later one in the file, after a manoeuvre. A
+    segment with the epoch at one of its ends gives way to one with the epoch inside.
     """
     holding = []
     inside = []
@@ -232,7 +234,10 @@ def _segment_at(
 
 
 def _usable_span(segment: OemSegment) -> str:
-    """Return the span of a segment in which its states may be interpolated, as text."""
+    """Return the span of a segment as its metadata state it, as text.
+
+    The states may begin later or end earlier.
+    """
     known = segment.metadata
     start = known.get("USEABLE_START_TIME", known.get("START_TIME", "the first state"))
     stop = known.get("USEABLE_STOP_TIME", known.get("STOP_TIME", "the last state"))
@@ -276,7 +281,7 @@ def _warnings(
 def _two_body_difference(found: Interpolated, parameter_m3_s2: float) -> float:
     """Return the distance from the two-body motion of the nearest tabulated state, m.
 
-    It is infinite if the motion cannot be computed.
+    It is zero for a tabulated state, and infinite if the motion cannot be computed.
     """
     if not found.nearest_s:
         return 0.0
@@ -289,7 +294,10 @@ def _two_body_difference(found: Interpolated, parameter_m3_s2: float) -> float:
 
 
 def _covariance_at(segment: OemSegment, where: str, seconds: Fraction) -> OemCovariance:
-    """Return the covariance of a segment at an epoch."""
+    """Return the covariance of a segment, which has at least one, at an epoch.
+
+    `InputError` if the nearest one is more than `SAME_EPOCH_S` from the epoch.
+    """
     nearest = min(segment.covariances, key=lambda each: abs(each.seconds - seconds))
     if abs(nearest.seconds - seconds) > SAME_EPOCH_S:
         raise InputError(
@@ -334,7 +342,7 @@ def _local_axes(state: Floats, where: str, *, along_radius: bool) -> Floats:
     """Return the axes of an orbit at a state as rows.
 
     The first axis is along the radius or along the velocity, the last one is the normal of the
-    orbit.
+    orbit, and the second one completes them: last x first. `InputError` if the orbit is a line.
     """
     position, velocity = state
     normal = np.cross(position, velocity)

@@ -80,7 +80,10 @@ _EPOCH = re.compile(
 
 
 class Epoch(NamedTuple):
-    """An epoch as written: its day, the seconds since midnight, and its time scale or None."""
+    """An epoch as written: its day, the seconds since midnight, and its time scale or None.
+
+    The seconds are less than 86 401: a leap second counts from 86 400 on.
+    """
 
     day: date
     second: Fraction
@@ -105,8 +108,10 @@ def parse_epoch(text: str) -> Epoch:
     seconds = Fraction(second or 0)
     if int(hour or 0) > 23 or int(minute or 0) > 59 or seconds >= 61:
         raise ValueError("has an hour, minute or second that does not exist")
-    # Second 60 exists only at the end of a day before a leap day.
-    if seconds >= 60 and (minutes != 60 * 24 - 1 or day + timedelta(1) not in LEAP_DAYS[1:]):
+    # Second 60 exists only at the end of a day before a leap day; in UTC only, but the scale of an
+    # epoch may be written elsewhere.
+    leap_ends = [leap - timedelta(1) for leap in LEAP_DAYS[1:]]
+    if seconds >= 60 and (minutes != 60 * 24 - 1 or day not in leap_ends):
         raise ValueError("has a second 60, and there is no leap second at this time")
 
     scale = None
@@ -150,7 +155,7 @@ def converted(epoch: Epoch, scale: str, wanted: str) -> Fraction:
 
 
 def is_guess(epoch: Epoch, scale: str, wanted: str) -> bool:
-    """Return whether a conversion uses leap seconds that are not yet known."""
+    """Return whether a conversion from or to UTC uses leap seconds that are not yet known."""
     return (scale == "UTC") != (wanted == "UTC") and epoch.day > LEAPS_KNOWN_UNTIL
 
 

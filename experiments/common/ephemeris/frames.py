@@ -19,7 +19,7 @@ FIXED = {
 """Frames whose axes are fixed to the stars, and the names of each, in capitals and without
 separators.
 
-EME2000 and ICRF differ by 0.02 arc seconds, which is 16 km at the distance of the Sun.
+EME2000 and ICRF differ by 0.023 arc seconds, which is 17 km at the distance of the Sun.
 """
 OF_DATE = {
     "TOD": "TOD|TODEARTH|TRUEOFDATE",
@@ -79,7 +79,8 @@ class Frame(NamedTuple):
 def inertial_frame(name: str, epoch: str | None = None) -> Frame:
     """Return the inertial frame of a REF_FRAME and its REF_FRAME_EPOCH.
 
-    A ValueError is raised for any other frame.
+    A frame of date with an epoch is fixed at it; frames fixed to the stars need no epoch. A
+    ValueError is raised for any other frame, and if the epoch of a frame of `OF_EPOCH` is missing.
     """
     plain = re.sub("[^A-Z0-9]", "", name.upper())
     fixed, of_date, of_epoch = (_common_name(plain, names) for names in (FIXED, OF_DATE, OF_EPOCH))
@@ -114,7 +115,10 @@ def frame_of_spice(name: str) -> Frame:
 
 
 def is_same_frame(one: Frame, other: Frame) -> bool:
-    """Return whether two frames have the same axes."""
+    """Return whether two frames have the same axes.
+
+    J2000 of SPICE is the same as EME2000 and as ICRF, although these two are different.
+    """
     names = {one.name, other.name}
     return len(names) == 1 or (SPICE_J2000 in names and names <= {SPICE_J2000, "EME2000", "ICRF"})
 

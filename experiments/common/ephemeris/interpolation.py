@@ -26,8 +26,9 @@ to 10 000 km. Chosen: equal steps have the distance 1, so that states near a sma
 the step are not left out.
 """
 GAP = 20
-"""An interval of more than this number of neighbouring steps is a gap, and the states in it are not
-known. Chosen: steps that adapt to the motion change less from one to the next.
+"""An interval of more than this number of times the longer of the two neighbouring steps is a gap,
+and the states in it are not known. A table of two states has no gap. Chosen: steps that adapt to
+the motion change less from one to the next.
 """
 
 
@@ -71,7 +72,7 @@ def interpolate(
     Parameters
     ----------
     epoch, times : Fraction
-        Seconds in one scale without leaps. The times increase, and contain the epoch.
+        Seconds in one scale without leaps. The times increase, each is there once.
     states : array of shape (N, 2, 3)
         Positions and velocities.
     method, degree : str, int
@@ -131,10 +132,8 @@ def interpolate(
 def lagrange(times_s: Floats, states: Floats) -> Floats:
     """Return the value at time zero of Lagrange's polynomials, shape (2, 3).
 
-    The polynomials of the positions and of the velocities are independent.
-
-    The weight of state i is the product of t_j / (t_j - t_i) over all other states j; no time is
-    zero.
+    The polynomials of the positions and of the velocities are independent. The weight of state i is
+    the product of t_j / (t_j - t_i) over all other states j; no time is zero.
     """
     weights, _, _ = _basis(times_s)
     base = states[np.argmin(np.abs(times_s))]
@@ -171,7 +170,7 @@ def hermite(times_s: Floats, states: Floats) -> Floats:
 def _basis(times_s: Floats) -> tuple[Floats, Floats, Floats]:
     """Return Lagrange's weights at time zero, and the sums D_i and G_i, each of shape (n,).
 
-    The sums are defined in `hermite`.
+    The sums are defined in `hermite`. The times are different, and none is zero.
     """
     differences = times_s[:, None] - times_s
     np.fill_diagonal(differences, 1.0)
@@ -186,7 +185,7 @@ def _basis(times_s: Floats) -> tuple[Floats, Floats, Floats]:
 def _window(times: Sequence[Fraction], after: int, wanted: int) -> list[int]:
     """Return rows of states around the interval that ends at row `after`, in order of time.
 
-    There are up to `wanted` rows.
+    There are up to `wanted` rows, at least two. Neighbours are `SPACING` intervals apart or more.
     """
     apart = SPACING * (times[after] - times[after - 1])
     before = [after - 1]
@@ -203,7 +202,8 @@ def _window(times: Sequence[Fraction], after: int, wanted: int) -> list[int]:
             break
         behind.append(row)
 
-    # Half of them on each side; where a side has fewer, the other one has more.
+    # Half of them on each side, of an odd number one more behind; where a side has fewer, the other
+    # one has more.
     count = min(max(wanted // 2, wanted - len(behind)), len(before))
     return [*reversed(before[:count]), *behind[: wanted - count]]
 

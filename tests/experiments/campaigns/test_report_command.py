@@ -75,6 +75,9 @@ def test_report_of_a_campaign_reads_only_its_files(
             == f"infoset engage {scenario} --noise {row['noise']} --seed 0 --run {row['run']}"
         )
         assert row["replay"] in out
+    # The note about a missing scenario file: --out has written the file.
+    assert "which these commands need" not in out
+    assert "which these commands need; --out writes one" in infoset("report", folder)[1]
     for title in (
         "correlation of the miss with",
         "Fisher's z",

@@ -152,6 +152,10 @@ RISING = "must go from a smaller to a greater value, with a count from 2 to 1000
             "angle_sensor.scale and angle_sensor.error_at_zero_range_rad vary the same value",
         ),
         ("thruster.budget_m_s=thruster.budget_m_s=1:2:2", "vary the same value"),
+        (
+            "thruster.budget_m_s=1:2:2,thruster.budget_km_s=1:2:2",
+            "thruster.budget_m_s and thruster.budget_km_s vary the same value",
+        ),
         ("thruster.budget_m_s=log:0:1:3", "must be greater than 0"),
         ("thruster.budget=1:2:2", "did you mean thruster.budget_m_s?"),
         *((text, FORM) for text in ("", "thruster.budget_m_s")),

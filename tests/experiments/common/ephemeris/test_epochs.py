@@ -72,6 +72,7 @@ def test_epoch_is_read_with_all_its_digits(
         "2029-03-01T00:00:61",
         "2029-03-01T23:59:60",  # no leap second on this day
         "2016-12-31T12:59:60",
+        "9999-12-31T23:59:60",  # the last day that a date can be
         "2029-03-01T00:00:00 UT1",
         "2029-03-01T00:00:00." + "1" * 31,
         "٢٠٢٩-03-01T00:00:00",  # digits of another script
