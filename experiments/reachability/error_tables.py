@@ -77,7 +77,10 @@ class Sensor:
 
     @property
     def acts_before_flight(self) -> bool:
-        """Whether a plan before the flight can react to it: lines of sight alone are only cuts."""
+        """Whether a plan made before the flight can react to the measurements.
+
+        It cannot to lines of sight without ranges: they only cut the set of states, in flight.
+        """
         return self.position_error_m is not None or self.range_error_m is not None
 
 
@@ -109,7 +112,10 @@ class PassiveSafetyTable:
 
 
 def check_starts(problem: ReachabilityProblem, error: Floats) -> None:
-    """Raise `ValueError` if a start within half-widths, shape (6,), breaks a constraint."""
+    """Raise `ValueError` if a start within half-widths, shape (6,), breaks a constraint of t = 0.
+
+    Constraints that the errors do not reach are left out: the start itself was checked already.
+    """
     normals, offsets = problem.further
     spread = np.concatenate([error, np.abs(normals) @ error])
     states = np.concatenate([np.abs(problem.initial), normals @ problem.initial])

@@ -68,7 +68,7 @@ _PLANES = ((1, 0), (1, 2), (4, 3), (4, 5))
 
 
 def _shown(report: ReachabilityReport) -> list[tuple[dict[str, Any], ChosenControl, Floats]]:
-    """Return the line style, the member and the trajectory of each member drawn."""
+    """Return the line style, the member and the nonlinear trajectory of each member drawn."""
     looks = [{**look, "linewidth": 1.0} for look in LINE_LOOKS]
     return [(look, *pair) for look, pair in zip(looks, report.shown, strict=False)]
 
@@ -93,9 +93,9 @@ def _legend(figure: Figure, report: ReachabilityReport) -> None:
 
 
 def shown_times(periods: int, most: int = _MAX_TIMES) -> list[int]:
-    """Return the times at which sets are drawn, without the last one.
+    """Return the times at which sets are drawn, without the first one and the last one.
 
-    If there are many, they are evenly spaced.
+    These are all times between them, or `most` evenly spaced ones; none if there is one period.
     """
     if periods <= most + 1:
         return list(range(1, periods))
@@ -229,6 +229,7 @@ def draw_controls(report: ReachabilityReport) -> Figure:
                 axes.plot(times, values, linestyle="none", **_STEM_END, color=look["color"])
             else:
                 axes.stairs(values, np.arange(periods + 1), baseline=None, label=name, **line)
+        # A bound far from all controls would only make them small; chosen.
         if max(float(np.abs(report.ranges[:, j]).max()), 1e-9) > 0.7 * bounds[j]:
             for sign in (-1.0, 1.0):
                 axes.axhline(sign * bounds[j], label="bound", **BOUND)

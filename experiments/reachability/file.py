@@ -183,7 +183,10 @@ class KeepIn:
 
     @property
     def half_spaces(self) -> tuple[Floats, Floats]:
-        """Normals, shape (k, 6), and offsets; the part for the position has length one."""
+        """Normals, shape (k, 6), and offsets; the part for the position has length one.
+
+        If this part is zero, the part for the velocity has.
+        """
         rows = self._rows
         lengths = np.linalg.norm(rows[:, :3], axis=1)
         lengths = np.where(lengths > 0.0, lengths, np.linalg.norm(rows[:, 3:], axis=1))
@@ -391,7 +394,10 @@ class Rendezvous:
 
     @property
     def is_frozen_ellipse(self) -> bool:
-        """Whether the linear model is not that of the ellipse, which has a bound at all times."""
+        """Whether the linear model is frozen although the orbit is an ellipse.
+
+        Bounds between the instants exist only for the model of the orbit itself.
+        """
         return self.model is MotionModel.FROZEN and self.orbit.eccentricity > 0.0
 
     @property
@@ -450,7 +456,10 @@ class Rendezvous:
 
     @property
     def disturbance_effect(self) -> Floats | None:
-        """Effect of unit components of the unknown acceleration on the state, shape (T, 6, 3)."""
+        """Effect of the unknown acceleration on the state, shape (T, 6, 3).
+
+        Column j is the effect of its largest magnitude along axis j, held over a period.
+        """
         if self.disturbance is None:
             return None
         _, held = discretised(self.motion, self.periods, self.period_s, 1.0)
@@ -524,7 +533,10 @@ class Rendezvous:
 
     @property
     def drifts(self) -> Coasting:
-        """The motion after each impulse after which the engines may fail."""
+        """The motion after each impulse after which the engines may fail.
+
+        Without [passive_safety] it is the motion in the period after each impulse.
+        """
         impulses = self.periods
         periods = 1
         if self.passive_safety is not None:

@@ -79,8 +79,8 @@ chosen."""
 class GuaranteeReport:
     """Results of one command; guarantees are in units of the goal's box.
 
-    `open_loop` is the best plan without measurements, None if no such plan was found.
-    With measurements it is for linear motion and its drifts are not proved.
+    `open_loop` is the best plan without measurements, None if no such plan was found. If `plan`
+    has feedback, `open_loop` is for linear motion and its drifts are not proved.
     `answered`, `bound` and `radius` are None without measured positions and for nonlinear motion;
     `answered` is also None if `refusal` says why there is none. `drifts` are the certain distances
     if the engines fail, None if the problem does not ask for them, and `replanned` are flights that
@@ -102,7 +102,8 @@ class GuaranteeReport:
     def by_measurements(self) -> Floats:
         """The guarantees of affine plans that have only the first k = 0..T measurements.
 
-        NaN if none was found. It takes a program for each.
+        Element k is for k measurements, the last one is that of `plan`. NaN if none was found. The
+        first access solves the problem for each k from 1 to T - 1.
         """
         problem = self.rendezvous.output_problem
         guarantees = [np.nan if self.open_loop is None else self.open_loop.guarantee]
@@ -511,7 +512,10 @@ def _conflict(rendezvous: Rendezvous, progress: Callable[[float], None]) -> Inpu
 
 
 def _relaxations(rendezvous: Rendezvous) -> Iterator[tuple[str, Rendezvous]]:
-    """Yield the rendezvous without one of its constraints each, and the name of it."""
+    """Yield a constraint's name, and the rendezvous without it or with a limit `_RELAXED` as large.
+
+    One constraint is relaxed at a time.
+    """
     # A file refuses a larger limit that is no limit: it is not the conflict.
     with suppress(ValueError):
         yield _with_more_thrust(rendezvous)
@@ -620,7 +624,10 @@ def _further_lines(report: GuaranteeReport) -> Iterator[str]:
 
 
 def flight_lines(report: GuaranteeReport) -> Iterator[str]:
-    """Yield the numbers of flights outside their guarantee, and how near it they came."""
+    """Yield the numbers of flights outside their guarantee, and how near to it the worst one came.
+
+    There is no line without flights.
+    """
     motion = " about a central body" if report.rendezvous.nonlinear else ""
     bounds = "half of them with errors at their bounds"
     flights = report.flights

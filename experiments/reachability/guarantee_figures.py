@@ -54,8 +54,9 @@ def draw_all(report: GuaranteeReport) -> Iterator[Figure]:
 def draw_guarantee(report: GuaranteeReport) -> Figure:
     """Draw the guarantee by the number of measurements, and the tube of the position by time.
 
-    Without a sensor there is only the tube, also with safe drifts: the plans with some measurements
-    are not proved to have them. Flights that are planned again have a panel.
+    The first panel needs a bound of all strategies (measured positions and linear motion), and is
+    left out with [passive_safety]: the drifts of plans with some measurements are not proved to be
+    safe. Flights that are planned again have a panel, the last one.
     """
     drawn = [_draw_widths]
     if report.bound is not None and report.rendezvous.passive_safety is None:
@@ -142,7 +143,7 @@ _BALL: dict[str, Any] = {"facecolor": REGION_FILL, "edgecolor": LIMIT, "zorder":
 def draw_planes(report: GuaranteeReport) -> Figure:
     """Draw the path without errors, and the tube of all errors, in planes.
 
-    A plane with a component that is always zero is left out.
+    A plane is left out if its second component is always zero.
     """
     largest = report.plan.state_ranges.largest.max(axis=0)
     planes = [plane for plane in _PLANES if largest[plane[1]] > 0.0]

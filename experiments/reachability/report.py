@@ -82,9 +82,9 @@ class ReachabilityReport:
     """Results of one command.
 
     `min_periods` is the minimum number of periods, up to `searched_periods`, in which the terminal
-    norm is zero. `forward`, `tube` and `backward`, shape (T + 1, 6, 2), are bounds of the sets,
-    `ranges`, shape (T, 3, 2), those of the optimal controls. `flight` is the simulation in closed
-    loop, `noisy` are those with navigation errors.
+    norm is zero, or None. `forward`, `tube` and `backward`, shape (T + 1, 6, 2), are bounds of the
+    sets, `ranges`, shape (T, 3, 2), those of the optimal controls. `flight` is the simulation in
+    closed loop, `noisy` are those with navigation errors.
     """
 
     rendezvous: Rendezvous
@@ -107,7 +107,10 @@ class ReachabilityReport:
 
     @cached_property
     def shown(self) -> tuple[tuple[ChosenControl, Floats], ...]:
-        """Return the first few different members with nonlinear trajectories, (points, 6)."""
+        """Return the first `_MAX_SHOWN` different members with nonlinear trajectories, (points, 6).
+
+        A member is left out if each of its controls differs by at most `_ALIKE` from one before it.
+        """
         bounds = self.rendezvous.problem.control_bounds
         chosen: list[ChosenControl] = []
         for member in self.members:
@@ -188,7 +191,7 @@ def trajectories(report: ReachabilityReport) -> str:
 def report_json(report: ReachabilityReport) -> dict[str, object]:
     """Return the results for `infoset.experiments.common.output.to_json`.
 
-    Key ``units`` has the units of the states.
+    Key ``units`` has the units of the results.
     """
     solution = report.solution
     rendezvous = report.rendezvous

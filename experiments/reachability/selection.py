@@ -45,7 +45,11 @@ MAX_SAMPLES = 1000
 
 
 def selection(text: str) -> tuple[list[str], int]:
-    """Return the names of the selection, and the number of samples."""
+    """Return the names of the selection, and the number of samples, 0 without them.
+
+    Raise `InputError` for an unknown name, or if the number of samples is not a whole number from 1
+    to `MAX_SAMPLES`.
+    """
     names = []
     count = 0
     for part in text.split(","):

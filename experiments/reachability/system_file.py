@@ -90,6 +90,7 @@ class ReachableSystem:
         states = [np.array(self.target or [0.0] * n)]
         for _ in range(self.periods):
             states.append(np.linalg.lstsq(a, states[-1] - c, rcond=None)[0])
+            # More than the rounding of least squares: there is no such state; chosen.
             if np.abs(a @ states[-1] + c - states[-2]).max() > 1e-9 * max(
                 1.0, np.abs(states[-2]).max()
             ):
