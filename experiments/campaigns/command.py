@@ -90,8 +90,8 @@ class FlightOptions:
             min=1,
             max=MAX_AT_ONCE,
             help=(
-                "Number of runs in a shard; it does not change the results. Default: depends on "
-                "the number of runs."
+                "Number of runs in a shard. The results of a run do not depend on it; --until can "
+                "stop at the end of a shard only. Default: depends on the number of runs."
             ),
         ),
     ] = None
@@ -124,11 +124,11 @@ class CampaignOptions(FlightOptions):
 
     The runs are stored in DIR in shards (files of many runs). A shard is written as soon as its
     runs are complete. After any interruption, the same command with --resume continues the
-    campaign; with a greater --runs it extends the campaign. The numbers depend only on the
-    scenario, the seed and the run, not on workers, shards or interruptions. With --noise mixed,
-    even runs have random noise and odd ones game noise. Run K with a noise is the same engagement
-    as in: infoset engage DIR/scenario.toml --noise NOISE --seed SEED --run K. To see the results:
-    infoset report DIR.
+    campaign; with a greater --runs it extends the campaign. The numbers of a run depend only
+    on the scenario, the noise, the strategy, the seed and its number, not on workers, shards or
+    interruptions. With --noise mixed, even runs have random noise and odd ones game noise. Run K
+    with a noise is the same engagement as in: infoset engage DIR/scenario.toml --noise NOISE --seed
+    SEED --run K. To see the results: infoset report DIR.
     """
 
     until: Annotated[

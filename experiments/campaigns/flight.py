@@ -58,7 +58,7 @@ def noise_of(options: FlightOptions) -> CampaignNoise | OwnNoise | None:
 
 
 def noises_at_once(options: FlightOptions) -> int:
-    """Return the number of noises among which the runs of the options are divided."""
+    """Return the number of noises among which the runs of the options are divided; own noise: 1."""
     noise = noise_of(options)
     return len(noise.kinds) if isinstance(noise, CampaignNoise) else 1
 
@@ -110,6 +110,7 @@ def _warnings(campaign: Campaign) -> list[str]:
         return all_warnings(campaign.scenario)
     lines = [line for cell in campaign.cells for line in scenario_warnings(cell)]
     warnings = [*dict.fromkeys(lines)]
+    # Every axis rises: the cells of the smallest and of the largest values.
     corners = dict.fromkeys((campaign.cells[0], campaign.cells[-1]))
     for name, cell in zip(("first", "last"), corners, strict=False):
         warnings += [f"{name} cell: {line}" for line in feasibility_warnings(cell)]
