@@ -445,9 +445,9 @@ class Kalman(Checked):
     """
 
     dead_zone: NotNegative = 1.0
-    # Chosen: six steps of asteroid-1997. From 1.5 to 12 s the 95 % quantile of its miss is 6.5 to 6.7
-    # m with random noise, for 100 to 112 m/s; at 0.75 s it is 8.5 m. With game noise it is 96 m up to
-    # 3 s, and 83 m from 6 s on (measured).
+    # Chosen: six steps of asteroid-1997. From 1.5 to 12 s the 95 % quantile of its miss is 6.5 to
+    # 6.7 m with random noise, for 100 to 112 m/s; at 0.75 s it is 8.5 m. With game noise it is 96 m
+    # up to 3 s, and 83 m from 6 s on (measured).
     last_s: NotNegative = 3.0
     gate_sigma: Positive | None = None
 

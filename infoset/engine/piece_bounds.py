@@ -357,7 +357,7 @@ def bound_pieces(
     if number < 3:
         # The feasible labels are equal to within the resolution: one outline and a small margin
         # bound them all. Two labels are left if rounding makes the middle one infeasible, in a set
-        # as thin as rounding: the bound is then not proved (not seen in 12 000 random flights).
+        # as thin as rounding: the bound is then not proved ("not guaranteed" in docs/guarantee.md).
         piece = pieces[count]
         piece.near = feasible.below
         piece.far = feasible.above

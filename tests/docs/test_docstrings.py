@@ -290,8 +290,6 @@ def test_commands_of_benchmarks_are_lines_of_an_indented_block() -> None:
         # A command within a sentence stands between backquotes.
         lines = re.sub(r"`[^`]+`", "", text).splitlines()
         wrapped += [
-            line
-            for line in lines
-            if re.search(r"^(?!    python).*\bpython |python .*python", line)
+            line for line in lines if re.search(r"^(?!    python).*\bpython |python .*python", line)
         ]
     assert wrapped == []
