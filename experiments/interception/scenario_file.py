@@ -269,10 +269,16 @@ def _target_warnings(scenario: Scenario) -> list[str]:
 
 
 def flight_facts(scenario: Scenario) -> list[str]:
-    """Return lines about the flight: schedule, impulses and images."""
+    """Return lines about the flight: schedule, impulses and images.
+
+    If the nominal arrival is more than `MAX_STEPS` away, there is only a line that says so.
+    """
     found = feasibility(scenario)
     if found is None:
-        return []
+        return [
+            f"flight: the nominal arrival is more than {MAX_STEPS} steps of {scenario.step_s:g} s "
+            "away, so the schedule is not printed; check nominal_range_m, or write a longer step_s"
+        ]
 
     steps = f"{found.steps} steps of {_seconds(scenario.fitted_step_s)} s"
     if scenario.fitted_step_s != scenario.step_s:
@@ -529,8 +535,8 @@ def feasibility_warnings(scenario: Scenario) -> list[str]:
     """
     found = feasibility(scenario)
     if found is None:
-        # The flight has more than `MAX_STEPS`. `scenario_warnings` reports its nominal range if it
-        # is more than `FAR` times the greatest possible one.
+        # The nominal flight has more than `MAX_STEPS`. `flight_facts` says so, and
+        # `scenario_warnings` if its range is more than `FAR` times the greatest possible one.
         return []
     return [
         *_authority_warnings(scenario, found),

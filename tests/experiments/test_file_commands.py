@@ -188,13 +188,35 @@ def test_check_prints_the_latest_last_impulse_of_burns(infoset: Command) -> None
     assert json.loads(out)["schedule"]["latest_last_impulse_s"] is None
 
 
+TOO_FAR = (
+    "flight: the nominal arrival is more than 100000 steps of 10 s away, so the schedule is not "
+    "printed; check nominal_range_m, or write a longer step_s"
+)
+
+
+def _line_of_the_flight(out: str) -> str:
+    """Return the only line after the first one."""
+    _, line = out.splitlines()
+    return line
+
+
 def test_check_of_a_nominal_arrival_that_is_far_too_late(infoset: Command) -> None:
     setting = "nominal_range_m=1e50"
     code, out, err = infoset("scenarios", "check", "dart-2022", "--set", setting)
-    assert (code, len(out.splitlines())) == (0, 1)
+    assert code == 0
+    assert _line_of_the_flight(out) == TOO_FAR
     assert "nominal_range_m is 1e+50 m, far outside" in err
     found = json.loads(infoset("scenarios", "check", "dart-2022", "--set", setting, "--json")[1])
     assert found["schedule"] is found["possible_miss"] is None
+
+
+def test_check_says_that_the_nominal_arrival_is_too_far_for_a_schedule(infoset: Command) -> None:
+    """1e10 m at 6.1 km/s are 160 000 steps, and less than ten times the greatest possible range."""
+    settings = ("uncertainty.x_m=[2e9,2.1e9]", "dispersion.x_m=[2e9,2.1e9]", "nominal_range_m=1e10")
+    options = [text for setting in settings for text in ("--set", setting)]
+    code, out, err = infoset("scenarios", "check", "dart-2022", *options)
+    assert (code, err) == (0, "")
+    assert _line_of_the_flight(out) == TOO_FAR
 
 
 @pytest.mark.parametrize(
