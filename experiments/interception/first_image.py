@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from infoset.experiments.common.errors import InputError, shown
 from infoset.experiments.common.units import duration_text
+from infoset.experiments.interception.sun_direction import is_the_sun
 from infoset.limits import Limits
 from infoset.sim import Scenario
 from infoset.sim.detection import AU_M, FACTOR_PER_MAGNITUDE, MAGNITUDE, PHASE_DEG, Magnitude
@@ -25,8 +26,10 @@ class FirstImage:
     first_image_s : float
         The time, s, at the nominal closing speed.
     sun_distance_au : float
-        Distance of the body from the Sun: the distance in [sun], whichever body attracts there, or
-        1 au without this table.
+        Distance of the body from the Sun: the distance in [sun], or 1 au if this table is another
+        attracting body or is missing.
+    sun_is_another_body : bool
+        Whether the table [sun] is another attracting body.
     limit : float
         The limiting magnitude.
     before_start : bool
@@ -37,6 +40,7 @@ class FirstImage:
 
     first_image_s: float
     sun_distance_au: float
+    sun_is_another_body: bool
     limit: float
     before_start: bool
     key: str
@@ -49,15 +53,17 @@ class FirstImage:
             f"an error of one magnitude is a factor of {FACTOR_PER_MAGNITUDE:.1f}: "
             f"{duration_text(latest_s)} to {duration_text(earliest_s)}"
         )
-        head = f"first image by the magnitude, {self.sun_distance_au:.3g} au from the Sun: "
+        head = f"first image by the magnitude, {self.sun_distance_au:.3g} au from the Sun"
+        if self.sun_is_another_body:
+            head += ", because [sun] is another body"
         if self.before_start:
             return (
-                f"{head}the body has the limiting magnitude {self.limit:g} {before}, before the "
+                f"{head}: the body has the limiting magnitude {self.limit:g} {before}, before the "
                 f"start of the flight: all images are bright enough ({error})"
             )
         # Three digits, and no exponent: a value for the key of the file.
         value_s = float(f"{self.first_image_s:.3g}")
-        return f"{head}{self.key} = {value_s:.12g} ({before}); {error}"
+        return f"{head}: {self.key} = {value_s:.12g} ({before}); {error}"
 
 
 def first_image(scenario: Scenario, text: str) -> FirstImage:
@@ -71,13 +77,15 @@ def first_image(scenario: Scenario, text: str) -> FirstImage:
         phase_rad = scenario.camera.phase_angle_rad
     magnitude = read_magnitude(text, phase_rad)
 
+    sun = scenario.sun
     sun_distance_m = AU_M
-    if scenario.sun is not None:
-        sun_distance_m = scenario.sun.distance_m
+    if sun is not None and is_the_sun(sun):
+        sun_distance_m = sun.distance_m
     first_s = magnitude.distance_m(sun_distance_m) / scenario.closing_speed_m_s
     return FirstImage(
         first_image_s=first_s,
         sun_distance_au=sun_distance_m / AU_M,
+        sun_is_another_body=sun is not None and not is_the_sun(sun),
         limit=magnitude.limit,
         before_start=first_s >= scenario.nominal_arrival_s,
         key=f"{scenario.bearing_sensor.table}.first_image_s",

@@ -49,16 +49,19 @@ class SunDirection(NamedTuple):
         return bool(self.vector() @ other.vector() < math.cos(FAR_RAD))
 
 
+def is_the_sun(body: Sun) -> bool:
+    """Whether the body of the table [sun] is the Sun: the table may be another attracting body."""
+    ratio = body.gravitational_parameter_m3_s2 / SUN_PARAMETER_M3_S2
+    return abs(ratio - 1.0) <= SAME_PARAMETER
+
+
 def direction_of(sun: Sun | None) -> SunDirection | None:
     """Return the direction of the Sun at the start; None if the attracting body is not the Sun.
 
     It is seen from the spacecraft and taken for that from the object: the range is a negligible
     part of the distance of the Sun.
     """
-    if sun is None:
-        return None
-    ratio = sun.gravitational_parameter_m3_s2 / SUN_PARAMETER_M3_S2
-    if abs(ratio - 1.0) > SAME_PARAMETER:
+    if sun is None or not is_the_sun(sun):
         return None
 
     in_plane = math.cos(sun.elevation_rad)

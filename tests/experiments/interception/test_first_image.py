@@ -74,6 +74,17 @@ def test_distance_of_the_sun_is_that_of_the_file(infoset: Command) -> None:
     assert near["first_image_s"] == pytest.approx(2.0 * far["first_image_s"])
 
 
+def test_distance_of_another_attracting_body_is_not_that_of_the_sun(infoset: Command) -> None:
+    """With the gravitational parameter of Jupiter in [sun], the Sun is taken to be at 1 au."""
+    _, out, _ = infoset(
+        *("scenarios", "check", "comet-fast", "--magnitude", "H=20,limit=11,phase=40"),
+        *("--set", "sun.gravitational_parameter_m3_s2=1.26686534e17"),
+    )
+    assert out.splitlines()[-1].startswith(
+        "first image by the magnitude, 1 au from the Sun, because [sun] is another body: "
+    )
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
