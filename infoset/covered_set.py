@@ -248,18 +248,25 @@ class CoveredSetView(InformationSetView):
         )
 
     def sections(self, engagement: int = 0) -> list[Section]:
-        """Return the nonempty sections of all members, one member after the other."""
+        """Return the nonempty sections of all members, one member after the other.
+
+        Those of a member are in order of increasing range.
+        """
         self._need_engagement(engagement)
-        rows = engagement * len(self.left_out) + np.flatnonzero(
-            self._nonempty_members()[engagement]
-        )
-        return [section for row in rows.tolist() for section in self._members.sections(row)]
+        first = engagement * len(self.left_out)
+        members = np.flatnonzero(self._nonempty_members()[engagement])
+        return [
+            replace(section, member=member)
+            for member in members.tolist()
+            for section in self._members.sections(first + member)
+        ]
 
     def section_at(self, label_m: float, engagement: int = 0, member: int = 0) -> Section:
         """Return the section of one member at any label, computed by replaying the history."""
         self._need_engagement(engagement)
         Limits(minimum=0, maximum=len(self.left_out) - 1, whole=True).need("member", member)
-        return self._members.section_at(label_m, engagement * len(self.left_out) + member)
+        section = self._members.section_at(label_m, engagement * len(self.left_out) + member)
+        return replace(section, member=member)
 
 
 class CoveredSet(CoveredSetView, InformationSet):

@@ -40,12 +40,15 @@ class Section:
     polygons : ConvexPolygons, shape (C,)
         Velocities and offsets along each lateral axis that agree with the history, m/s and m: (V,
         z) in a plane, (V_y, y) and (V, z) in space, where the section is the product of both.
+    member : int
+        Member of a set that allows for wrong images (`CoveredSet`); 0 in any other set.
     """
 
     label_m: float
     range_m: float
     closing_speed_m_s: float
     polygons: ConvexPolygons
+    member: int = 0
 
     @property
     def omega_alpha(self) -> ConvexPolygons:

@@ -65,7 +65,9 @@ class Record:
         Signed margin of the true state in its section at the last measurement; NaN before the
         first.
     sections : tuple of tuple of Section
-        Sections after the measurement of each step, in ascending order of range.
+        Sections after the measurement of each step, in ascending order of range; those of a set
+        that allows for wrong images member after member (`Section.member`), and in this order
+        within each.
     noise : str or None
         Name of the noise that replaced the scenario's; None if none did.
     inconsistency : RecordedInconsistency or None

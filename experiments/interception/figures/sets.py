@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import groupby
 from string import ascii_lowercase
 from typing import Any
 
@@ -74,8 +75,9 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
 
     There is one row per time, and one column per record and lateral axis.
 
-    At most five sections are drawn, evenly chosen over the range (`choose_sections`). The planes of
-    a row have the same limits for each lateral axis, unless a set would then be too small to see.
+    At most five sections are drawn, evenly chosen over the range (`choose_sections`); of a set that
+    allows for wrong images so many of each member. The planes of a row have the same limits for
+    each lateral axis, unless a set would then be too small to see.
 
     Parameters
     ----------
@@ -107,7 +109,7 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
 
 @dataclass(frozen=True)
 class Plane:
-    """Sections of one step in the (omega, alpha) plane of one lateral axis."""
+    """Sections of one step in the (omega, alpha) plane of one lateral axis, the nearest first."""
 
     title: str
     noise: str
@@ -167,7 +169,7 @@ class Plane:
 def planes_at(records: Sequence[Record], time_s: float, sections: int) -> list[Plane]:
     """Return the planes of each record at its step nearest to a time.
 
-    A plane has at most so many sections.
+    A plane has at most so many sections of each member of a set.
     """
     planes = []
     clock = Clock.of(records)
@@ -195,28 +197,30 @@ def _km(section: Section) -> str:
 
 
 def choose_sections(sections: Sequence[Section], most: int) -> list[Section]:
-    """Return at most `most` sections in their order, evenly distributed over the range.
+    """Return at most `most` sections of each member, evenly distributed over its range.
 
-    `sections` are in ascending order of range, and the first and the last one are chosen. If there
-    are more than `most` in a set that allows for wrong images, whose members follow each other, the
-    first member of each range is taken.
+    The order of `sections` is that of `Record`, and the result is in ascending order of range. The
+    nearest and the farthest section of a member are chosen if `most` is 2 or more.
     """
-    if len(sections) <= most:
-        return list(sections)
-    return [
-        sections[index]
-        for index in evenly(np.array([section.range_m for section in sections]), most)
-    ]
+    chosen: list[Section] = []
+    for _, group in groupby(sections, key=lambda section: section.member):
+        member = list(group)
+        if len(member) > most:
+            ranges_m = np.array([section.range_m for section in member])
+            member = [member[index] for index in evenly(ranges_m, most)]
+        chosen += member
+    return sorted(chosen, key=lambda section: section.range_m)
 
 
 def draw_plane(axes: Axes, plane: Plane) -> None:
     """Draw sections and the true state, and name the axes; `level_planes` draws the measurement.
 
-    The sections have the dark 55 % of the colours; lighter ones could not be seen.
+    The sections have the dark 55 % of the colours, by range; lighter ones could not be seen.
     """
-    colours = mpl.colormaps["Blues_r"](np.linspace(0.0, 0.55, len(plane.chosen)))
-    for number, (outline, colour) in enumerate(zip(plane.outlines, colours, strict=True)):
-        _draw_outline(axes, outline, colour, zorder=3.0 - 0.01 * number)
+    ranges_m, places = np.unique([section.range_m for section in plane.chosen], return_inverse=True)
+    colours = mpl.colormaps["Blues_r"](np.linspace(0.0, 0.55, len(ranges_m)))
+    for outline, place in zip(plane.outlines, places.tolist(), strict=True):
+        _draw_outline(axes, outline, colours[place], zorder=3.0 - 0.01 * place)
     axes.plot(*plane.true, zorder=6, label=TRUTH_MARK, path_effects=HALO, **_TRUTH)
     axes.set_xlabel(f"rate $\\omega_{plane.name}$, µrad/s")
     axes.set_ylabel(f"angle $\\alpha_{plane.name}$, mrad")

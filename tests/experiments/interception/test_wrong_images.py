@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 from infoset import Model
 from infoset.experiments.interception.course import complete_steps, true_predicted_misses
 from infoset.experiments.interception.figures.members import draw_members
+from infoset.experiments.interception.figures.sets import planes_at
 from infoset.experiments.interception.member_course import MemberCourse, member_courses
 from infoset.experiments.interception.page import interception_page
 from infoset.experiments.interception.scenario_file import load_scenario
@@ -78,6 +79,22 @@ def test_complete_steps_do_not_depend_on_the_order_of_the_members() -> None:
     others_first = tuple(sections[::-1] for sections in record.sections)
     reordered = replace(record, sections=others_first)
     np.testing.assert_array_equal(complete_steps(reordered), complete)
+
+
+def test_figure_of_the_sets_draws_the_sections_of_every_member(record: Record) -> None:
+    """Before a wrong image is proved, the set is the union of four members, of which not every one
+    contains the true state.
+    """
+    time_s = float(record.time_s[PROVED - 1])
+    (plane,) = planes_at([record], time_s, 3)
+    assert len(plane.chosen) == 4 * 3
+    ranges_m = [section.range_m for section in plane.chosen]
+    assert ranges_m == sorted(ranges_m)
+
+    for member in range(4):
+        of_set = [each for each in record.sections[PROVED - 1] if each.member == member]
+        drawn = [each for each in plane.chosen if each.member == member]
+        assert (drawn[0], drawn[-1]) == (of_set[0], of_set[-1])
 
 
 def test_set_without_wrong_images_has_no_members() -> None:
