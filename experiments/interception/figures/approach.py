@@ -161,7 +161,7 @@ def _draw_b_plane(axes: Axes, record: Record) -> None:
     if len(known):
         y, z = record.predicted_miss_m[known[-1]] + aim_m[:, None]
         sizes.append(float(np.abs([y, z]).max()))
-        label = "possible misses at the last decision"
+        label = "possible misses of the last complete set"
         axes.add_patch(Rectangle((y[0], z[0]), y[1] - y[0], z[1] - z[0], label=label, **SET))
     if body is not None and body.longest_m <= RADIUS_SHOWN * max(sizes):
         sizes.append(body.longest_m)

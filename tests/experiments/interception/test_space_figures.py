@@ -223,6 +223,7 @@ def test_approach_shows_possible_misses_and_the_schedule(records: list[Record]) 
     assert moduli.get_xlabel() == "time to go"
     assert b_plane.get_xlim() == b_plane.get_ylim()
     assert "times of the schedule" in legend(figure)
+    assert "possible misses of the last complete set" in legend(figure)
     assert len(draw_approach(records).axes) == 6
 
 
