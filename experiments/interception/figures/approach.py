@@ -126,7 +126,7 @@ def _draw_possible(axes: Axes, record: Record) -> None:
     axes.plot(times[known], centred, label="after an impulse that centres the set", **_CENTRED)
     axes.plot(times, true, **_TRUE)
     if len(known):
-        draw_end(axes, times[known[-1]], maximum[-1], record.scenario)
+        draw_end(axes, times[known[-1]], maximum[-1], "end: last complete set")
     draw_levels(axes, max_guarantee_m(record.result), record.scenario.certain_radius_m)
 
 

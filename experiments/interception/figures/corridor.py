@@ -104,7 +104,7 @@ def _draw_possible(axes: Axes, course: Courses) -> None:
         axes.plot(times, median, color=TRUTH, label="possible miss: median")
         look: dict[str, Any] = {"color": SET_EDGE, "linewidth": 1.0, "linestyle": (0, (4, 1.5))}
         axes.plot(times, maximum, label="possible miss: maximum", **look)
-        draw_end(axes, times[-1], median[-1], course.scenario)
+        draw_end(axes, times[-1], median[-1], "end: last complete set of half the runs")
 
 
 def _draw_impulses(axes: Axes, course: Courses) -> None:

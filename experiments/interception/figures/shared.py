@@ -49,12 +49,11 @@ def draw_levels(axes: Axes, guaranteed_m: float | None, radius_m: float | None) 
         axes.axhline(radius_m, label=f"body radius, {radius_m:.4g} m", **RADIUS)
 
 
-def draw_end(axes: Axes, time_s: float, miss_m: float, scenario: Scenario) -> None:
-    """Mark the end of the possible miss, after which the set is not complete.
+def draw_end(axes: Axes, time_s: float, miss_m: float, label: str) -> None:
+    """Mark the end of the possible miss, after which the set is not complete, or is empty.
 
     See `complete_steps`.
     """
-    label = f"end: nearest range in the set {scenario.set_model.range_threshold_m / 1e3:g} km"
     axes.plot(
         time_s,
         miss_m,

@@ -174,6 +174,22 @@ def test_process_has_a_column_for_each_record_and_axis(records: list[Record]) ->
         )
 
 
+def test_end_of_the_possible_miss_is_that_of_a_set_that_became_empty(
+    records: list[Record],
+) -> None:
+    record = records[0]
+    empty_from = record.steps // 2
+    predicted_m = record.predicted_miss_m.copy()
+    predicted_m[empty_from:] = np.nan
+    emptied = replace(record, predicted_miss_m=predicted_m)
+
+    lines = drawn(draw_approach([emptied]).axes[1])
+
+    known = lines["possible miss without further impulses"]
+    assert len(known) == empty_from
+    np.testing.assert_array_equal(lines["end: last complete set"], known[-1:])
+
+
 def scheduled(record: Record) -> Record:
     """The same record with a cut-off and a last image."""
     scenario = record.scenario
@@ -280,8 +296,7 @@ def test_the_corridor_has_quantiles_of_possible_misses_and_impulses() -> None:
     median, maximum = (drawn(left)[f"possible miss: {name}"] for name in ("median", "maximum"))
     np.testing.assert_allclose(median[:, 1], np.median(courses.possible_m, axis=0)[: len(median)])
     np.testing.assert_allclose(maximum[:, 1], courses.possible_m.max(axis=0)[: len(maximum)])
-    threshold_km = scenario.set_model.range_threshold_m / 1e3
-    end = drawn(left)[f"end: nearest range in the set {threshold_km:g} km"]
+    end = drawn(left)["end: last complete set of half the runs"]
     np.testing.assert_array_equal(end[0], median[-1])
     assert left.get_ylim() == right.get_ylim()
     assert left.get_xlim() == left_impulse.get_xlim()
