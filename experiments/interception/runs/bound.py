@@ -394,9 +394,12 @@ def _bound_parts(
             "smaller"
         )
     yield from _attitude_lines(scenario)
+    which = "the nominal ones"
+    if (nominal.label_m, nominal.vx_m_s) != (scenario.nominal_range_m, -model.closing_speed_m_s):
+        which = "the nearest to the nominal ones in [uncertainty]"
     yield (
         f"at the range {nominal.label_m / M_PER_KM:.1f} km and closing speed "
-        f"{-nominal.vx_m_s / M_PER_KM:g} km/s, the nominal ones: {number(nominal.bound_m)} m"
+        f"{-nominal.vx_m_s / M_PER_KM:g} km/s, {which}: {number(nominal.bound_m)} m"
     )
     for axis in model.axes:
         maximum = model.axis(axis).disturbance_m_s2

@@ -228,6 +228,26 @@ def test_bound_says_what_it_means_for_an_ellipse(
     assert bound._body_line(body, bound_m) == line
 
 
+@pytest.mark.usefixtures("known")
+@pytest.mark.parametrize(
+    ("range_m", "words"),
+    [
+        (1745e3, "at the range 1745.0 km and closing speed 58 km/s, the nominal ones: "),
+        (
+            1760e3,
+            "at the range 1750.0 km and closing speed 58 km/s, the nearest to the nominal ones in "
+            "[uncertainty]: ",
+        ),
+    ],
+)
+def test_bound_says_whether_its_nominal_range_is_that_of_the_scenario(
+    range_m: float, words: str, infoset: Command, short_file: Path
+) -> None:
+    nominal = ("--set", f"nominal_range_m={range_m}")
+    _, out, _ = infoset("bound", short_file, "--budget", 0, *nominal)
+    assert words in out
+
+
 NARROWER = "the simulated runs start in [dispersion], which is narrower"
 
 
