@@ -502,8 +502,8 @@ def _notes(
 
     if any(pair.is_single for pair in lower.pairs):
         yield (
-            "one motion: a start that all impulses together do not bring nearer, whatever is "
-            "measured"
+            "one motion: a start that all impulses together do not bring to the target, whatever "
+            "is measured"
         )
     if not worst:
         return

@@ -11,6 +11,7 @@ import pytest
 from infoset import Model, StateBox
 from infoset.experiments.common.errors import InputError
 from infoset.experiments.common.input_file import to_toml
+from infoset.experiments.interception.command import Bound
 from infoset.experiments.interception.figures.bound import draw_bound
 from infoset.experiments.interception.runs import bound
 from infoset.experiments.interception.scenario_file import load_scenario
@@ -246,6 +247,18 @@ def test_bound_says_whether_its_nominal_range_is_that_of_the_scenario(
     nominal = ("--set", f"nominal_range_m={range_m}")
     _, out, _ = infoset("bound", short_file, "--budget", 0, *nominal)
     assert words in out
+
+
+def test_note_on_one_motion_says_that_impulses_do_not_bring_it_to_the_target(
+    short: Scenario, planar: LowerBound
+) -> None:
+    """The impulses bring the motion nearer, but not near enough: Theorem 6."""
+    single = replace(planar, pairs=(replace(planar.pair, is_single=True),))
+    (line,) = bound._notes(short, single, Bound(), [])
+    assert line == (
+        "one motion: a start that all impulses together do not bring to the target, whatever is "
+        "measured"
+    )
 
 
 NARROWER = "the simulated runs start in [dispersion], which is narrower"
