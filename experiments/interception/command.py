@@ -222,9 +222,8 @@ class Bound(FileOptions):
     miss that such pairs prove; in space, they differ along both axes. Each strategy is simulated
     with these pairs, and in the searches of infoset adversary. With information_set.wrong_images
     some images of each pair are wrong for one of the two states, and the bound without wrong images
-    is printed too. Where range and closing speed are known and there is no gravity, the bound is
-    the value of the game up to a reserve, which is printed. Without --out or --json no file is
-    written.
+    is printed too. In special cases the bound is the value of the game up to a reserve; the output
+    has the reserve, or the conditions that are not met. Without --out or --json no file is written.
     """
 
     scenario: ScenarioName = "asteroid-1997"
