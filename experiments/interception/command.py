@@ -307,7 +307,10 @@ class Replay:
                 "Times of the sets in the figure sets of --out, s, separated by commas; the "
                 "nearest step is drawn."
             ),
-            show_default="0.5,4,8, or in a long flight evenly over the logarithm of the time to go",
+            show_default=(
+                "0.5,4,8, or, in a flight that is long or has a schedule, evenly over the "
+                "logarithm of the time to go"
+            ),
         ),
     ] = ""
     overwrite: Overwrite = False
