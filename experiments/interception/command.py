@@ -114,12 +114,13 @@ RecordFile = Annotated[
 
 @dataclass(frozen=True)
 class Experiment(FileOptions):
-    """Simulate many runs with random noise and with game noise.
+    """Simulate many runs with the noise of the scenario and with game noise.
 
-    There are four cases (curves): random or game noise, without or with the range sensor. Game
-    noise is measurement errors chosen against the guidance; --noise replaces the random noise, and
-    may not be game. Run K starts from the same state in all four cases, and is the same engagement
-    as in: infoset engage --run K. Without --out, --json or --csv no file is written.
+    There are four cases (curves): the noise of the scenario or game noise, without or with the
+    range sensor. Game noise is measurement errors chosen against the guidance. --noise replaces the
+    noise of the scenario, and may not be game; if that of the scenario is game, the default is
+    random. Run K starts from the same state in all four cases, and is the same engagement as in:
+    infoset engage --run K. Without --out, --json or --csv no file is written.
     """
 
     scenario: ScenarioName = "asteroid-1997"
