@@ -166,7 +166,8 @@ def scenario_of(
     Raises
     ------
     InputError
-        If a file is invalid, or the states do not meet.
+        If a file is invalid, the states do not meet, or `like` has a phase angle and the radius of
+        the target is not known.
     """
     trajectory = read_file(Trajectory, file)
     source = os.fspath(file)
@@ -177,6 +178,13 @@ def scenario_of(
         )
 
     target = target or KnownTarget()
+    camera = like.camera
+    if camera is not None and camera.phase_angle_rad is not None and target.radius_m is None:
+        raise InputError(
+            f"--like: {like.name} has camera.phase_angle_deg, which needs the radius of the "
+            "target: add --body-radius-m"
+        )
+
     pair = _pair(trajectory, Path(file).parent, folders, source)
     _check_accuracy(pair, source)
 

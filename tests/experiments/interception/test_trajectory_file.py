@@ -167,6 +167,24 @@ def test_scenario_names_the_phase_angle_and_takes_it_in_place_of_another(
     assert np.degrees(camera.phase_angle_rad) == pytest.approx(float(found[1]), abs=0.05)
 
 
+def test_model_with_a_phase_angle_needs_the_radius_of_the_target(
+    infoset: Command, tmp_path: Path
+) -> None:
+    lit = tmp_path / "lit.toml"
+    lit.write_text(
+        scenario_text("dart-2022").replace(
+            "[camera]", "[camera]\nphase_angle_deg = 60.0\nsun_angle_deg = 0.0"
+        )
+    )
+    message = infoset.refused(
+        "scenarios", "from-states", "two-states", "--out", "mine.toml", "--like", lit
+    )
+    assert (
+        "--like: dart-2022 has camera.phase_angle_deg, which needs the radius of the target: add "
+        "--body-radius-m"
+    ) in message
+
+
 def test_results_have_b_t_and_b_r_where_the_reference_plane_is_known(infoset: Command) -> None:
     infoset("scenarios", "from-states", "two-states", "--out", "mine.toml", "--quiet")
     long = ("--set", "step_s=600", "--set", "camera.period_s=600", "--runs", 3)
