@@ -64,7 +64,7 @@ def draw_all(folder: CampaignFolder) -> Iterator[Figure]:
     in memory.
     """
     scenario = folder.manifest.scenario
-    yield draw_samples(_distributions(folder), scenario.certain_radius_m)
+    yield draw_samples(_distributions(folder), scenario.body)
     yield draw_convergence(samples_of(folder, tuple(_QUANTITIES)))
     yield draw_dispersion(samples_of(folder, ("miss_m", *start_columns(scenario))))
     if scenario.is_spatial:

@@ -127,7 +127,7 @@ def _draw_possible(axes: Axes, record: Record) -> None:
     axes.plot(times, true, **_TRUE)
     if len(known):
         draw_end(axes, times[known[-1]], maximum[-1], "end: last complete set")
-    draw_levels(axes, max_guarantee_m(record.result), record.scenario.certain_radius_m)
+    draw_levels(axes, max_guarantee_m(record.result), record.scenario.body)
 
 
 def _draw_moduli(axes: Axes, record: Record) -> None:

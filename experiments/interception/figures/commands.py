@@ -39,7 +39,7 @@ def draw_experiment(
     """Draw the distributions and the corridor, and in space the misses across the approach."""
     of_paper = is_of_paper(scenario)
     printed = printed_single_runs() if of_paper else None
-    yield draw_distributions(curves, scenario.certain_radius_m, printed, numbered=of_paper)
+    yield draw_distributions(curves, scenario.body, printed, numbered=of_paper)
     yield draw_corridor(curves, courses)
     if not scenario.is_spatial:
         return
@@ -58,7 +58,7 @@ def draw_compared(scenario: Scenario, compared: Sequence[Comparison]) -> Iterato
 
     With game noise, each run has its worst tie rule.
     """
-    yield draw_comparison(compared, scenario.certain_radius_m)
+    yield draw_comparison(compared, scenario.body)
     if not scenario.is_spatial:
         return
     for noise in dict.fromkeys(one.noise for one in compared):

@@ -22,6 +22,7 @@ from infoset.experiments.common.figure_style import (
 from infoset.experiments.common.screen import some_runs
 from infoset.experiments.interception.figures.distributions import draw_radius
 from infoset.experiments.interception.study import Comparison
+from infoset.sim import Body
 from infoset.sim.statistics import shows
 
 _BINS = 48
@@ -38,12 +39,12 @@ _MARK: dict[str, Any] = {"color": INK, "linestyle": "none", "zorder": 4.0}
 
 
 @style()
-def draw_comparison(compared: Sequence[Comparison], radius_m: float | None = None) -> Figure:
+def draw_comparison(compared: Sequence[Comparison], body: Body | None = None) -> Figure:
     """Draw the distributions of the miss (left) and of the impulse spent.
 
     Each noise has a row of two panels, and each strategy a line in them. With several tie rules,
     each run has the value of its worst one. Misses are on a logarithmic axis, with a line at the
-    radius of the body, m.
+    radius of the body (`radius_name`).
     """
     names = list(dict.fromkeys(each.strategy for each in compared))
     noises = {each.noise: each.noise_title for each in compared}
@@ -67,7 +68,7 @@ def draw_comparison(compared: Sequence[Comparison], radius_m: float | None = Non
     for axes in grid[:, 0]:
         axes.set_xscale("log")
         plain_ticks(axes.xaxis)
-        draw_radius(axes, radius_m)
+        draw_radius(axes, body)
 
     for axes, label in zip(grid[-1], ("miss, m", "impulse spent, m/s"), strict=True):
         axes.set_xlabel(label)

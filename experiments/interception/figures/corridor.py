@@ -67,7 +67,7 @@ def draw_corridor(curves: Sequence[Curve], courses: Sequence[Courses]) -> Figure
 
     for first, second, curve, course in zip(above, below, curves, courses, strict=True):
         _draw_possible(first, course)
-        draw_levels(first, max_guarantee_m(curve.results), course.scenario.certain_radius_m)
+        draw_levels(first, max_guarantee_m(curve.results), course.scenario.body)
         _draw_impulses(second, course)
         count_down((first, second), course.scenario)
         name_events(first, course.scenario)

@@ -21,10 +21,10 @@ from infoset.experiments.common.figure_style import (
     subplots,
 )
 from infoset.experiments.common.screen import some_runs
-from infoset.experiments.interception.figures.shared import RADIUS
+from infoset.experiments.interception.figures.shared import RADIUS, radius_name
 from infoset.experiments.interception.published import ONE_RUN_START
 from infoset.experiments.interception.study import Curve
-from infoset.sim import empirical_distribution
+from infoset.sim import Body, empirical_distribution
 
 MAX_POINTS = 2000
 """Maximum number of points of a curve: a panel has fewer pixels."""
@@ -65,17 +65,17 @@ class Sample:
 
 def draw_distributions(
     curves: Sequence[Curve],
-    radius_m: float | None = None,
+    body: Body | None = None,
     printed: Mapping[str, tuple[float, float]] | None = None,
     *,
     numbered: bool = False,
 ) -> Figure:
     """Draw the distribution functions of the curves of the experiment with `draw_samples`.
 
-    `radius_m` is the body's radius, a line. `printed` are the miss, m, and the impulse, m/s, of the
-    run that the paper prints for a noise (`published.ONE_RUN`): without a range sensor, from
-    `ONE_RUN_START`. They are marks in the colour of the curve of this noise without that sensor. If
-    `numbered`, the curves have their numbers in the paper's figure 4.
+    `printed` are the miss, m, and the impulse, m/s, of the run that the paper prints for a noise
+    (`published.ONE_RUN`): without a range sensor, from `ONE_RUN_START`. They are marks in the
+    colour of the curve of this noise without that sensor. If `numbered`, the curves have their
+    numbers in the paper's figure 4.
     """
     samples = []
     runs = []
@@ -94,12 +94,12 @@ def draw_distributions(
                 Sample(title, {"color": CURVE_LOOKS[curve.number]["color"]}, miss_m, impulse_m_s)
             )
 
-    return draw_samples(samples, radius_m, runs)
+    return draw_samples(samples, body, runs)
 
 
 @style()
 def draw_samples(
-    samples: Sequence[Sample], radius_m: float | None = None, runs: Sequence[Sample] = ()
+    samples: Sequence[Sample], body: Body | None = None, runs: Sequence[Sample] = ()
 ) -> Figure:
     """Draw the distribution functions of (a) the miss and (b) the impulse spent.
 
@@ -107,14 +107,14 @@ def draw_samples(
 
     Where a few values are far beyond the others, the axis ends before them and its label says how
     many; where the curves or the radius lie far apart, the axis of the miss is logarithmic. The
-    radius of the body, m, is a line in (a). Single runs are marks on the axes.
+    radius of the body (`radius_name`) is a line in (a). Single runs are marks on the axes.
     """
     figure, (panels,) = subplots(85.0, 1, 2, sharey=True)
     left, right = panels
     misses = [sample.miss_m for sample in samples]
     impulses = [sample.impulse_m_s for sample in samples]
     bounds = [sample.guaranteed_miss_m for sample in samples if sample.guaranteed_miss_m.size]
-    scale_misses(left, [*misses, *bounds], radius_m)
+    scale_misses(left, [*misses, *bounds], None if body is None else body.inscribed_m)
     # Marks are not clipped: one beyond the end of the axis would be drawn outside of the figure.
     farthest_m = max((float(run.miss_m.max()) for run in runs), default=0.0)
     left.set_xlim(right=max(left.get_xlim()[1], 1.04 * farthest_m))
@@ -135,7 +135,7 @@ def draw_samples(
         left.plot(run.miss_m, [0.0], label=run.name, **_RUN | run.look)
         right.plot(run.impulse_m_s, [0.0], **_RUN | run.look)
     left.fill_between([], [], facecolor=LIMIT, alpha=0.3, label=_BAND)
-    draw_radius(left, radius_m)
+    draw_radius(left, body)
 
     left.set_ylabel("share of runs")
     letters(panels, ("miss", "impulse spent"))
@@ -190,11 +190,12 @@ def _beyond(axes: Axes, name: str, samples: Sequence[Floats]) -> list[str]:
     return [f"{name} beyond the axis: {count} of {sum(sample.size for sample in samples)}"]
 
 
-def draw_radius(axes: Axes, radius_m: float | None) -> None:
-    """Draw the radius of the body, if it is known, as a line on a scaled axis of misses."""
-    if radius_m is None:
+def draw_radius(axes: Axes, body: Body | None) -> None:
+    """Draw the radius of a body (`radius_name`) as a line on a scaled axis of misses."""
+    if body is None:
         return
-    label = f"body radius, {radius_m:.4g} m"
+    radius_m = body.inscribed_m
+    label = radius_name(body)
     look = RADIUS | {"transform": axes.get_xaxis_transform()}
     if radius_m <= axes.get_xlim()[1]:
         axes.plot(

@@ -41,12 +41,20 @@ The mark of its centre would hide it.
 """
 
 
-def draw_levels(axes: Axes, guaranteed_m: float | None, radius_m: float | None) -> None:
-    """Draw the guaranteed miss and the radius of the body, if known and not 0, as level lines."""
+def draw_levels(axes: Axes, guaranteed_m: float | None, body: Body | None) -> None:
+    """Draw the guaranteed miss, if known and not 0, and the radius of a body as level lines."""
     if guaranteed_m:
         axes.axhline(guaranteed_m, label="guaranteed miss Φ", **GUARANTEE)
-    if radius_m:
-        axes.axhline(radius_m, label=f"body radius, {radius_m:.4g} m", **RADIUS)
+    if body is not None:
+        axes.axhline(body.inscribed_m, label=radius_name(body), **RADIUS)
+
+
+def radius_name(body: Body) -> str:
+    """Return the name of the radius around the aim point that is certainly inside a body."""
+    radius = f"{body.inscribed_m:.4g} m"
+    if body.is_sphere_around_aim:
+        return f"body radius, {radius}"
+    return f"circle inside the body, {radius}"
 
 
 def draw_end(axes: Axes, time_s: float, miss_m: float, label: str) -> None:

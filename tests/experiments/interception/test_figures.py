@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 
 from infoset.arrays import Floats
-from infoset.experiments.common.figure_style import CURVE_LOOKS, figure_bytes
+from infoset.experiments.common.figure_style import CURVE_LOOKS, figure_bytes, new_figure
 from infoset.experiments.interception.course import Courses
 from infoset.experiments.interception.figures.commands import draw_experiment
 from infoset.experiments.interception.figures.comparison import draw_comparison
@@ -29,10 +29,11 @@ from infoset.experiments.interception.figures.sets import (
     choose_sections,
     draw_sets,
 )
+from infoset.experiments.interception.figures.shared import draw_levels
 from infoset.experiments.interception.scenario_file import load_scenario
 from infoset.experiments.interception.study import Comparison, Curve, curve_scenarios
 from infoset.guidance import NoiseKind, TieRule
-from infoset.sim import Record, Results, fly_one, simulate
+from infoset.sim import Body, Record, Results, fly_one, simulate
 
 UNITS = (", m", ", s", ", m/s", ", mrad", ", µrad/s", "share of runs")
 RUNS = 6
@@ -182,10 +183,32 @@ def test_the_axis_of_the_miss_shows_the_radius_of_the_body(
     radius_m: float | None, scale: str
 ) -> None:
     misses = np.geomspace(500.0, 2000.0, 40)
-    figure = draw_samples([Sample("wide", CURVE_LOOKS[1], misses, misses)], radius_m)
+    body = None if radius_m is None else Body(radius_m)
+    figure = draw_samples([Sample("wide", CURVE_LOOKS[1], misses, misses)], body)
     assert figure.axes[0].get_xscale() == scale
     low, high = figure.axes[0].get_xlim()
     assert low < (radius_m or 500.0) < high
+
+
+@pytest.mark.parametrize(
+    ("body", "name"),
+    [
+        (Body(700.0), "body radius, 700 m"),
+        (Body(700.0, aim_m=(300.0, 400.0)), "circle inside the body, 200 m"),
+        (Body(semi_axes_m=(900.0, 600.0)), "circle inside the body, 600 m"),
+    ],
+)
+def test_radius_that_is_not_that_of_a_sphere_around_the_aim_point_is_named(
+    body: Body, name: str
+) -> None:
+    misses = np.geomspace(500.0, 2000.0, 40)
+    figure = draw_samples([Sample("wide", CURVE_LOOKS[1], misses, misses)], body)
+    assert f"{name}: a smaller miss is a hit" in legend(figure)
+
+    axes = new_figure(80.0).subplots()
+    draw_levels(axes, None, body)
+    (line,) = axes.lines
+    assert line.get_label() == name
 
 
 def test_a_printed_run_beyond_all_misses_is_within_the_axis() -> None:
