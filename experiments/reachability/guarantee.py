@@ -19,6 +19,7 @@ from infoset.experiments.common.units import Unit
 from infoset.experiments.reachability.command import Reach
 from infoset.experiments.reachability.file import Rendezvous
 from infoset.experiments.reachability.guarantee_flights import affine_flights, replanned_flights
+from infoset.geometry.zonotope import Zonotope
 from infoset.rendezvous.reachability import (
     IMPULSE,
     Acceptance,
@@ -124,20 +125,9 @@ class GuaranteeReport:
         return norm_faces(len(acting)) if len(acting) > 1 else None
 
     def tube(self, time: int, states: list[int]) -> Floats:
-        """Return points in a plane whose hull are two states at a time for all errors, (k, 2).
-
-        It is a sum of segments +-g. An edge is parallel to a segment, and its ends are the sums
-        that are extreme along its normal.
-        """
-        columns = self.plan.state_columns[time][states].T
-        segments = columns[columns.any(axis=1)]
-        normals = np.column_stack([-segments[:, 1], segments[:, 0]])
-        signs = np.sign(normals @ segments.T)
-        np.fill_diagonal(signs, 0.0)
-        middles = signs @ segments
-        ends = np.concatenate([middles + segments, middles - segments])
-        corners = np.concatenate([ends, -ends, np.zeros((1, 2))])
-        return np.asarray(self.plan.nominal_states[time, states] + corners)
+        """Return the vertices of the set of two states at a time for all errors, shape (k, 2)."""
+        middle = self.plan.nominal_states[time, states]
+        return Zonotope(middle, self.plan.state_columns[time][states].T).vertices
 
     @cached_property
     def path(self) -> Floats:

@@ -158,6 +158,21 @@ def test_page_has_the_numbers_and_all_states_around_the_path() -> None:
             np.testing.assert_allclose(end, by_plan[t, [1, 0]], rtol=1e-9, atol=1e-9)
 
 
+def test_tube_reaches_the_sum_of_all_errors_in_each_direction() -> None:
+    """Several errors along z give parallel columns in the plane y-z."""
+    settings = [SHORT[1], "initial_error.position_m=25", "sensor.position_error_m=1"]
+    report = COMMAND.report(Reach(problem=ARCH, settings=settings, flights=0))
+    plan = report.plan
+    angles = np.linspace(0.0, np.pi, 37)
+    directions = np.array([np.cos(angles), np.sin(angles)])
+
+    for t in range(5):
+        reach = np.abs(plan.state_columns[t, 1:3].T @ directions).sum(axis=0)
+        found = ((report.tube(t, [1, 2]) - plan.nominal_states[t, 1:3]) @ directions).max(axis=0)
+        # The vertices are rounded outward by about 1e-12 of the size.
+        np.testing.assert_allclose(found, reach, rtol=1e-9)
+
+
 def test_figure_shows_the_guarantee_by_the_number_of_measurements() -> None:
     report = COMMAND.report(Reach(problem=ARCH, settings=[SHORT[1], SHORT[3]], flights=0))
 
