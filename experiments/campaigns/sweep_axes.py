@@ -34,6 +34,8 @@ SCALE = "scale"
 """Name, after the table of a sensor, of the factor of its error bounds."""
 DRIFT = "drift_rad"
 """Key of an error bound without `error` in its name."""
+_ENDS = (".min", ".max")
+"""Ends of the names of keys that are an end of an interval."""
 _NUMBER = r"([+-]?(?:[0-9]{1,20}\.?[0-9]{0,20}|\.[0-9]{1,20})(?:[eE][+-]?[0-9]{1,4})?)"
 _RANGE = re.compile(rf"(log:)?\s*{_NUMBER}\s*:\s*{_NUMBER}\s*:\s*([0-9]{{1,9}})")
 
@@ -56,13 +58,16 @@ def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
 
     axes = tuple(_axis(piece.strip(), scenario) for piece in pieces)
 
-    # A key may be varied once, also in another unit and by the factor of its sensor.
+    # A key may be varied once, also in another unit and by the factor of its sensor; an interval
+    # not also by an end.
     bounds = _error_bounds(scenario)
     varied: dict[str, list[str]] = {}
     for axis in axes:
         for tied in tied_keys(axis.key):
             for key in bounds.get(tied, {field_key(Scenario, tied): 0.0}):
-                varied.setdefault(key, []).append(tied)
+                ends = [key] if key.endswith(_ENDS) else [key + end for end in _ENDS]
+                for end in ends:
+                    varied.setdefault(end, []).append(tied)
 
     for names in varied.values():
         if len(names) > 1:
@@ -200,7 +205,7 @@ def key_label(key: str, factor: str = "") -> str:
     names = []
     for single in tied_keys(key):
         end = ""
-        if single.endswith((".min", ".max")):
+        if single.endswith(_ENDS):
             end = single[-4:]
         name = split_unit(single.removesuffix(end))[0] + end.replace(".", " ")
         names.append(name.replace(f".{SCALE}", ".factor of the error bounds").replace(".", ": "))

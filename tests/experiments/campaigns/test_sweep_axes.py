@@ -156,6 +156,14 @@ RISING = "must go from a smaller to a greater value, with a count from 2 to 1000
             "thruster.budget_m_s=1:2:2,thruster.budget_km_s=1:2:2",
             "thruster.budget_m_s and thruster.budget_km_s vary the same value",
         ),
+        (
+            "uncertainty.z_m=1:2:2,uncertainty.z_m.min=1:2:2",
+            "uncertainty.z_m and uncertainty.z_m.min vary the same value",
+        ),
+        (
+            "uncertainty.z_km.max=1:2:2,uncertainty.z_m=1:2:2",
+            "uncertainty.z_km.max and uncertainty.z_m vary the same value",
+        ),
         ("thruster.budget_m_s=log:0:1:3", "must be greater than 0"),
         ("thruster.budget=1:2:2", "did you mean thruster.budget_m_s?"),
         *((text, FORM) for text in ("", "thruster.budget_m_s")),
