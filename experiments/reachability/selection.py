@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 from infoset.arrays import Floats
-from infoset.experiments.common.errors import InputError, input_errors
+from infoset.experiments.common.errors import InputError, shown
 from infoset.experiments.common.options import choice
 from infoset.experiments.reachability.file import Engine
 from infoset.rendezvous.reachability import (
@@ -47,23 +49,35 @@ MAX_SAMPLES = 1000
 def selection(text: str) -> tuple[list[str], int]:
     """Return the names of the selection, and the number of samples, 0 without them.
 
-    Raise `InputError` for an unknown name, or if the number of samples is not a whole number from 1
-    to `MAX_SAMPLES`.
+    Raise `InputError` for an unknown or repeated name, a number after another name, or if the
+    number of samples is not a whole number from 1 to `MAX_SAMPLES`.
     """
-    names = []
+    names = list[str]()
     count = 0
     for part in text.split(","):
-        name, _, digits = part.strip().partition(":")
+        name, colon, digits = part.strip().partition(":")
         name = choice("--select", name, [*SINGLE, VERTICES, SAMPLES])
-        if name == SAMPLES:
-            with input_errors(f"--select {SAMPLES}"):
-                count = int(digits)
-            if not 1 <= count <= MAX_SAMPLES:
-                raise InputError(
-                    f"--select {SAMPLES}: must be between 1 and {MAX_SAMPLES}, found {count}"
-                )
+        if name in names:
+            raise InputError(f"--select {name}: is given twice; give it once")
         names.append(name)
+
+        if name == SAMPLES:
+            count = _sample_count(digits.strip(), part.strip())
+        elif colon:
+            raise InputError(f"--select {name}: takes no number, found {shown(part.strip())}")
     return names, count
+
+
+def _sample_count(digits: str, part: str) -> int:
+    """Return the number of samples in a part of --select."""
+    # More digits than four are more than `MAX_SAMPLES`.
+    count = int(digits) if re.fullmatch("[0-9]{1,4}", digits) else 0
+    if not 1 <= count <= MAX_SAMPLES:
+        raise InputError(
+            f"--select {SAMPLES}: must be {SAMPLES}:N with a whole number N between 1 and "
+            f"{MAX_SAMPLES}, found {shown(part)}"
+        )
+    return count
 
 
 def select_controls(solution: Solution, select: str, seed: int) -> dict[str, Floats]:

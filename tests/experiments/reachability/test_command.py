@@ -177,7 +177,11 @@ def test_more_periods_are_searched_if_zero_is_out_of_reach(infoset: Command) -> 
     ("arguments", "told"),
     [
         (["--select", "enrgy"], "did you mean energy?"),
-        (["--select", "samples"], "--select samples: invalid literal"),
+        (["--select", "samples"], 'a whole number N between 1 and 1000, found "samples"'),
+        (["--select", "samples:two"], 'a whole number N between 1 and 1000, found "samples:two"'),
+        (["--select", "samples:1001"], 'a whole number N between 1 and 1000, found "samples:1001"'),
+        (["--select", "energy:5"], '--select energy: takes no number, found "energy:5"'),
+        (["--select", "samples:3,samples:4"], "--select samples: is given twice"),
         (["approach-cone", "--select", "vertices"], "choose for example --select samples:20"),
         (
             [CASES / "s4_1_59.toml", "--select", "vertices"],
