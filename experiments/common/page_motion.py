@@ -150,8 +150,9 @@ def faces_of(points: Floats) -> list[Floats]:
         return [outline(points)]
     try:
         # Points in one place have no size; 1e-300 instead keeps the division defined, and Qhull
-        # refuses them.
-        hull = ConvexHull(points / max(float(np.ptp(points, axis=0).max()), 1e-300))
+        # refuses them. From the first point they are zero: no quotient overflows.
+        from_first = points - points[0]
+        hull = ConvexHull(from_first / max(float(np.ptp(points, axis=0).max()), 1e-300))
     except QhullError:
         return [outline(points)]
 
@@ -175,10 +176,10 @@ def outline(points: Floats) -> Floats:
     """
     if points.shape[1] == 2 and len(points) > 3:
         try:
-            # 1e-300 as in `faces_of`: an axis without extent keeps the division defined.
-            return np.asarray(
-                points[ConvexHull(points / np.maximum(np.ptp(points, axis=0), 1e-300)).vertices]
-            )
+            # As in `faces_of`; here an axis may have no extent.
+            from_first = points - points[0]
+            hull = ConvexHull(from_first / np.maximum(np.ptp(points, axis=0), 1e-300))
+            return np.asarray(points[hull.vertices])
         except QhullError:
             pass
 
