@@ -80,11 +80,19 @@ def run(options: Options) -> None:
 def _runs(options: Options, required: AnyRequirement) -> int | RunsUntil:
     """Return the number of runs of a cell; with --until, the requirement with the limits.
 
-    A --max-runs below --runs counts as --runs.
+    The default of --max-runs is at least --runs. Raise `InputError` if a given one is less.
     """
-    if options.until is not None:
-        max_runs = max(options.max_runs or MAX_RUNS_A_CELL, options.runs)
-        return RunsUntil(required, max_runs, min_runs=options.runs)
-    if options.max_runs is not None:
-        raise InputError("--max-runs is the limit of --until; add --until decided, or omit it")
-    return options.runs
+    if options.until is None:
+        if options.max_runs is not None:
+            raise InputError("--max-runs is the limit of --until; add --until decided, or omit it")
+        return options.runs
+
+    max_runs = options.max_runs
+    if max_runs is None:
+        max_runs = max(MAX_RUNS_A_CELL, options.runs)
+    if max_runs < options.runs:
+        raise InputError(
+            f"--max-runs: must be at least --runs, {options.runs}, found {max_runs}; give a "
+            "greater --max-runs or a smaller --runs"
+        )
+    return RunsUntil(required, max_runs, min_runs=options.runs)

@@ -144,6 +144,10 @@ def test_report_of_a_sweep_reads_only_its_files(
         (["--require", "miss_m 10"], "--require: must be hit>=SHARE, no-CAUSE>=SHARE or QUANTITY"),
         (["--require", "hit>=0.95"], "has no [body] with a radius; give a bound of the miss"),
         (["--max-runs", 30], "--max-runs is the limit of --until; add --until decided"),
+        (
+            ["--until", "decided", "--max-runs", 9],
+            "--max-runs: must be at least --runs, 10, found 9",
+        ),
     ],
 )
 def test_wrong_option_is_refused_before_the_work(
