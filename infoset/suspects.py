@@ -78,7 +78,7 @@ class Suspects:
     def steps(self, engagement: int, state: SetState) -> list[int]:
         """Return the steps of the images at least one of which is wrong.
 
-        They are the images that some member leaves out that is not refuted, until the last
+        They are the images that some member that is not refuted leaves out, until the last
         refutation. There are none before a wrong image is proved, and if all members are refuted.
         """
         if self.proof_step[engagement] < 0:
@@ -89,7 +89,7 @@ class Suspects:
         return [step for step in steps if step <= self._last_step[engagement]]
 
     def groups(self, engagement: int, state: SetState) -> dict[int, tuple[int, ...]] | None:
-        """Return the steps of the images that each member leaves out that is not refuted; None
+        """Return the steps of the images that each member that is not refuted leaves out; None
         before the split.
         """
         if not self.is_split[engagement]:

@@ -90,8 +90,11 @@ def copy_of_rings(rings: Floats, size: int) -> Floats:
 
 
 def working_room() -> Floats:
-    """Return the working array of the operations on whole chains."""
-    return np.empty((3 * CAPACITY + 4, 2))
+    """Return the working array of the operations on whole chains.
+
+    `chains.reduce_outward` needs most: CAPACITY + 2 rows for a chain, and 2 CAPACITY for a tree.
+    """
+    return np.empty((3 * CAPACITY + 2, 2))
 
 
 @pasted
@@ -166,6 +169,7 @@ def copy_section(chains: Chains, n: int, to_chains: Chains, to_n: int) -> None:
     """Copy section `n` to section `to_n` of other chains, whose rings must have enough unused
     room.
     """
+    # Nothing here depends on the labels.
     section = view_of(chains, n, 0.0)
     to = view_of(to_chains, to_n, 0.0)
     # The target is emptied first: `widen_rings` would copy its old vertices.

@@ -66,7 +66,8 @@ class Chain(Protocol):
         Bound of |V| over the section's history, m/s, to which rounding errors are relative; in the
         right chain only.
     begin, end, peak : int
-        Number of the first vertex, one past that of the last, and that of the peak.
+        Number of the first vertex, one past that of the last, and that of the peak. They become
+        negative if vertices are inserted before the first one.
     ring, mask : int
         Offset of the ring in `rings`, and the ring's size minus one. The size is a power of two,
         and a vertex is stored at its number modulo the size.
@@ -268,6 +269,7 @@ def turn(section: SectionView, tau: float) -> None:
     ends.
     """
     right, left, rings, _ = section
+    # 2 ulp of the origins bound the rounding errors of `height` by m; those by V are in `same_v`.
     same_v = 4.0 * EPSILON * right.reach
     same_m = 2.0 * EPSILON * (abs(right.m) + abs(left.m))
     same = (same_v, same_m + tau * same_v)
@@ -492,6 +494,7 @@ def margin_in(section: SectionView, tau: float, v: float, z: float) -> float:
     nearest, _ = polygon.pass_edge(np.inf, FALSE, rounded, last, 0.0, 0.0)
     _, inside = polygon.pass_edge(np.inf, FALSE, end, last, 0.0, 0.0)
 
+    # The state is the point (0, 0), because the vertices are relative to it.
     for chain in (right, left):
         for i in range(chain.begin, chain.end):
             end = vertex_from(chain, rings, i, tau, v, z)
@@ -513,6 +516,7 @@ def outline(section: SectionView, tau: float, out: Floats) -> int:
         for i in range(chain.begin, chain.end):
             v, m = vertex(chain, rings, i)
             z = m - tau * v
+            # Only the first vertex of the left chain can repeat the last one of the right chain.
             if i > chain.begin or made == 0 or not meets(out, made - 1, v, z, right.reach, tau):
                 made = polygon.append(out, made, v, z)
 
@@ -559,6 +563,7 @@ def reduce_outward(section: SectionView, tau: float, points: Floats) -> None:
     for i in range(longer.begin, longer.end):
         v, m = read(longer, rings, i)
         count = polygon.append(points, polygon_reduction.drop_turned(points, count, v, m), v, m)
+    # The shorter chain has at most half of the vertices of a full section: 32 or more are left.
     most = REDUCED - min(in_right, in_left)
     count, done = polygon_reduction.drop_inner_edges(points, count, most, points[CAPACITY + 2 :])
     if not done:
@@ -589,6 +594,7 @@ def cut_misses(
         for i in range(chain.begin, chain.end):
             v, m = vertex(chain, rings, i)
             count = polygon.append(points, count, v, m)
+    # Directions are factors of V and m: (0, 1) is the miss, and (-tau, 1) the height.
     count, overlap = polygon.clip_to_band(points, count, 0.0, 1.0, lower, upper)
     if count == 0:
         return False, overlap

@@ -91,6 +91,7 @@ def list_leaving(leaving: Leaving, b: int, past: Past, pieces: Records, count: i
         piece.step = step
         piece.bound = np.inf
         count += 1
+        # Labels are positive; `known` is minus infinity if none is known.
         if past.errors is not None and leaving.known[step, b] > 0.0:
             # The windows of pieces apply the measurements that have cut this label.
             run(leaving.known[step, b], past)
@@ -129,6 +130,7 @@ def divide(
     far = pieces[i].far
     b = pieces[i].set
     step = pieces[i].step
+    # The last piece takes its place.
     count -= 1
     pieces[i] = pieces[count]
 
@@ -201,6 +203,7 @@ class GuaranteedMiss:
         self._speed_error = speed_error
         steps = law.label_max / (law.closing_speed * law.step)
         self._group_steps = max(1, int(steps / GROUPS))
+        # Labels below these, m, have been noted already.
         self._bounded_below = np.full(batch, -np.inf)
         self._leaving: list[Leaving] = []
 
@@ -218,10 +221,12 @@ class GuaranteedMiss:
         Labels that leave during the following steps of a group are noted too, so that the number of
         windows does not grow with the number of steps.
         """
+        # Engagements of which a label leaves in this step that was not noted before.
         lower = np.maximum(lower, self._bounded_below)
         active = active & (lower <= upper) & (lower < self._min_label(history.elapsed + 1))
         if not active.any():
             return
+        # The group is this step and the following ones: labels below leave in one of them.
         below = self._min_label(history.elapsed + self._group_steps)
         near = np.where(active, lower, np.inf)
         far = np.minimum(upper, below)
@@ -233,6 +238,7 @@ class GuaranteedMiss:
         is_used = np.arange(slots.shape[1]) < sections.used[:, None]
         is_known = slots["feasible"] & is_between & is_used
         known = np.where(is_known, labels, -np.inf).max(axis=1)
+        # Arrays without an axis: `bound` stacks them.
         events = np.array(history.events)
         elapsed = np.array(history.elapsed)
         self._leaving.append(Leaving(near, far, known, events, elapsed))
@@ -257,8 +263,11 @@ class GuaranteedMiss:
                 supports=np.empty((4, MAX_LABELS)),
             )
             leaving = Leaving(*(np.stack(each) for each in zip(*self._leaving, strict=True)))
+            # A division puts at most `PIECES` pieces in the place of one: each leaving window is
+            # divided once, and `MAX_DIVIDED` others for each set.
             pieces = np.recarray(PIECES * (windows + MAX_DIVIDED) * self._members, PIECE)
             bound_all(leaving, past_of(history, laws), outlines, pieces, phi)
+        # A miss is not negative; minus infinity stands for none.
         exists = phi >= 0.0
         factor = (1.0 + self._speed_error) * (1.0 + SLACK)
         return np.where(exists, (phi + MISS_ROUNDING * self._law.label_max) * factor, 0.0), exists

@@ -129,6 +129,7 @@ class History:
         """Give engagement `row` the events of engagement `source`, but `applies`, shape (events,),
         says which ones apply. Only for histories without rates.
         """
+        # `total_impulse` sums each event once: before the values of the row change.
         self.total_impulse()
         self._fired[row] = self._fired[source]
         self.values[: self.events, :, row] = self.values[: self.events, :, source]
@@ -142,6 +143,7 @@ class History:
         """Return the sum of the impulses' magnitudes in each engagement, m/s, shape (B,)."""
         new = self._summed + np.flatnonzero(self.kinds[self._summed : self.events] == IMPULSE)
         for event in new:
+            # With one axis `reduce` returns the value itself, with its sign.
             modulus = np.abs(np.hypot.reduce(self.values[event]))
             self._fired = self._fired + np.where(self.applies[event], modulus, 0.0)
         self._summed = self.events

@@ -81,12 +81,14 @@ def locate_end(
     run(feasible, past)
     keep_feasible(past, row)
     feasible_overlaps = past.room.feasible_overlaps
+    # Of all replays only those of windows for Phi are thinned.
     is_coarse = past.errors is not None and past.thinned
     known = feasible
     infeasible = outside.label
     emptying = Emptying(outside.emptied_at, outside.overlap, outside.emptied_axis)
     infeasible_weight = emptying.overlap
     feasible_weight = feasible_overlaps[emptying.emptied_axis, emptying.emptied_at]
+    # The end that was moved last: 1 the feasible one, -1 the infeasible one.
     last_moved = 0
     width_before = 0.0
     for evaluations in range(MAX_EVALUATIONS):
@@ -169,6 +171,7 @@ def search_bracket(past: Past) -> bool:
 
         outer = FIRST if lower_half > upper_half else LAST
         other = LAST - outer
+        # The index of the new label among four, next to the outer label.
         at = 1 if outer == FIRST else 2
         for i in range(3):
             four[i if i < at else i + 1] = bracket[i]
@@ -192,7 +195,8 @@ def search_bracket(past: Past) -> bool:
 def order_bracket(past: Past) -> None:
     """Make the middle label of the bracket in the workspace the one that empties last.
 
-    If it is an outer label, the bracket becomes this label, twice, and the middle one.
+    If it is an outer label, the bracket becomes this label, twice, and the middle one. Only one
+    outer label can empty later than the middle one, because the pair is unimodal.
     """
     bracket = past.room.bracket
     for end in (FIRST, LAST):

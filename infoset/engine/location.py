@@ -84,6 +84,7 @@ def list_known_labels(
         record.overlap = slot.overlap
         record.emptied_axis = slot.emptied_axis
         if slot.feasible:
+            # Index 0 is the lower limit: no feasible label so far.
             if lowest == 0:
                 lowest = last
             highest = last
@@ -101,6 +102,7 @@ def check_limits(labels: KnownLabels, past: Past) -> KnownLabels:
     """
     known = past.room.known
     last, some_feasible, lowest, highest = labels
+    # The labels 1 and last - 1 are next to the limits.
     if (not some_feasible or lowest == 1) and evaluate_label(known, ZERO, known[0].label, past):
         keep_section(past, LOWER)
         lowest = ZERO
@@ -285,5 +287,6 @@ def refine_all(
         used[b] = number
         for s in range(number):
             spare = min(spare, fill_slot(b, s, number, labels, sections, past))
+        # Replays of the new labels may have reduced a section too.
         sections.unproved[b] |= past.room.unproved[0]
     return spare

@@ -217,6 +217,7 @@ def miss_at(outlines: Outlines, i: int, past: Past) -> float:
         points = outlines.points[channel, i]
         count = outlines.counts[channel, i]
         tau = time_to_go(middle, past.log.elapsed, law)
+        # Both are zero without rates.
         room = past.room.drifts[channel, 1]
         turn = past.room.drifts[channel, 0] * ((label - middle) / law.closing_speed)
 
@@ -334,6 +335,7 @@ def replay_labels(feasible: FeasibleLabels, past: Past, outlines: Outlines) -> P
 
     outer = ZERO
     if past.errors is None and feasible.above == feasible.upper:
+        # One spacing above the upper end.
         outer = write_if_feasible(outlines, number, feasible.lower + LABELS * spacing, past)
     return PieceLabels(number + outer, inner, outer)
 
@@ -445,6 +447,7 @@ def bound_piece(
     for channel in range(past.laws.shape[0]):
         law = law_of(past.laws, channel)
         tau = time_to_go(middle, past.log.elapsed, law)
+        # `bound_between` reads two labels on each side of the piece.
         write_supports(channel, max(first - 2, 0), min(first + 2, number), tau, outlines)
         slope, offset, room = turning_of(near, far, number, first, law, past, outlines)
 
@@ -454,6 +457,7 @@ def bound_piece(
         moved, turn = later_impulses(near, far, -1.0, past, law)
         lower = bound_between(labels, supports[MINUS_LOWER_MISS], first, near, far, -slope - turn)
         lower = lower - offset - moved
+        # The farthest label has the most time to drift.
         drift = 0.5 * law.disturbance * time_to_go(far, past.log.elapsed, law) ** 2
         farther = max(upper + law.aim, lower - law.aim) + law.aim_error
         total = math.hypot(total, farther + room + drift)
@@ -473,6 +477,6 @@ def margin_of(outlines: Outlines, width: float, past: Past) -> float:
         count = outlines.counts[channel, 0]
         tau = time_to_go(label, past.log.elapsed, law)
         size = abs(support(points, count, tau, 1.0)) + abs(support(points, count, -tau, -1.0))
-        # A range of zero would make the margin infinite.
+        # A range of zero would make the margin infinite: ranges below 1 m count as 1 m.
         margin += size * (SLACK + width / max(tau * law.closing_speed, 1.0))
     return margin

@@ -21,6 +21,7 @@ def follow_sight(log: EventLog, done: int, b: int, sights: Floats, law: SectionL
     `sights` contains the last sights after `done` events, shape (C, B, columns), and is updated.
     """
     c = law.channel
+    # The flag and the number of steps are stored as floats.
     row = sights[c, b]
     sight = LastSight(row[KNOWN] != 0.0, row[ALPHA], row[ACROSS], int(row[STEPS]), row[FIRED])
     for event in range(done, log.number):

@@ -135,9 +135,12 @@ def apply_stretch(
     before = time_to_go(section.label, stretch.began, law)
     now = time_to_go(section.label, elapsed, law)
     late = stretch.moments / (before - now) if elapsed > stretch.began else stretch.bounds
+    # It is not noted in `unproved`, which is for histories without rates.
     if chains.is_crowded(section):
         chains.reduce_outward(section, before, points)
 
+    # All events are later than `began` by at most the whole stretch: a negative difference is
+    # rounding.
     chains.spread(section, before, max(stretch.bounds - late, 0.0))
     chains.shift(section, before, -stretch.turned)
     # An impulse changes the predicted miss by its product with the time to go when it is given.
@@ -198,6 +201,7 @@ def replay_rates(
         kind = past.log.kinds[i]
         event = AxisEvent(kind, values[law.channel, i], across_of(values, i, law), errors[i])
         is_measurement = kind in (ANGLE, RATE)
+        # Measurements that have cut, enlargements, burns, and the prediction after a burn.
         is_single = cuts[i] or starts_burn(kind, law) or stretch.began == IN_BURN
         is_left_out = past.thinned and not is_single
         # A rate does not change the last angle, so that this may be before its cut.

@@ -59,7 +59,11 @@ class Emptying(NamedTuple):
 def replay_angles(
     done: Replayed, label: float, until: int, past: Past, law: SectionLaw
 ) -> tuple[int, Replayed]:
-    """Replay a history without rates, see `replay`. About 30 ns for each event."""
+    """Replay a history without rates, see `replay`. About 30 ns for each event.
+
+    The section after the events `done` must still be in row `LAST_REPLAY` of the axis; it is
+    started anew if there are none.
+    """
     kinds = past.log.kinds
     applies = past.room.applies
     values = past.room.values
@@ -83,6 +87,9 @@ def replay_angles(
                 section, kinds[event], own[event], across, elapsed, law, past.room.points
             )
             if is_reduced:
+                # The section is too large from now on, and so are the overlaps that follow. They
+                # are no concave function of the label then, so that a search that finds no feasible
+                # label proves nothing (`is_infeasible_between`).
                 past.room.unproved[0] = True
             elapsed += kinds[event] == PREDICTION
     return NEVER_EMPTIED, Replayed(until, elapsed, done.sight)
@@ -96,9 +103,10 @@ def replay(
     number `until`.
 
     Return the number of the event that makes the section empty, and `done` as it was; or
-    NEVER_EMPTIED, and the events done now. The workspace receives the section, in row `LAST_REPLAY`
-    of the axis, and the overlaps with the bands of the measurements up to the one that makes it
-    empty.
+    NEVER_EMPTIED, and the events done now. The section after the events `done` must still be in row
+    `LAST_REPLAY` of the axis; it is started anew if there are none. The workspace receives the
+    section, in the same row, and the overlaps with the bands of the measurements up to the one that
+    makes it empty.
 
     `errors` are the error bounds of the measured rates. They are an argument because the compiler
     omits `replay_rates`, which is most of the code, only if an argument is None.
@@ -204,6 +212,7 @@ def margins_all(
             emptied_at = NEVER_EMPTIED
             done = AT_START
             for k in range(events_before.shape[0]):
+                # No other replay comes between: the section goes on from the events `done`.
                 if emptied_at == NEVER_EMPTIED:
                     emptied_at, done = replay(done, label, events_before[k], past, past.errors, law)
 

@@ -14,7 +14,8 @@ from infoset.arrays import Floats
 from infoset.model import Interval, SetModel
 
 BOUND_SLACK = 1e-9
-"""Relative enlargement of the bounds of the guaranteed model; rounding errors are far smaller."""
+"""Relative enlargement of the bounds of the guaranteed model; in the paper's model too, of the
+centroid error of a camera and of the error bound of a rate. Rounding errors are far smaller."""
 BOX_ROUNDING = 16.0 * sys.float_info.epsilon
 """Enlargement of the box, relative to the largest values of its coordinates: 16 ulp, as for a
 cut.
@@ -178,6 +179,7 @@ def _with_burns(law: SectionLaw, model: SetModel, psi: float) -> SectionLaw:
         return law
 
     delta = model.execution_error_relative
+    # Limits of the scale 1 / (1 + eta) of velocities.
     most = 1.0 / (1.0 - model.speed_error)
     least = 1.0 / (1.0 + model.speed_error)
     early = 0.5 * max(most - 1.0, 1.0 - least + delta**2 * most)
@@ -242,6 +244,10 @@ def _law(model: SetModel) -> SectionLaw:
     Therefore the guaranteed model enlarges the bounds of lengths and velocities by eta, takes the
     maximum error bound of an angle over the ranges that correspond to a label, and adds eta to the
     engine's error of an impulse. See docs/guarantee.md.
+
+    In space and for burns, `section_laws` replaces the constants from `other_error_at_zero_range`
+    to `other`, `other_centroid_error` and `farthest_shift`: this function writes their values of a
+    plane with instantaneous impulses.
     """
     box = model.seen_bounds
     sensor = model.angle_sensor
@@ -252,6 +258,8 @@ def _law(model: SetModel) -> SectionLaw:
     impulse_error = 0.0
     guaranteed = model.is_guaranteed
     if guaranteed:
+        # The bound of a label at the true distances from (1 - eta) x to (1 + eta) x: a rising one
+        # is greatest at the far end, a falling one at the near end.
         slope *= (1.0 + math.copysign(eta, slope)) * (1.0 + BOUND_SLACK)
         error *= 1.0 + BOUND_SLACK
         impulse_error = (1.0 + model.execution_error_relative) / (1.0 - eta) - 1.0
@@ -269,6 +277,7 @@ def _law(model: SetModel) -> SectionLaw:
         # terms keep coordinates that are known exactly inside the set.
         offset = max(abs(z) for z in box.z_m)
         speed = max(abs(v) for v in box.vz_m_s)
+        # One over the minimum time to go at the start.
         rate = model.closing_speed_m_s / min_label
         slack = rate * offset * model.gravity_speed_change + BOX_ROUNDING * (speed + rate * offset)
         vz_min = vz_min - slack

@@ -36,7 +36,7 @@ ANGLE_SLACK = 1e-12
 NEVER_EMPTIED = np.iinfo(np.int64).max
 """Event at which a feasible label became empty: after all others."""
 
-# Columns of a section's summary.
+# Columns of a section's summary; `widest_all` needs UPPER_MISS after LOWER_MISS.
 LOWER_MISS, UPPER_MISS, Z_MIN, Z_MAX = range(4)
 SUMMARY_COLUMNS = 4
 
@@ -76,6 +76,7 @@ def start_section(section: SectionView, room: float, law: SectionLaw) -> None:
     if law.rectangle:
         lowest -= max(law.vx_min * z_min, law.vx_max * z_min) / x
         highest -= min(law.vx_min * z_max, law.vx_max * z_max) / x
+        # V = omega x - e alpha: the shift is that of the second term, at both ends of alpha.
         shift_at_min = -e * math.atan(z_min / x)
         shift_at_max = -e * math.atan(z_max / x)
         z_min = math.atan(z_min / x) * x
@@ -208,6 +209,7 @@ def linear_slope_band(
         return -np.inf, np.inf
     cosine = math.cos(own)
     if law.error_slope > 0.0:
+        # x times `chord` is the chord of x^2 between the ranges of the nearest and farthest label.
         near = max(law.label_min - travelled, 0.0)
         # The error bound depends on the true distance, at most x/(cos(own) cos(other)).
         chord = near + far - near * far / x
@@ -407,9 +409,11 @@ def move_section(
     points: Floats,
 ) -> bool:
     """Apply an event that is not a measurement to a section: a prediction, an impulse or an
-    enlargement. Return whether the section was reduced.
+    enlargement. Return whether the section was reduced: enlarged to fewer vertices.
 
-    `elapsed` is the number of predictions before the event. `points` is a working array.
+    `elapsed` is the number of predictions before the event. `points` is a working array. Only a
+    prediction tests whether the section is crowded: a cut by an angle adds no vertex, and the turn
+    of a burn is one of the two turns in `MAX_ADDED`.
     """
     is_reduced = False
     if kind == PREDICTION:

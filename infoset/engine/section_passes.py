@@ -323,6 +323,7 @@ def make_room_all(
                 section = section_of(sections, channel, b, s)
                 if widen and active[b] and chains.is_crowded(section):
                     chains.reduce_outward(section, time_to_go(slot.label, elapsed, law), points)
+                    # As in `replay_angles`: the overlaps that follow are too large for a proof.
                     sections.unproved[b] = True
 
                 count = chains.count_of(section)
@@ -379,6 +380,7 @@ def widest_all(elapsed: int, sections: Sections, laws: Laws, exists: Flags, ends
                 points = chains.extreme_points(section, tau, TIE_TOLERANCE, CUT_SLACK)
                 v, m = points[1 - end]
                 alpha = (m - tau * v) / x
+                # The column `UPPER_MISS` follows `LOWER_MISS`.
                 ends[channel, b, end, 0] = summaries[channel, b, s, LOWER_MISS + end]
                 ends[channel, b, end, 1] = alpha
                 ends[channel, b, end, 2] = (v + law.closing_speed * alpha) / x
@@ -390,8 +392,8 @@ def extreme_angles_all(elapsed: int, sections: Sections, laws: Laws, extremes: F
     """Write the minimum and the maximum alpha of the feasible sections along each axis, rad, and
     their ranges, m.
 
-    `extremes`, shape (4, C, B), is not written for engagements without a feasible section. The
-    columns of z of the summaries must be up to date.
+    `extremes`, shape (4, C, B), has both angles and then their ranges; it is not written for
+    engagements without a feasible section. The columns of z of the summaries must be up to date.
     """
     slots = sections.slots
     used = sections.used
@@ -447,13 +449,14 @@ def count_all(sections: Sections, counts: Integers) -> None:
 
 @entry
 def write_outline(section: Chains, n: int, tau: float, out: Floats) -> int:
-    """Call `chains.outline` from Python."""
+    """Call `chains.outline` from Python, with the section in row `n`; its label is not used."""
     return chains.outline(view_of(section, n, 0.0), tau, out)
 
 
 @entry
 def steepest_all(alpha: Floats, farthest: float, laws: Laws, steepest: Floats) -> None:
     """Write the results of `steepest_angles` for angles of shape (C, B), shape (2, B)."""
+    # The constants of one axis contain the error bounds of both angles.
     law = law_of(laws, ZERO)
     for b in range(alpha.shape[1]):
         steepest[0, b], steepest[1, b] = steepest_angles(

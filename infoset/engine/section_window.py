@@ -114,6 +114,7 @@ def window_after(window: Window, event: AxisEvent, elapsed: int, law: SectionLaw
     counts a prediction itself.
     """
     near, far, turned, loose, fastest, most = window
+    # The farthest label has the greatest time to go.
     tau = max(time_to_go(far, elapsed, law), 0.0)
     size = abs(event.value)
     if event.kind == PREDICTION:
@@ -172,6 +173,7 @@ def measure_in_window(
     near = window.near - travelled
     far = window.far - travelled
     middle = section.label - travelled
+    # Both forms are exact for a single label. The other form needs a positive range of all labels.
     by_speed = half == 0.0 or near <= 0.0 or window.fastest * near <= window.most * e
     if by_speed:
         scale = x
@@ -187,6 +189,7 @@ def measure_in_window(
     # Most bands cut nothing: a narrower one without tangents shows it in half the time. Between the
     # ends of a window the shift of (21') is between those of its ends.
     minimum, maximum = chains.heights(section, middle / e)
+    # `nearly_tangent` holds below 0.5 rad.
     if abs(alpha) + bound < 0.5:
         shifted = turn - law.shift
         lower = scale * nearly_tangent(alpha - bound, -1.0, law) + shifted - slack

@@ -245,6 +245,8 @@ class SetState:
         travelled = self.travelled
         slack = CUT_SLACK * (measured + travelled)
         eta = self.model.speed_error
+        # A label is the range x now plus the distance travelled. The true distance is from
+        # (1 - eta) x to (1 + eta) x / `nearer`.
         nearer = self._min_cosine(alpha) if self.model.is_guaranteed else 1.0
         lower = measured * nearer / ((1.0 + relative_error) * (1.0 + eta)) + travelled - slack
         upper = measured / ((1.0 - relative_error) * (1.0 - eta)) + travelled + slack
@@ -279,6 +281,8 @@ class SetState:
         """
         new = np.where(active, np.stack((lower, -upper)), -np.inf)
         ordered = np.sort(np.concatenate((earlier, new[:, None]), axis=1), axis=1)
+        # Of q + 2 limits the smallest is dropped; where none was measured, minus infinity. The
+        # first of the others is the (q + 1)-th largest.
         self._range_limits = ordered[:, 1:]
         return self._range_limits[0, 0], -self._range_limits[1, 0]
 
@@ -410,6 +414,7 @@ class SetState:
         found by replay.
         """
         self._catch_up()
+        # Room for two rings of the greatest size for each new section: `copy_section` may need it.
         new = number * int(np.count_nonzero(wanted)) * len(self.laws)
         self._add_room(2 * (2 * chains.CAPACITY + chain_storage.LINE) * new)
         limits = (self.lower_label, self.upper_label)
@@ -440,7 +445,6 @@ class SetState:
         wanted = self._none.copy()
         wanted[row] = True
         self.refine(wanted, self._grid)
-        self.sections.stale[row] = True
         if self.feasible[row].any():
             return True
         self.refute(row)

@@ -79,8 +79,6 @@ def search_windows(
     windows = past.room.windows
     windows[0].near = lower
     windows[0].far = upper
-    windows[0].emptied_at = NEVER_EMPTIED
-    windows[0].overlap = 0.0
     count = 1
     for _ in range(MAX_HALVED_WINDOWS):
         if count == 0:

@@ -70,7 +70,7 @@ class Workspace(NamedTuple):
     latest : ndarray, shape (2, 4)
         Labels and overlaps of those that became empty at the latest event.
     windows : recarray of WINDOW, shape (MAX_HALVED_WINDOWS + 2,)
-        Windows of labels to be searched.
+        Windows of labels to be searched. One halving puts at most two in the place of one.
     unproved : ndarray of bool, shape (1,)
         Whether a search without a result proves nothing for a history without rates: a section was
         reduced, or a bracket ended without a proof. `select` resets it, `replay_angles` and
