@@ -107,14 +107,14 @@ class CoveredSetView(InformationSetView):
     def suspected_steps(self, engagement: int = 0) -> list[int]:
         """Return the steps of the images at least one of which is wrong.
 
-        They are the images until the last refutation that some member leaves out that is not
-        refuted. There are none before a wrong image is proved, and if all members are refuted.
+        They are the images that some member that is not refuted leaves out, until the last
+        refutation. There are none before a wrong image is proved, and if all members are refuted.
         """
         self._need_engagement(engagement)
         return self._suspects.steps(engagement, self._state)
 
     def groups(self, engagement: int = 0) -> dict[int, tuple[int, ...]] | None:
-        """Return the steps of the images that each member leaves out that is not refuted, after a
+        """Return the steps of the images that each member that is not refuted leaves out, after a
         split; None before, when members leave out the classes in `left_out`.
         """
         self._need_engagement(engagement)
@@ -214,6 +214,7 @@ class CoveredSetView(InformationSetView):
         exists, ends = self._state.widest(repeated)
         counts = self._by_member(exists)
         # An end is the predicted miss, and the state that reaches it; zeros without a section.
+        # The axis of the two ends is moved to the front: (2, C, B, R, 4).
         lower_ends, upper_ends = self._by_member(np.moveaxis(ends, 2, 0), axis=2)
         lowest = np.where(counts, lower_ends[..., 0], np.inf).argmin(axis=2)
         highest = np.where(counts, upper_ends[..., 0], -np.inf).argmax(axis=2)
@@ -299,6 +300,7 @@ class CoveredSet(CoveredSetView, InformationSet):
         COUNT.need("batch", batch)
         left_out = classes_left_out(model.wrong_images, model.classes)
         ordinary = replace(model, wrong_images=0, image_classes=None)
+        # Without its constructor, which makes a state of sets that do not belong together.
         members = InformationSet.__new__(InformationSet)
         state = SetState(ordinary, batch * len(left_out), guarantee, members=len(left_out))
         SetQueries.__init__(members, state)
@@ -332,6 +334,7 @@ class CoveredSet(CoveredSetView, InformationSet):
         every = self.model.steps_in(self.model.angle_sensor.period_s)
         image_class = (state.elapsed // every) % self.left_out.shape[1]
         wanted = self._where(where)
+        # Before the cut, which appends the event of this image to the history.
         self._suspects.record_image(state, image_class, wanted & self.tracking)
 
         uses = ~self.left_out[:, image_class] | self._suspects.is_split[:, None]

@@ -235,6 +235,7 @@ def _check(name: str, value: Any, hint: Any) -> None:
         if isinstance(kind, type) and not isinstance(value, kind):
             raise TypeError(f"{name} must be of the type {kind.__name__}: got {shown(value)}")
     elif get_origin(kind) is tuple:
+        # The arguments of ``tuple[float, ...]`` are float and the ellipsis.
         is_pair = get_args(kind)[1:] != (...,)
         _check_tuple(name, value, limits, is_pair)
     else:
@@ -317,4 +318,5 @@ def shown(value: object) -> str:
     text = " ".join(repr(value).split())
     if len(text) <= LONGEST_SHOWN:
         return text
+    # With the three dots it has the maximum length.
     return f"{text[: LONGEST_SHOWN - 3]}..."

@@ -157,6 +157,7 @@ class StateBox:
         Without impulses and accelerations the distance is a convex function of time: it is largest
         at the start or at the end.
         """
+        # vx is negative: its upper limit is the slowest approach.
         max_range = self.x_m[1]
         max_duration = max_range / -self.vx_m_s[1]
         at_start = math.hypot(max_range, self.offset_m)
@@ -177,7 +178,8 @@ class SetSettings:
         model allows only BOX.
     sections : int
         Number of x-sections at the start, on a uniform grid over the possible ranges, ends
-        included.
+        included. With 101 sections the median misses of asteroid-1997 differ by at most 4 % from
+        those with the default (docs/interception.md).
     fewest_sections : int
         If fewer sections are left, replay makes a new grid of 2 fewest_sections + 1: more than half
         of them can become empty before the next grid is needed.
@@ -423,8 +425,7 @@ class SetModel(SetSettings):
         """Refuse starts at or below the range threshold, or without a positive error bound.
 
         The error bound is the bound of the angle at the maximum distance, the smaller one of both
-        axes. `name` is the name of the
-        box, for the message.
+        axes. `name` is the name of the box, for the message.
 
         Raises
         ------
@@ -450,6 +451,7 @@ class SetModel(SetSettings):
         """Maximum |eta|, where e (1 + eta) is the true closing speed; zero in the paper's model."""
         if not self.is_guaranteed:
             return 0.0
+        # vx is minus the closing speed.
         e = self.closing_speed_m_s
         return max(abs(speed + e) for speed in self.bounds.vx_m_s) / e + self.gravity_speed_change
 

@@ -155,7 +155,7 @@ class SetQueries:
         feasible = self.feasible
         tracked = feasible.any(axis=1)
         rows = np.arange(len(ranges))
-        # The labels increase with the slot.
+        # The labels increase with the slot; the last feasible slot is counted from the end.
         minimum = ranges[rows, feasible.argmax(axis=1)]
         maximum = ranges[rows, -1 - feasible[:, ::-1].argmax(axis=1)]
         return np.where(tracked, minimum, 0.0), np.where(tracked, maximum, 0.0)

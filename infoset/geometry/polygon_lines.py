@@ -51,7 +51,10 @@ sum once: in all less than a quarter of this.
 
 @inlined
 def add_products(one: Floats, two: Floats, sign: float, sums: Floats, made: int) -> int:
-    """Append the terms of the product of two sums, with the rounding errors; return the count."""
+    """Append the terms of the product of two sums, with the rounding errors; return the count.
+
+    `sums` needs room for two more terms for each pair.
+    """
     for a in one:
         for b in two:
             if a != 0.0 and b != 0.0:

@@ -79,10 +79,12 @@ class Cover:
                     "measurement_classes belongs to wrong_measurements, which is 0: leave "
                     "measurement_classes out, or set wrong_measurements"
                 )
+            # One member, which leaves out no class.
             return cls(classes_left_out(0, 1))
 
         if measurement_classes is None:
             return cls(classes_left_out(wrong_measurements, 2 * wrong_measurements + 2))
+        # With q + 1 classes each member would use the measurements of one class only.
         minimum = wrong_measurements + 2
         Limits(minimum=minimum, whole=True).need("measurement_classes", measurement_classes)
         sets = math.comb(measurement_classes, wrong_measurements)

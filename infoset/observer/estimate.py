@@ -91,6 +91,7 @@ class Estimate:
     @property
     def is_empty(self) -> Flags:
         """Whether no state is possible, shape () or (B,)."""
+        # A run has a possible state if one of its sets has.
         return np.asarray(~self._runs(self._maximum(~self.sets.is_empty)))
 
     @property
@@ -117,6 +118,7 @@ class Estimate:
         """
         below, above = self._heights(np.eye(self.states))
         is_larger = self.sets.reduced & ~self.sets.is_empty
+        # A record that became too long was discarded (`LinearObserver._note`).
         if is_larger.any() and len(self.events) < self.count:
             raise ValueError(
                 f"exact widths are known for {MAX_RECORD} steps and measurements, not more"
@@ -216,6 +218,7 @@ class Estimate:
         """
         rows = finite_values("matrix", matrix, "m", self.states)
         below, above = map(self._maximum, self._heights(rows))
+        # `below` are maxima of -row . x. A difference from 0.0, because -0.0 would be shown as -0.
         lower = 0.0 - np.where(np.isinf(below), np.nan, below)
         upper = np.where(np.isinf(above), np.nan, above)
         return self._runs(lower), self._runs(upper)
@@ -295,6 +298,7 @@ class Estimate:
     def _outlines_by_programs(self, numbers: list[int]) -> list[Floats]:
         """Return polygons around the projections, with sides at equal angles in a square plot."""
         lower, upper = (np.atleast_2d(end)[:, numbers] for end in self._hull)
+        # The bounds of an empty set are NaN, and not greater: its width counts as zero.
         widths = np.nanmax(np.where(upper > lower, upper - lower, 0.0), axis=0)
         units = np.where(widths > 0.0, widths, 1.0)
         angles = np.linspace(0.0, 2.0 * np.pi, _OUTLINE_SIDES, endpoint=False)

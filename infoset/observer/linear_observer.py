@@ -230,6 +230,7 @@ class LinearObserver:
         matrix = self._at(self._c, "output_matrix", self.step)
         noise = self._noise.at("noise", self.step)
         if self._cover.members > 1:
+            # A run without any measured output has no measurement to count.
             is_missing = np.isnan(y)
             y = self._cover.used(y, self._measured)
             self._measured += ~is_missing.all(axis=1) if some(is_missing) else 1
@@ -419,6 +420,7 @@ class LinearObserver:
             step = smoothed[i].step
             motion = self._motion(step, rows[i])
             sets = smoothed[i].sets.preimage_cut(smoothed[i + 1].sets, motion)
+            # With the record of the last estimate, because the set agrees with all of it.
             smoothed[i] = replace(smoothed[-1], step=step, sets=sets)
         return smoothed
 
@@ -520,6 +522,8 @@ class _Noise:
             errors = self.polytope
             if not pattern.all():
                 errors = errors.project(np.flatnonzero(pattern).tolist())
+            # rows v <= upper with v = y - C x: a lower end of rows C x. Elements of `y` in runs of
+            # other groups may be NaN: their strips do not exist.
             rows, upper = errors.constraints()
             heights = y[:, pattern] @ rows.T
             terms = np.abs(np.nan_to_num(y[:, pattern])) @ np.abs(rows).T + np.abs(upper)

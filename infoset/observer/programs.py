@@ -180,9 +180,11 @@ class Program:
         cost = direction @ lines.state.matrix
         goal[lines.state.first : lines.state.first + len(cost)] = -cost
         length = float(np.abs(cost).max(initial=0.0))
+        # No unknown changes direction . x: the sum needs no multipliers.
         if length == 0.0:
             return self._sum(direction, np.zeros(len(lines.levels)))
 
+        # The solver minimises: the goal is minus direction . x, in units of its largest entry.
         optimum = linprog(
             goal / length, None, None, lines.rows, lines.levels, lines.limits, options=_OPTIONS
         )
@@ -208,6 +210,7 @@ class Program:
         optimum = linprog(goal, None, None, rows, lines.levels, limits, options=_OPTIONS)
         if optimum.status != 0 or optimum.fun <= 0.0:
             return False
+        # If there is a motion, the sum is an upper bound of 0 . x, which is 0.
         return self._sum(np.zeros(self._states), -optimum.eqlin.marginals) < 0.0
 
     def _sum(self, direction: Floats, marginals: Floats) -> float:
@@ -242,6 +245,7 @@ class Program:
         costate = np.zeros(self._states)
         for k in range(len(self._stages) - 1, -1, -1):
             stage = self._stages[k]
+            # The motion of the last stage leads out of the program (`Window.before`).
             motion = stage.motion if k < len(self._stages) - 1 else None
             if motion is not None:
                 parts += self._parts_of_motion(motion, stage.sizes, costate)

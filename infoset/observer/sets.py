@@ -71,7 +71,7 @@ class Motion:
 
     @property
     def reversed_sum(self) -> Motion:
-        """The step x - shift - w."""
+        """The step x - shift - w; the set of -w is the image of W under -1."""
         unit = np.eye(len(self.matrix))
         return Motion(unit, -self.shifts, self.terms, -unit @ self.disturbance)
 
@@ -222,6 +222,7 @@ class RunPolytope:
         if one.is_empty or one.dimension == one.space:
             return self
         sizes = np.maximum(self.sizes, sizes)
+        # A coordinate that is always zero has the size 1.
         return replace(self, polytope=one.enlarged(REDUCED * np.where(sizes > 0.0, sizes, 1.0)))
 
     def limited(self) -> RunPolytope:
@@ -265,10 +266,12 @@ class RunPolytope:
         else:
             one = one.minkowski_sum(polytope_of(disturbance))
         moved = replace(moved, polytope=one)
+        # Only to refuse a set of too many vertices.
         if self.max_facets is None:
             moved = moved.limited()
 
         widths = np.ptp(one.vertices, axis=0) if not one.is_empty else 0.0
+        # `solid` returns the set itself if it is not flat.
         slack = POLYTOPE_SLACK if was_solid and moved.solid(terms) is moved else REDUCED
         return replace(moved, polytope=moved.polytope.enlarged(SUM_SLACK * terms + slack * widths))
 
@@ -278,7 +281,8 @@ class RunPolytope:
         The distances have the shape (r,).
         """
         terms = np.abs(strips.normals) @ self.sizes + strips.terms[run]
-        # A row that is short in the units of the states counts like others.
+        # A row that is short in the units of the states counts like others. The units are powers of
+        # two, so that products with them are not rounded.
         unit = np.ldexp(1.0, -np.frexp(np.maximum(terms, _MIN_TERM))[1])
         normals = strips.normals * unit[:, None]
 

@@ -187,6 +187,8 @@ def enlarge(
     meets there, two to four. The division at extremes is correct for edges of a few ulp with a
     wrong direction.
     """
+    # `ends[k]` is the vertex between the parts k and k + 1, of k modulo 4. If the lowest vertex is
+    # extreme along other axes too, the boundary begins with a part before 0.
     ends = extremes(points, count)
     low = ends[0]
     part = 0
@@ -360,6 +362,7 @@ def update_all(sets: Batch, strips: Strips, excess: Floats, out: Batch) -> None:
             minimum = strips.lower[b, r] - more
             maximum = strips.upper[b, r] + more
 
+            # The height of all points along a zero normal is 0.
             if normal_x == 0.0 and normal_y == 0.0:
                 overlap = min(maximum, -minimum)
                 count = count if overlap >= 0.0 else 0
@@ -403,6 +406,7 @@ def cut_to_preimage(sets: Batch, later: Batch, matrix: Floats, out: Batch) -> No
             level = polygon.height(other, top, normal_x, normal_y)
             level += CUT_SLACK * (abs(normal_x) * terms_x + abs(normal_y) * terms_y)
 
+            # normal . (matrix x) is the height of x along this vector; 0 for all x if it is zero.
             mapped_x = matrix[0, 0] * normal_x + matrix[1, 0] * normal_y
             mapped_y = matrix[0, 1] * normal_x + matrix[1, 1] * normal_y
             if mapped_x == 0.0 and mapped_y == 0.0:

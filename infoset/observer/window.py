@@ -192,6 +192,7 @@ class Window:
         program = self._up_to(last, row - 1)
         below = stage.lower[row] - program.bound(normal)
         above = -program.bound(-normal) - stage.upper[row]
+        # A bound that the solver does not find is infinite, and gives no excess.
         excess = max(float(below), float(above), 0.0)
         return Contradiction(stage.step, int(stage.outputs[row]), excess)
 
@@ -217,6 +218,7 @@ def exact_hull(initial: Set, record: Sequence[Motion | Strips], run: int, step: 
     if window.is_known_empty:
         return np.full((2, n), np.nan)
 
+    # The record is whole: the number of a stage is its step.
     program = Program(window.stages, step)
     lower = [-program.bound(-unit) for unit in np.eye(n)]
     upper = [program.bound(unit) for unit in np.eye(n)]
@@ -297,6 +299,7 @@ def moved(one: Zonotope, motion: Motion) -> Zonotope:
     matrix = motion.matrix
     w = _zonotope_of(motion.disturbance)
     terms = motion.sums_of_terms(sizes_of(one))
+    # Each coordinate is a sum of n products, and of the shift and w.
     slack = (SUM_SLACK + len(matrix) * EPSILON) * terms
 
     centre = matrix @ one.centre + motion.shifts[0] + w.centre
@@ -312,6 +315,7 @@ def extent(one: Zonotope, normals: Floats, sizes: Floats) -> tuple[Floats, Float
     half = np.abs(normals @ one.generators.T).sum(axis=1)
     middle = normals @ one.centre
     terms = np.abs(normals) @ sizes
+    # Sums of n products and of g sizes, and a few more operations, each rounded by EPSILON / 2.
     rounding = (sum(one.generators.shape) + 4) * EPSILON * terms
     return middle + half + rounding, middle - half - rounding
 

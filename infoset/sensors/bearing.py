@@ -303,6 +303,7 @@ class AngleSensor(BearingSensor):
         """
         if self.error_at_nominal_range_y_rad is None and self.error_at_zero_range_y_rad is None:
             return self.error_bound(range_m)
+        # Ranges of the shape (B,) are those of both angles, of the shape (2, B) one for each.
         y, z = np.broadcast_to(range_m, (2, range_m.shape[-1]))
         at_nominal, at_zero = self._bounds_of_y
         return np.stack(
@@ -404,6 +405,7 @@ class Camera(BearingSensor):
         It does not increase at distances d below the centroid error c, where c/d is greater than 1
         rad.
         """
+        # Without a centroid error the quotient is 0 at any distance: 1 m only avoids 0 / 0.
         distance: RangeOrRanges = np.maximum(range_m, self.centroid_error_m or 1.0)
         return self.constant_error_rad + self.centroid_error_m / distance
 
@@ -483,7 +485,10 @@ class OffsetCamera(Camera):
 
     @cached_property
     def _planar(self) -> dict[str, OffsetCamera]:
-        """The sensors of both plane angles, which strategies need at every step."""
+        """The sensors of both plane angles, which strategies need at every step.
+
+        The last offset is along z; the first one is along y in space, the same in a plane.
+        """
         return {
             "y": replace(self, offset_m=self.offset_m[:1]),
             "z": replace(self, offset_m=self.offset_m[-1:]),
@@ -514,6 +519,7 @@ class OffsetCamera(Camera):
     def error_bound(self, range_m: RangeOrRanges) -> RangeOrRanges:
         """Return the error bound of the set at a range (m), rad; in space of the angle of z."""
         centroid_m = self.centroid_bound_m
+        # 1 m only avoids 0 / 0, see `Camera.error_bound`.
         distance: RangeOrRanges = np.maximum(range_m, centroid_m or 1.0)
         return self.constant_error_rad + centroid_m / distance
 
@@ -524,6 +530,7 @@ class OffsetCamera(Camera):
         """
         if len(self.offset_m) == 1:
             return self.error_bound(range_m)
+        # Ranges of the shape (B,) are those of both angles, of the shape (2, B) one for each.
         y, z = np.broadcast_to(range_m, (2, range_m.shape[-1]))
         return np.stack([self.axis("y").error_bound(y), self.error_bound(z)])
 

@@ -51,6 +51,7 @@ def offset_share(phase_rad: float, law: Brightness) -> float:
     the longitude l from the line of sight toward the Sun, the latitude b, mu = cos(b) cos(l) and
     mu0 = cos(b) cos(l - phi); f is mu0, mu0 / (mu0 + mu), or 1 for a binary image.
     """
+    # The logarithm of `_lommel_seeliger` is infinite there.
     if phase_rad == 0.0:
         return 0.0
     if law is Brightness.LAMBERT:
@@ -59,6 +60,7 @@ def offset_share(phase_rad: float, law: Brightness) -> float:
         return _lommel_seeliger(phase_rad)
     if law is Brightness.MEAN:
         return 0.5 * (_lambert(phase_rad) + _lommel_seeliger(phase_rad))
+    # The centre of the lit area, the closed form of k for f = 1.
     return 8.0 / (3.0 * math.pi) * math.sin(0.5 * phase_rad) ** 2
 
 
@@ -68,11 +70,13 @@ def _lit_part(phase_rad: float) -> float:
 
 
 def _lambert(phase_rad: float) -> float:
+    """Return k of `offset_share` for f = mu0, in closed form."""
     numerator = math.sin(phase_rad) * (1.0 + math.cos(phase_rad))
     return 3.0 * math.pi / 16.0 * numerator / _lit_part(phase_rad)
 
 
 def _lommel_seeliger(phase_rad: float) -> float:
+    """Return k of `offset_share` for f = mu0 / (mu0 + mu), in closed form; the phase is not 0."""
     half_rad = 0.5 * phase_rad
     logarithm = -math.log(math.tan(0.5 * half_rad))
     denominator = 1.0 - math.sin(half_rad) * math.tan(half_rad) * logarithm

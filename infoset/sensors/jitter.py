@@ -95,6 +95,7 @@ def jitter(
     drift = _integral(psd, constant_hz, slow_hz)
     constant = quad(psd, 0.0, constant_hz)[0]
 
+    # With the image at the start.
     images = flight_s / period_s + 1.0
     tail = (1.0 - confidence) / (2.0 * AXES * (2.0 * images + 1.0))
     sigmas = float(-ndtri(tail))

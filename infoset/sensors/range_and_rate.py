@@ -129,6 +129,7 @@ class RateSensor(Checked, Sensor):
         with 4 q^2 in Lemma 20 of docs/guarantee-bound.md, where q is `slope`.
         """
         change_m = np.abs(apart.predicted_miss_m) + 4.0 * apart.slope**2 * np.abs(apart.offset_m)
+        # Half of the change over the half-width for one bound: the half-width for two bounds.
         return np.asarray(
             change_m.max(axis=0) / self.band(apart.range_m, apart.closing_speed_m_s, 2.0)[1]
         )

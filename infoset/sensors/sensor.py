@@ -56,6 +56,7 @@ def along_x_m(alpha_rad: Floats, range_m: Floats) -> Floats:
 
     It is negative behind x = 0, where an angle is beyond a right one.
     """
+    # The cosines of all axes have the sign of x.
     slope = np.tan(alpha_rad)
     distance_per_x = np.sqrt(1.0 + (slope * slope).sum(axis=0))
     return np.asarray(np.copysign(range_m / distance_per_x, np.cos(alpha_rad[0])))
