@@ -49,8 +49,8 @@ LONGEST_BURN = 1.0 + 1e-9
 _APPROACH = Limits(below=0.0)
 _SECTIONS = Limits(minimum=1, maximum=MAX_SECTIONS, whole=True)
 _IMAGE_CLASSES = Limits(minimum=3, maximum=16, whole=True)
-"""Number G of classes, at least q + 2. The maximum is chosen: with q = 1 there are G sets, and the
-time of a flight grows with them."""
+"""Number G of classes, at least q + 2, where q is at least 1. The maximum is chosen: with q = 1
+there are G sets, and the time of a flight grows with them."""
 MAX_SETS = 64
 """Maximum number C(G, q) of sets of an engagement, to limit the time and the memory of a flight.
 Chosen: q = 3 with its default of 8 classes gives 56."""

@@ -527,7 +527,10 @@ def outline(section: SectionView, tau: float, out: Floats) -> int:
 
 @allocation_free
 def meets(points: Floats, i: int, v: float, z: float, reach: float, tau: float) -> bool:
-    """Whether a vertex equals (V, z) to within the rounding error of a change of chains."""
+    """Whether a vertex equals (V, z) to within the rounding error of a change of chains.
+
+    The terms of z = m - tau V are at most |z| + 2 tau `reach` in all, where `reach` bounds |V|.
+    """
     close_v = abs(points[i, 0] - v) <= 4.0 * EPSILON * reach
     return bool(close_v and abs(points[i, 1] - z) <= 4.0 * EPSILON * (abs(z) + 2.0 * tau * reach))
 
@@ -544,8 +547,8 @@ def reduce_outward(section: SectionView, tau: float, points: Floats) -> None:
 
     An edge is removed by extending its neighbours to their intersection; the edge that adds the
     minimum area is removed first. Vertices that are not convex because of rounding are removed
-    before. If too few edges can be removed, three sides of a box around the chain replace it. The
-    peak of the chain is not known afterwards (`find_peak`).
+    before. If too few edges can be removed, three sides of a box around the chain replace it, along
+    the level of the time to go `tau`. The peak of the chain is not known afterwards (`find_peak`).
 
     `points` is a working array (`working_room`): its first CAPACITY + 2 rows hold the chain, and
     the others, at least 2 CAPACITY, the tree of `drop_inner_edges`.

@@ -269,6 +269,7 @@ class GuaranteedMiss:
             bound_all(leaving, past_of(history, laws), outlines, pieces, phi)
         # A miss is not negative; minus infinity stands for none.
         exists = phi >= 0.0
+        # A true miss is at most 1 + eta times the miss in the scale of the model.
         factor = (1.0 + self._speed_error) * (1.0 + SLACK)
         return np.where(exists, (phi + MISS_ROUNDING * self._law.label_max) * factor, 0.0), exists
 

@@ -13,7 +13,8 @@ from infoset.arrays import Flags, Floats, Integers
 ANGLE, IMPULSE, PREDICTION, RATE, WIDENING = range(5)
 """Kinds of events."""
 ROOM_AT_START = 64
-"""Initial room of a history, in events; it is doubled when it is full."""
+"""Initial room of a history, in events; it is doubled when it is full. Chosen: it changes only how
+often the arrays are copied."""
 
 
 class EventLog(NamedTuple):

@@ -315,6 +315,8 @@ def change_of_miss_at(
 ) -> tuple[float, float]:
     """Return the changes of the predicted miss of a label by an impulse, m, to be subtracted from
     the upper and from the lower one: the least and the greatest one for all errors of the engine.
+
+    `tau` is the time to go of the label when the impulse is given, or the burn starts.
     """
     if law.burn_time > 0.0:
         burn = burn_of(impulse, across, law)

@@ -68,7 +68,7 @@ class Workspace(NamedTuple):
     four : recarray of EVALUATED, shape (4,)
         The labels of a bracket and the one evaluated between them, in increasing order.
     latest : ndarray, shape (2, 4)
-        Labels and overlaps of those that became empty at the latest event.
+        Labels and overlaps of those in `four` that became empty at the latest event.
     windows : recarray of WINDOW, shape (MAX_HALVED_WINDOWS + 2,)
         Windows of labels to be searched. One halving puts at most two in the place of one.
     unproved : ndarray of bool, shape (1,)

@@ -231,6 +231,7 @@ class Estimate:
         lists with a member for each run. With wrong measurements, the vertices of a run are a list
         for each set.
         """
+        # The bounds of an empty set are NaN.
         lower = np.atleast_2d(self.lower)
         is_empty: Flags = np.asarray(np.isnan(lower).any(axis=1))
         columns: dict[str, list[Any]] = {"is_empty": is_empty.tolist()}

@@ -167,6 +167,7 @@ class LinearObserver:
         initial = self._initial
         sets = self._runs * self._cover.members
         if self.states == 2:
+            # Of a batch, the polygon of each run is repeated for the members of the run.
             if isinstance(initial, ConvexPolygons) and initial.shape:
                 initial = ConvexPolygons.unchecked(
                     self._cover.repeated(initial.vertices), self._cover.repeated(initial.counts)
@@ -182,6 +183,7 @@ class LinearObserver:
         """Whether the sets may be larger than the exact ones, whose widths then need the record."""
         if self.states > MAX_POLYTOPE_STATES:
             return self.window is not None
+        # Reductions of polygons, the sets of two states, are not recorded.
         return self.states != 2 and self.max_facets is not None
 
     def predict(self, inputs: ArrayLike | None = None, *, disturbance: Set | None = None) -> None:
@@ -427,6 +429,7 @@ class LinearObserver:
     def _motion(self, step: int, inputs: ArrayLike | None) -> Motion:
         """Return the motion from a step to the next one."""
         matrix = self._at(self._a, "state_matrix", step)
+        # Shape (1, n), the same for all runs.
         offset = self._at(self._offset, "offset", step, 1)[None]
         w = self._replaced.get(step)
         if w is None:
@@ -507,7 +510,9 @@ class _Noise:
         """Return the strips of C x = y - v for groups of runs.
 
         The same outputs are measured in the runs of a group; others are NaN. A strip with NaN ends
-        does not exist. For a polytope, runs without any measured output are in no group.
+        does not exist. A box is one group, because its outputs have strips of their own. For a
+        polytope, whose projection depends on the measured outputs, there is a group for each choice
+        of them, and runs without any measured output are in no group.
         """
         if self.polytope is None:
             strips = Strips(matrix, y - self.half, y + self.half, np.abs(y) + self.half)

@@ -162,6 +162,7 @@ def corner(part: int) -> tuple[float, float]:
 
     Part 0 is before the lowest vertex, and parts follow counter-clockwise.
     """
+    # The part modulo 4, of negative ones too.
     k = part & 3
     return (1.0 if 0 < k < 3 else -1.0), (1.0 if k >= 2 else -1.0)
 

@@ -141,6 +141,7 @@ class Window:
             return replace(self, contradiction=where)
 
         cut = stage.with_strips(normals, lower, upper, outputs)
+        # Where a strip goes beyond the zonotope, its end is moved to the zonotope.
         low = np.maximum(lower, bottom)
         high = np.minimum(upper, top)
         part = corrected_by_strips(self.carried.centre, self.carried.generators, normals, low, high)

@@ -31,7 +31,8 @@ rounding of an angle. `error_bound` and `error_bounds` of the whole sensor still
 
 
 _PHASE = Limits(minimum=0.0, maximum=math.radians(170.0))
-"""Limits of a phase angle; beyond, the lit part is too narrow for a centre of brightness."""
+"""Limits of a phase angle; beyond, the lit part, less than 0.8 % of the disc, is too narrow for a
+centre of brightness. The maximum is chosen."""
 _TURN = Limits(minimum=-2.0 * math.pi, maximum=2.0 * math.pi)
 """Limits of an angle in a plane: any turn, counted from -180 or from 0 degrees."""
 
@@ -547,6 +548,7 @@ class OffsetCamera(Camera):
         difference of 1/x.
         """
         lengths_m = np.reshape(np.abs(self.offset_m), (-1, 1))
+        # `range_m` is the smaller of both ranges: a bound of the difference of 1/x.
         inverse = apart.shift_m / apart.range_m**2
         angles = np.abs(apart.offset_m) / apart.range_m + lengths_m * inverse
         bounds = np.minimum(

@@ -68,6 +68,7 @@ class RangeSensor(Checked, Sensor):
 
     def share(self, apart: Apart) -> Floats:
         """Return half of the maximum difference of the distances, in units of the bound, (n,)."""
+        # A distance changes by at most the slope times the change across x, and the change of x.
         difference_m = apart.slope * np.hypot.reduce(apart.offset_m) + apart.shift_m
         return np.asarray(difference_m / (2.0 * self.relative_error * apart.range_m))
 
