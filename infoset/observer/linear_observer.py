@@ -57,8 +57,9 @@ class LinearObserver:
         Number B of runs. Without it there is one run, and its arrays have no axis of runs.
     max_facets : int or None, optional
         Maximum number of facets of a polytope after a measurement, at least 2n; it then has at most
-        700 vertices. None keeps the sets exact; a set of more than 5000 vertices is then an
-        ArithmeticError. Not used for two and for more than four states.
+        700 vertices. More facets give smaller sets and take longer. None keeps the sets exact; a
+        set of more than 5000 vertices is then an ArithmeticError. Not used for two and for more
+        than four states.
     window : int or None, optional
         Number of steps of the linear programs of five and more states. None is the whole record:
         bounds are then exact, and their time grows with the record. Not used for fewer states.
