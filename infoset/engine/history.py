@@ -140,6 +140,16 @@ class History:
         """Whether the latest event is of a kind."""
         return self.events > 0 and bool(self.kinds[self.events - 1] == kind)
 
+    def shifted_in_step(self) -> Flags:
+        """Return which engagements have had an impulse since the last prediction, shape (B,)."""
+        shifted = np.zeros(self.applies.shape[1], dtype=bool)
+        for event in range(self.events - 1, -1, -1):
+            if self.kinds[event] == PREDICTION:
+                break
+            if self.kinds[event] == IMPULSE:
+                shifted |= self.applies[event]
+        return shifted
+
     def total_impulse(self) -> Floats:
         """Return the sum of the impulses' magnitudes in each engagement, m/s, shape (B,)."""
         new = self._summed + np.flatnonzero(self.kinds[self._summed : self.events] == IMPULSE)

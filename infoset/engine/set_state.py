@@ -473,7 +473,7 @@ class SetState:
         if not some(active):
             return
 
-        self._check_burns(impulse[:, active])
+        self._check_burns(impulse[:, active], active)
         self.history.record(IMPULSE, impulse, active)
         self._catch_up()
         if self.law.burn_time > 0.0:
@@ -481,8 +481,10 @@ class SetState:
             self._make_room(active)
         section_passes.shift_all(active, impulse, self.elapsed, self.sections, self.table)
 
-    def _check_burns(self, impulse: Floats) -> None:
-        """Refuse burns that may not end within the step, or before the nearest label arrives."""
+    def _check_burns(self, impulse: Floats, active: Flags) -> None:
+        """Refuse burns that may not end within the step or before the nearest label arrives, and a
+        second burn in a step: both would begin at its start, and `MAX_ADDED` counts one.
+        """
         size_m_s = float(np.hypot.reduce(impulse, axis=0).max())
         longest_s = self.model.burn_s(size_m_s)
         if longest_s == 0.0:
@@ -493,6 +495,10 @@ class SetState:
                 f"a burn must end within the step of {self.model.step_s:g} s, and before the "
                 f"earliest possible arrival in {arrival_s:.6g} s: {size_m_s:g} m/s may last "
                 f"{longest_s:.6g} s"
+            )
+        if (self.history.shifted_in_step() & active).any():
+            raise ValueError(
+                "a step has one burn: add the impulses, or call predict between the burns"
             )
 
     def _check_no_burn(self) -> None:

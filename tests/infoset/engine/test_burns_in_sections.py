@@ -154,6 +154,11 @@ def test_a_burn_that_is_too_long_or_before_an_image_is_refused() -> None:
     information.predict()
     information.measure_angle(0.0)
 
+    information.shift(0.8, where=False)
+    information.shift(0.4)
+    with pytest.raises(ValueError, match="a step has one burn"):
+        information.shift(0.4)
+
     near = InformationSet(replace(MODEL, bounds=replace(BOX, x_m=(5.5e5, 5.6e5))))
     near.predict()
     with pytest.raises(ValueError, match="earliest possible arrival"):
