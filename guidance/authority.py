@@ -32,9 +32,10 @@ def correctable_later_m(situation: Situation, range_m: Floats) -> Floats:
 
     # An impulse of maximum size in each of the next steps.
     to_go_s = range_at_impulse(range_m, e, situation.lead_s) / e
+    # Steps after the impulse that is decided now and before the arrival: none at it.
     steps = np.ceil(to_go_s / step_s) - 1.0
     full = np.clip(np.floor(budget / thruster.max_impulse_m_s), 0.0, np.maximum(steps, 0.0))
-    # A burn acts at its middle.
+    # A burn acts at its middle. The sum of the times to go j steps later, for j = 1 to `full`:
     to_go_s = to_go_s - 0.5 * thruster.burn_s(thruster.max_impulse_m_s)
     return np.asarray(
         thruster.max_impulse_m_s * (full * to_go_s - step_s * 0.5 * full * (full + 1.0))
@@ -60,6 +61,7 @@ def correctable_m(
     first : ndarray of int or int
         Index of the first impulse that counts, at most n.
     """
+    # Impulses from `first` on that are before x = 0.
     possible = np.maximum(np.searchsorted(times_s, to_go_s) - first, 0)
     full = np.minimum(budget // thruster.max_impulse_m_s, possible).astype(np.int64)
     rest = np.minimum(budget - full * thruster.max_impulse_m_s, thruster.max_impulse_m_s)
@@ -67,9 +69,10 @@ def correctable_m(
 
     # The sum of the times to go of the impulses from `first` to `end`, by sums of all times.
     end = first + full
-    times_s = times_s[: end.max(initial=0) + 1]
+    times_s = times_s[: end.max(initial=0) + 1]  # later ones are not needed
     sums_s = np.append(0.0, np.cumsum(times_s))
-    # After the last time the rest is zero: any number will do.
+    # The rest is given at the time after the full impulses. Where this would be after the last one,
+    # the rest is zero: any number will do.
     next_s = np.append(times_s, 0.0)[end]
     # A burn acts at its middle.
     of_full_s = to_go_s - 0.5 * thruster.burn_s(thruster.max_impulse_m_s)
@@ -92,6 +95,7 @@ def max_correctable_m(
     For burns it is an upper bound: a longer burn also acts later. The default budget is no limit.
     """
     if budget is None:
+        # One impulse more than there are times: no rounding of the quotient loses one.
         budget = thruster.max_impulse_m_s * (len(times_s) + 1.0)
     commanded_m = correctable_m(times_s, thruster, np.asarray(budget), to_go_s, first)
     return (1.0 + thruster.execution_error_relative) * commanded_m

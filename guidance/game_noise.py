@@ -95,8 +95,10 @@ class GameNoise:
 
     @property
     def truth_side(self) -> Floats:
-        """Side to which the shift moves the true state: 1 or -1, 0 for no shift.
+        """Side of the set to which the shift moves the true state: 1 or -1, 0 for no shift.
 
+        With `TieRule.UPPER` the measured position moves up, and with it the set: the true state is
+        then on its lower side. A `target_side` replaces this side.
         The shape is () or (C, B).
         """
         if self.shift_m is None or self.tie not in (TieRule.UPPER, TieRule.LOWER):
@@ -131,7 +133,7 @@ class GameNoise:
         if self.tie is TieRule.RANDOM:
             at_tie = draws_of_step("tie_draws", self.tie_draws, step, is_tie.shape) >= 0.0
         elif self.tie is TieRule.ALTERNATE:
-            at_tie = step % 2 == 0
+            at_tie = step % 2 == 0  # the upper extreme first, in step 0
         else:
             at_tie = self.tie is TieRule.UPPER
         return np.where(is_tie, at_tie, upper > lower)
@@ -197,7 +199,7 @@ def _range(
     error = sensor.relative_error
     if len(upper_is_worse) > 1:
         worst, other = _ranges_of_corners(predicted, upper_is_worse)
-    else:  # the corners of an interval are its ends
+    else:  # in a plane there is one axis, and the corners of an interval are its ends
         worst = np.where(upper_is_worse, upper, lower)[0]
         other = np.where(upper_is_worse, lower, upper)[0]
     minimum, maximum = predicted.stored_range_interval_m()
@@ -231,6 +233,7 @@ def _ranges_of_corners(
     other = signed_modulus(np.where(is_upper, lower, upper))
     ranges = predicted.ranges_m
     feasible = predicted.feasible & (ranges != 0.0)
+    # Where no section counts, the set is empty, and the result is not used (`measure`).
     rows = np.arange(len(ranges))
     worst_section = np.where(feasible, worst, -np.inf).argmax(axis=1)
     other_section = np.where(feasible, other, np.inf).argmin(axis=1)

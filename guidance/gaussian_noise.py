@@ -30,6 +30,7 @@ def truncated_gaussian(uniform: Floats, sigma: float) -> Floats:
     size = np.abs(uniform)
     # The probability of a larger error of this sign, without the truncation.
     tail = 0.5 * (1.0 - size) + size * ndtr(-1.0 / sigma)
+    # Rounding may exceed the bound.
     error = np.minimum(-sigma * ndtri(tail), 1.0)
     return np.asarray(np.copysign(error, uniform))
 

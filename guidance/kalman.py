@@ -149,6 +149,7 @@ class KalmanBank:
 
         precise = self._is_precise(gradient, variance)
         if precise.any():
+            # Engagements without an image have NaN; their filters do not use the zero.
             measured = np.where(situation.is_new("angle"), situation.measured["angle"], 0.0)
             alpha = measured[..., None]
             # The equation z = x tan(alpha), times cos^2(alpha) / x, for an innovation in radians.
@@ -230,6 +231,7 @@ class KalmanBank:
     def _set_prior(self, situation: Situation) -> None:
         model = situation.information.model
         bounds = model.bounds
+        # Each filter has the middle of its interval of the range; the closing speed is minus vx.
         edges = np.linspace(*bounds.x_m, MEMBERS + 1)
         stretch = (bounds.x_m[1] - bounds.x_m[0]) / MEMBERS
         self.mean[..., X] = 0.5 * (edges[:-1] + edges[1:])
@@ -246,7 +248,8 @@ class KalmanBank:
                 np.ptp(bounds.vx_m_s),
                 2.0 * plane.acceleration_m_s2,
             ]
-            # The variance of a uniform distribution is a twelfth of the square of its width.
+            # The variance of a uniform distribution is a twelfth of the square of its width. The
+            # last width is for filters that estimate the acceleration.
             self.covariance[axis] = np.diag(np.square(widths[: self.mean.shape[-1]]) / 12.0)
 
     def _predict(self, situation: Situation) -> None:
@@ -255,14 +258,16 @@ class KalmanBank:
         impulse = situation.last_impulse_m_s
         self.mean[..., VZ] -= impulse[..., None]
         if situation.thruster.acceleration_m_s2 is not None:
-            # A burn acts at its middle.
+            # A burn acts at its middle, half its duration after the start of the step, and the line
+            # above counts it from the start: this is what it moves the offset less.
             late_m = 0.5 * situation.thruster.burn_s(modulus(impulse)) * impulse
             self.mean[..., Z] += late_m[..., None]
         motion = np.eye(self.mean.shape[-1])
         motion[Z, VZ] = step_s
         motion[X, SPEED] = -step_s
 
-        # Noise of the process: one acceleration for a step, or the change of the estimated one.
+        # Noise of the process: an acceleration that is constant for a step and new in the next one,
+        # or the change of the estimated acceleration in this step.
         push = np.array([0.5 * step_s**2, step_s, 0.0, 0.0])
         accelerations = np.array([model.axis(name).acceleration_m_s2 for name in model.axes])
         variance = accelerations**2 / 3.0
@@ -270,6 +275,7 @@ class KalmanBank:
             motion[Z, ACCELERATION] = push[0]
             motion[VZ, ACCELERATION] = push[1]
             push = np.array([*push, 1.0])
+            # The share of a flight from the maximum range that a step takes.
             variance *= step_s * situation.closing_speed_m_s / model.bounds.x_m[1]
         if situation.thruster.execution_error_relative > 0.0:
             error = situation.thruster.execution_error_relative * situation.last_impulse_m_s
@@ -291,6 +297,7 @@ class KalmanBank:
 
         It is Joseph's form, for precise measurements Potter's.
         """
+        # Engagements without a measurement have NaN; with a gain of zero they do not use the zero.
         new = situation.is_new(sensor)
         innovation = np.where(new, situation.measured[sensor], 0.0)[..., None] - expected
         if self._gate_sigma is not None:
@@ -299,6 +306,7 @@ class KalmanBank:
         precise = self._is_precise(gradient, variance)
         if precise.any():
             self._measure_precisely(new & precise, innovation, expected, gradient, variance)
+            # Their gain is zero below, for which any variance that is not zero will do.
             new = new & ~precise
             variance = np.where(precise, 1.0, variance)
 
@@ -384,6 +392,7 @@ def _independent_error_rad(model: SetModel, range_m: Floats) -> Floats:
     """
 
     def independent(sensor: BearingSensor, distance_m: Floats) -> Floats:
+        # Without a centroid error the constant part is zero: any positive divisor, 1 m, will do.
         nearest_m = np.maximum(distance_m, sensor.centroid_bound_m or 1.0)
         return np.asarray(sensor.error_bound(distance_m) - _constant_part_m(sensor) / nearest_m)
 

@@ -24,8 +24,8 @@ MIN_AUTHORITY_M = 1e-9
 misses, so that the effort is then far above 1. Misses are the same from 1e-12 to 1e-3 (measured).
 """
 NO_DEMAND_M = 1e200
-"""An excluded label has the interval from this to minus this: it never decides. Its product with a
-share, at most 1e9, is finite.
+"""An excluded label has the interval from this to minus this: it never decides, and neither does a
+label between it and a feasible section. Its product with a share, at most 1e9, is finite.
 """
 TRIALS = 60
 """Maximum number of trials of an impulse, a guard: bisections alone end after 44 of them, by
@@ -82,6 +82,7 @@ class LeastEffort:
         upper = _between(np.where(feasible, maximum - pending, -NO_DEMAND_M))
 
         ranges = _between(ranges_m)
+        # vx is negative: x decreases.
         fastest = max(e, *(-vx for vx in view.model.bounds.vx_m_s)) / e
         authority = correctable_later_m(situation, ranges) / fastest
         to_go_s = range_at_impulse(ranges, e, situation.lead_s) / e
@@ -116,12 +117,16 @@ def unavoidable_m(situation: Situation) -> Floats:
     thruster = situation.thruster
     e = situation.closing_speed_m_s
     x0 = whole.bounds.x_m[0]
+    # Times to go tau of last steps in which the motions look alike, at ranges e tau below x0; and
+    # what full impulses at the steps after each of them correct, whatever budget is left.
     to_go_s: Floats = whole.step_s * np.arange(1.0, math.ceil(x0 / (e * whole.step_s)))
     correctable_m = thruster.max_impulse_m_s * (np.cumsum(to_go_s) - to_go_s)
     for axis, model in enumerate(map(whole.axis, whole.axes)):
         box = model.seen_bounds
         h = model.angle_sensor.error_bound
         apart_m = e * to_go_s * (h(e * to_go_s) + h(x0)) / (1.0 - e * to_go_s / x0)
+        # Half of the most that they can arrive apart: the lesser of what the first image and the
+        # box of positions allow, and what the velocities allow.
         widest_m = 0.5 * (min(np.ptp(box.z_m), 2.0 * h(x0) * x0) + np.ptp(box.vz_m_s) * x0 / e)
         reference_m[axis] = (np.minimum(apart_m, widest_m) - correctable_m).max(initial=0.0)
     return reference_m
@@ -134,7 +139,8 @@ def _between(values: Floats) -> Floats:
     """
     between = np.empty((*values.shape[:-1], PARTS * (values.shape[-1] - 1) + 1))
     between[..., -1] = values[..., -1]
-    # A part at a time is faster than all parts in one short inner axis.
+    # A part at a time is faster than all parts in one short inner axis. The last section has no
+    # neighbour after it, and is written before.
     for part in range(PARTS):
         share = part / PARTS
         between[..., part:-1:PARTS] = values[..., :-1] * (1.0 - share) + values[..., 1:] * share
@@ -185,10 +191,13 @@ def balance_all(
             if fall == rise or low == high:
                 break
 
+            # Falling lines decide: the minimum is at a greater u.
             if fall > rise:
                 low = u
             else:
                 high = u
+            # Two lines without a slope do not meet: `low` is not within the interval, and its
+            # middle is taken.
             slope = fall_slope + rise_slope
             u = u + (fall - rise) / slope if slope > 0.0 else low
             if not low < u < high:

@@ -81,7 +81,8 @@ class Patient(Checked):
         if situation.last_s <= lead_s + LAST_SECONDS_S:
             return symmetric
 
-        # Lower end first.
+        # Lower end first. Each end less what later impulses can correct of it is its excess, which
+        # is positive above and negative below.
         ends_m = np.stack([miss.lower_point.range_m, miss.upper_point.range_m], axis=-1)
         later_m = correctable_later_m(situation, ends_m)
         above = np.maximum(miss.upper_m - self.share * later_m[..., 1], 0.0)
@@ -95,6 +96,7 @@ class Patient(Checked):
         certain = certain_above + certain_below
         both = (above > 0.0) & (below < 0.0)
         alone = _impulse(above, upper_range, e) + _impulse(below, lower_range, e)
+        # The formula of U_s, with the excesses in place of the ends: both then have the same size.
         balanced = _impulse(above + below, upper_range + lower_range, e)
         urgent = np.where(both, balanced, alone)
 

@@ -83,9 +83,11 @@ class Predictive(Checked):
             return whole
 
         state.due_s = np.where(np.isinf(state.due_s), estimate.to_go_s / self.spacing, state.due_s)
+        # If the next decision is at or after the arrival, this is the last one.
         is_due = (estimate.to_go_s <= state.due_s) | (estimate.to_go_s <= next_s)
         wanted = np.where(is_due, whole, 0.0)
-        # The engine limits the modulus of both axes (`Thruster.give`).
+        # A manoeuvre above the limit stays due, and continues in the next step. The engine limits
+        # the modulus of both axes (`Thruster.give`).
         is_done = is_due & (modulus(wanted) <= situation.thruster.max_impulse_m_s)
         state.due_s = np.where(is_done, estimate.to_go_s / self.spacing, state.due_s)
         return wanted

@@ -92,11 +92,13 @@ class ProportionalNavigation(Checked):
             left_s, estimate.to_go_s, out=np.zeros_like(whole), where=estimate.to_go_s > 0.0
         )
         command = state.accumulated_m_s + whole * (1.0 - part**self.ratio)
+        # The sum with old commands is at most as large as the whole correction.
         command = np.clip(command, -np.abs(whole), np.abs(whole))
 
         dead_band_m_s = self.dead_band_m_s
         if dead_band_m_s is None:
             dead_band_m_s = situation.thruster.min_impulse_m_s
+        # Without time left after this decision, the whole sum is given.
         given = np.where((np.abs(command) >= dead_band_m_s) | (left_s <= 0.0), command, 0.0)
         state.accumulated_m_s = np.where(given == 0.0, command, 0.0)
         return given

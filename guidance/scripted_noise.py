@@ -123,6 +123,7 @@ class RandomNoise(ScriptedNoise):
         if not isinstance(camera, Camera):
             return errors
         if self.drift is not None:
+            # Without a bias the centroid part is in `errors`, too.
             drift = draws_of_step("drift", self.drift, sight.step, sight.shape(camera))
             errors[camera.name] = camera.with_drift(
                 sight, errors[camera.name], drift, is_whole=self.bias is None

@@ -80,6 +80,7 @@ class Situation:
 
     def is_new(self, name: str) -> Flags:
         """Return the engagements in which a sensor measured in this step, shape (B,)."""
+        # A sensor without an entry in `seen` measured in all engagements, or in none.
         all_or_none = np.full(self.budget_left_m_s.shape, name in self.new)
         return self.seen.get(name, all_or_none)
 
@@ -118,6 +119,7 @@ class Situation:
         """
         change = np.zeros((len(self.last_impulse_m_s), *time_to_go_s.shape[-2:]))
         for time_s, impulse in self.pending:
+            # A burn acts at its middle; without a thrust its duration is zero.
             middle_s = time_s + 0.5 * self.thruster.burn_s(modulus(impulse))[:, None]
             change += impulse[..., None] * np.maximum(time_to_go_s - middle_s, 0.0)
         return change

@@ -20,6 +20,7 @@ def checked_impulses(
     """
     values = np.asarray(wanted)
     shape = situation.last_impulse_m_s.shape
+    # Numbers that are not bool, complex, text or objects.
     is_real = values.dtype.kind in "fiu" and not isinstance(wanted, np.ma.MaskedArray)
     if is_real and values.shape == shape:
         finite = np.isfinite(values)
@@ -47,5 +48,7 @@ class Strategy(Protocol):
     def decide(self, situation: Situation, state: Any) -> Floats:
         """Return the impulses of a step along the lateral axes, m/s, shape (C, B).
 
+        An impulse is subtracted from the lateral velocity: a positive one decreases the (signed)
+        miss.
         The state is the return value of `start`; it may be changed.
         """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from functools import reduce
 from itertools import pairwise
 from typing import Annotated, TypeVar
@@ -23,6 +24,8 @@ _DELAY = Limits(minimum=0, maximum=MAX_IMPULSES, whole=True)
 """Limits of a delay in steps: at most as many as a flight has."""
 MIN_FLOAT = float(np.finfo(np.float64).smallest_subnormal)
 """Minimum divisor of an impulse: the modulus of an impulse that is not zero is not less."""
+_DIGITS = 4
+"""Number of digits of the values that a message advises; chosen: enough to type."""
 
 
 @dataclass(frozen=True)
@@ -175,6 +178,8 @@ class Thruster:
         """
         if self.acceleration_m_s2 is None or to_go_s <= 0.0:
             return impulse_m_s
+        # With the modulus k of an impulse, u tau - u^2 / (2 a) = k tau: its smaller root, without
+        # cancellation. If it has no real root, the maximum of 0 makes it 2 k.
         share = 2.0 * self.burn_s(modulus(impulse_m_s)) / to_go_s
         return np.asarray(impulse_m_s * (2.0 / (1.0 + np.sqrt(np.maximum(1.0 - share, 0.0)))))
 
@@ -184,7 +189,8 @@ class Thruster:
         Raises
         ------
         ValueError
-            If the maximum impulse is given, and its burn may be longer than a step.
+            If the maximum impulse is given, and its burn may be longer than a step; or if it is not
+            given, and the minimum impulse exceeds the impulse of a burn of one step.
         """
         acceleration_m_s2 = self.acceleration_m_s2
         if acceleration_m_s2 is None:
@@ -194,11 +200,14 @@ class Thruster:
             return replace(self, max_impulse_m_s=most_m_s)
         if self.longest_burn_s <= LONGEST_BURN * step_s:
             return self
+        # Rounded to the side on which the check above is passed, which allows for `LONGEST_BURN`.
+        shortest_s = _rounded(self.longest_burn_s / LONGEST_BURN, ROUND_CEILING)
+        greatest_m_s = _rounded(LONGEST_BURN * most_m_s, ROUND_FLOOR)
         raise ValueError(
             "thruster.max_impulse_m_s: a burn must end before the next step: a burn "
             f"of {self.max_impulse_m_s:g} m/s lasts up to {self.longest_burn_s:.4g} s, a step "
-            f"{step_s:g} s; write a step_s of at least {self.longest_burn_s:.4g}, or a "
-            f"max_impulse_m_s of at most {most_m_s:.4g}: got {self.max_impulse_m_s!r}"
+            f"{step_s:g} s; write a step_s of at least {shortest_s:g}, or a "
+            f"max_impulse_m_s of at most {greatest_m_s:g}: got {self.max_impulse_m_s!r}"
         )
 
     @property
@@ -230,6 +239,7 @@ class Thruster:
         if self.last_impulse_s is None and self.first_impulse_s is None and not self.impulses_s:
             return None
 
+        # Without a cut-off it is the arrival itself: all steps before it can have an impulse.
         last = steps_between(arrival_s, self.last_impulse_s or 0.0, step_s)
         if self.impulses_s:
             steps: Sequence[int] = [
@@ -264,7 +274,8 @@ class Thruster:
 
     def _periodic_steps(self, period_s: float, arrival_s: float, step_s: float) -> list[int]:
         """Return the steps of impulses every period, counted back from the cut-off."""
-        # The asked step is shorter than the fitted one by at most this factor (`fitted_step_s`).
+        # The asked step is shorter than the fitted one by at most this factor (`fitted_step_s`): a
+        # period of one asked step is not refused.
         fitting = 1.0 - 0.5 * step_s / arrival_s
         if period_s < step_s * fitting * (1.0 - STEP_ROUNDING):
             raise ValueError(
@@ -275,9 +286,10 @@ class Thruster:
         first_s = arrival_s if self.first_impulse_s is None else self.first_impulse_s
         last_s = self.last_impulse_s or 0.0
 
-        # The first impulse is the one nearest to first_impulse_s.
-        # Both times are a period earlier here: the last impulse may be at the arrival itself, where
-        # `steps_between` allows no step.
+        # The first impulse is the one nearest to first_impulse_s. `steps_between` counts forward in
+        # time, with times before the arrival: from the last impulse to the first one it is
+        # negative. Both times are a period earlier here: the last impulse may be at the arrival
+        # itself, where `steps_between` allows no step.
         number = 1 - steps_between(last_s + period_s, first_s + period_s, period_s)
         if number > MAX_IMPULSES:
             raise ValueError(
@@ -287,7 +299,8 @@ class Thruster:
 
         times_s = (last_s + place * period_s for place in reversed(range(number)))
         steps = (steps_between(arrival_s, time_s, step_s) for time_s in times_s)
-        # A period of one step may round two times to one step.
+        # Without first_impulse_s the period also gives impulses in the first `delay_steps` steps,
+        # which are dropped. A period of one step may round two times to one step.
         return [*dict.fromkeys(step for step in steps if step >= self.delay_steps)]
 
     def _first_step(self, arrival_s: float, step_s: float) -> int:
@@ -358,6 +371,11 @@ class Thruster:
             y, z = impulse_m_s  # only impulses in space have an error of the direction
             impulse_m_s = np.stack([cosine * y - sine * z, cosine * z + sine * y])
         return impulse_m_s
+
+
+def _rounded(value: float, rounding: str) -> float:
+    """Return a number with `_DIGITS` digits, by a rounding of `decimal`."""
+    return float(Context(prec=_DIGITS, rounding=rounding).create_decimal_from_float(value))
 
 
 def modulus(lateral: Floats) -> Floats:

@@ -42,7 +42,9 @@ class ZeroEffortMiss:
         """
         lower, upper = situation.information.predicted_miss_by_section_m()
         feasible = situation.information.feasible
-        # The addition keeps the weights positive if every section is a single point.
+        # The addition keeps the weights positive if every section is a single point. They are then
+        # divided by the greatest one, so that such weights do not underflow in the products;
+        # without a feasible section all are zero, and the second `tiny` is only a divisor.
         width = upper - lower + np.finfo(np.float64).tiny
         weight = np.where(feasible, width, 0.0)
         weight = weight / np.maximum(weight.max(axis=-1, keepdims=True), np.finfo(np.float64).tiny)

@@ -512,7 +512,8 @@ class Scenario:
         Raises
         ------
         ValueError
-            If the maximum impulse is given, and its burn may be longer than a step.
+            If the maximum impulse is given, and its burn may be longer than a step; or if it is not
+            given, and the minimum impulse exceeds the impulse of a burn of one step.
         """
         return self.thruster.limited_to(self.fitted_step_s)
 

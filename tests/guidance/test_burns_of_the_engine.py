@@ -52,6 +52,21 @@ def test_a_burn_longer_than_a_step_is_refused_with_both_remedies() -> None:
     assert "step_s of at least 60, or a max_impulse_m_s of at most 0.2:" in str(no.value)
 
 
+def test_the_advice_about_a_long_burn_is_rounded_so_that_it_can_be_followed() -> None:
+    engine = Thruster(20.0, 0.0, 1.0, thrust_N=3.0, mass_kg=20.0, execution_error_relative=0.07)
+    # 1.07 * 20 / 3 = 7.1333... s; 2 s * 0.15 / 1.07 = 0.28037... m/s.
+    with pytest.raises(ValueError, match=r"step_s of at least 7\.134, or .* at most 0\.2803:"):
+        engine.limited_to(2.0)
+    assert engine.limited_to(7.134) is engine
+    smaller = replace(engine, max_impulse_m_s=0.2803)
+    assert smaller.limited_to(2.0) is smaller
+
+
+def test_a_minimum_impulse_above_a_burn_of_a_step_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"min_impulse_m_s must not exceed max_impulse_m_s, 0\.2:"):
+        replace(ENGINE, min_impulse_m_s=0.5).limited_to(10.0)
+
+
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
