@@ -38,6 +38,7 @@ def finite_values(name: str, value: ArrayLike, *shape: str | int) -> Floats:
     if values.shape == (0,) and len(last) == 2 and not isinstance(last[1], str):
         values = values.reshape(0, last[1])
 
+    # `last` are the axes after those of the batch.
     has_axes = values.ndim >= len(last) if has_batch else values.ndim == len(last)
     if not has_axes or not _fit(values.shape[values.ndim - len(last) :], last):
         text = str(shape).replace("'", "")
@@ -59,6 +60,7 @@ def _fit(sizes: tuple[int, ...], wanted: tuple[str | int, ...]) -> bool:
 def bound_values(name: str, value: ArrayLike, *shapes: tuple[int, ...]) -> Floats:
     """Return numbers that may be infinite, of one of `shapes`; of any shape if none is given."""
     bounds = real_values(name, value)
+    # A sum of squares, infinite ones included, is NaN only if a number is NaN.
     if math.isnan(np.vdot(bounds, bounds)):
         raise ValueError(f"{name} must be a number, not NaN: got {shown(value)}")
     if shapes and bounds.shape not in shapes:
@@ -120,6 +122,7 @@ def radius_values(radius: ArrayLike, *shape: str) -> Floats:
 
 def axis_numbers(axes: ArrayLike, space: int, most: int) -> list[int]:
     """Return different axes of a space, at most `most`, from one number or several."""
+    # Whole numbers that are stored as floats are axes, too: they are equal to one of the range.
     numbers = np.atleast_1d(real_values("axes", axes))
     listed = [int(number) for number in numbers.flat if number in range(space)]
     if numbers.ndim > 1 or not 0 < len(set(listed)) == numbers.size <= most:
@@ -140,6 +143,6 @@ def need_set(name: str, value: object, kind: type[Set]) -> Set:
 
 def not_negative(name: str, value: float) -> float:
     """Return a number that is not negative."""
-    if value != 0.0:  # the default of most arguments
+    if value != 0.0:  # no check for zero, the default of most arguments: it saves time
         NOT_NEGATIVE.need(name, value)
     return value

@@ -60,6 +60,7 @@ def ring_of_geometry(geometry: BaseGeometry) -> Floats:
     if not len(points):
         return ring
 
+    # Products of an x with a height of the set, and of a y with a width: hence the reversed order.
     rounding = AREA_ROUNDING * np.abs(points).max(axis=0) @ np.ptp(points, axis=0)[::-1]
     missing = abs(geometry.convex_hull.area - geometry.area)
     if missing > rounding:

@@ -214,8 +214,9 @@ class ConvexPolygons(ConvexSet):
         """Return regular polygons around discs, or in them.
 
         The discs have a `centre`, shape (..., 2), and a `radius`, shape (...). An `outer` polygon
-        contains the disc and exceeds it by the factor 1 / cos(pi / sides); an inner polygon is
-        contained in it. Both are true up to rounding, a few ulp. O(sides), at least three.
+        contains the disc and exceeds it by the factor 1 / cos(pi / sides), with the default by 2 %;
+        an inner polygon is contained in it. Both are true up to rounding, a few ulp. O(sides), at
+        least three.
         """
         Limits(minimum=3, whole=True).need("sides", sides)
         middle = finite_values("centre", centre, "...", 2)
@@ -452,6 +453,7 @@ class ConvexPolygons(ConvexSet):
         inverse = np.zeros(matrices.shape)
         kernels.invert(matrices, inverse)
         mapped = self.translate(-start).linear_map(inverse.reshape(*self.shape, 2, 2))
+        # `invert` leaves a matrix of zeros for a singular one.
         is_regular = inverse.any(axis=(1, 2))
         if is_regular.all():
             return mapped
@@ -504,7 +506,7 @@ class ConvexPolygons(ConvexSet):
         if absent.any():
             if not one.shape and one.counts:
                 raise ValueError("the difference with an empty set is unbounded")
-            # Without a bounded difference a member of a batch is empty.
+            # Without a bounded difference a member of a batch is empty; a single set is empty here.
             one = ConvexPolygons.unchecked(one.vertices, np.where(absent, 0, one.counts))
         return one._make(_MORE_OF_DIFFERENCE, kernels.difference, *two._flat())
 
@@ -565,6 +567,7 @@ class ConvexPolygons(ConvexSet):
         """
         (axis,) = axis_numbers(axes, 2, 1)
         section = self.cut(np.eye(2)[axis], values, values)
+        # Empty members of a batch are masked by `project`.
         if not self.shape and section.is_empty:
             raise ValueError(
                 f"the line where coordinate {axis} is {shown(values)} does not meet the polygon"
@@ -591,6 +594,7 @@ class ConvexPolygons(ConvexSet):
         p <= 0; an empty set has the row 0 p <= -1. O(n^2); directions and offsets are rounded.
         """
         vertices, counts = self._flat()
+        # A segment and a point have four half-planes.
         room = max(4, vertices.shape[1])
         normals = np.zeros((counts.size, room, 2))
         offsets = np.zeros((counts.size, room))
@@ -763,6 +767,7 @@ class ConvexPolygons(ConvexSet):
         if not self.shape:
             raise ValueError(f"the empty set has no {quantity}")
 
+        # The batch has the first axes of the values; the mask is the same along all others.
         shape = empty.shape + (1,) * (values.ndim - empty.ndim)
         return np.ma.masked_array(values, np.broadcast_to(empty.reshape(shape), values.shape))
 
@@ -837,7 +842,10 @@ class ConvexPolygons(ConvexSet):
         return self.unchecked(out[:, :room].reshape(*self.shape, room, 2), made.reshape(self.shape))
 
     def _measure(self, kernel: Callable[..., None], *arguments: object) -> Floats:
-        """Apply a kernel that computes up to three numbers for each polygon, shape (..., 3)."""
+        """Apply a kernel that computes up to three numbers for each polygon, shape (..., 3).
+
+        The kernel says what the columns are; unused ones are zero.
+        """
         vertices, counts = self._flat()
         out = np.zeros((counts.size, 3))
         kernel(vertices, counts, out, *arguments)

@@ -105,7 +105,8 @@ def ring_order(points: Floats) -> Integers:
     if len(points) < 3:
         return np.arange(len(points))
 
-    # In these coordinates the polygon is as wide as it is long; an affine map keeps the order.
+    # In these coordinates the polygon is as wide as it is long; an affine map keeps the order. The
+    # first two columns belong to the plane of the polygon, the others to rounding.
     steps = points - points.mean(axis=0)
     coordinates = np.linalg.svd(steps, full_matrices=False)[0]
     return np.argsort(np.arctan2(coordinates[:, 1], coordinates[:, 0]))

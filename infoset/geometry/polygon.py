@@ -157,7 +157,7 @@ def crossing(
     x = points[near, 0] + fraction * (points[far, 0] - points[near, 0])
     y = points[near, 1] + fraction * (points[far, 1] - points[near, 1])
 
-    # A cut along an axis has its coordinate exactly.
+    # A cut along an axis has its coordinate exactly. The normal is not zero: the heights differ.
     if normal_x == 0.0:
         y = level / normal_y
     elif normal_y == 0.0:
@@ -358,6 +358,7 @@ def moments(points: Points, count: int) -> Moments:
     x = 0.0
     y = 0.0
     for i in range(1, count - 1):
+        # The centroid of a triangle, from vertex 0, is a third of the sum of its two sides.
         triangle = fan_area(points, i)
         weight += triangle
         x += triangle * ((points[i, 0] - points[0, 0]) + (points[i + 1, 0] - points[0, 0])) / 3.0

@@ -126,6 +126,7 @@ def range_meets(
         is_right = False
         for k in range(counts[i]):
             height = polygon_lines.height_over_line(along, offset[i], vertices[i, k])
+            # A vertex on the line is on both sides.
             is_left |= height >= 0.0
             is_right |= height <= 0.0
         out[i, 0] = is_left and is_right
@@ -192,7 +193,10 @@ def intersect(
 def intersect_lines(
     vertices: Floats, counts: Integers, out: Floats, made: Integers, lines: Floats
 ) -> None:
-    """Intersections of k half-planes, shape (B, k, 3, 1); the polygons give only their number."""
+    """Intersections of k half-planes, shape (B, k, 3, 1); the polygons give only their number.
+
+    The number of vertices of an unbounded set is -1 (`polygon_lines.UNBOUNDED`).
+    """
     for i in range(counts.size):
         made[i] = polygon_lines.intersect_lines(lines[i], out[i])
 
@@ -236,6 +240,7 @@ def outward_normal(points: Points, n: int, j: int) -> Point:
     x, y = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[j]
     if n == 1:
         return Point(x, y)
+    # The same four directions, turned so that the second one is along the segment.
     along = unit_vector(vertex(points, 0), vertex(points, 1))
     return Point(x * along.y + y * along.x, y * along.y - x * along.x)
 
@@ -311,7 +316,7 @@ def nearest(vertices: Floats, counts: Integers, out: Floats, point: Floats) -> N
 
 @compiled
 def support(vertices: Floats, counts: Integers, out: Floats, direction: Floats) -> None:
-    """Support functions and support vectors."""
+    """Support functions, column 0 of `out`, and support vectors (x, y), columns 1 and 2."""
     for i in range(counts.size):
         if counts[i] == 0:
             out[i, 0] = -np.inf
@@ -325,14 +330,14 @@ def support(vertices: Floats, counts: Integers, out: Floats, direction: Floats) 
 
 @compiled
 def margin(vertices: Floats, counts: Integers, out: Floats, point: Floats) -> None:
-    """Signed distances of points from the boundaries."""
+    """Signed distances of points from the boundaries, column 0 of `out`."""
     for i in range(counts.size):
         out[i, 0] = polygon.margin(vertices[i], counts[i], point[i, 0], point[i, 1])
 
 
 @compiled
 def moments(vertices: Floats, counts: Integers, out: Floats) -> None:
-    """Areas and centroids."""
+    """Areas and centroids, as columns (area, x, y). `out` is zero before."""
     for i in range(counts.size):
         if counts[i] > 0:
             found = polygon.moments(vertices[i], counts[i])
@@ -343,14 +348,14 @@ def moments(vertices: Floats, counts: Integers, out: Floats) -> None:
 
 @compiled
 def diameter(vertices: Floats, counts: Integers, out: Floats) -> None:
-    """Maximum distances between two vertices."""
+    """Maximum distances between two vertices, column 0 of `out`."""
     for i in range(counts.size):
         out[i, 0] = polygon.farthest_pair(vertices[i], counts[i]).distance
 
 
 @compiled
 def max_disc(vertices: Floats, counts: Integers, out: Floats) -> None:
-    """Centres and radii of largest discs."""
+    """Centres and radii of largest discs, as columns (x, y, radius)."""
     for i in range(counts.size):
         if counts[i] > 0:
             disc = polygon_distance.max_disc(vertices[i], counts[i])
@@ -368,6 +373,7 @@ def sample(vertices: Floats, counts: Integers, uniform: Floats, out: Floats) -> 
         if n == 0:
             continue
 
+        # `fan_area` is twice the area of a triangle, too.
         area = 2.0 * polygon.moments(points, n).area
         for j in range(uniform.shape[1]):
             # The first number chooses a triangle of the fan from vertex 0, with k and k + 1.

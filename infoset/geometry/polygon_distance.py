@@ -97,7 +97,7 @@ def max_disc(points: Points, count: int) -> Disc:
     corners, n = tidy(points, count)
     corners = corners[:n].copy()
     normals = np.empty((n, 2))
-    if n > 2:
+    if n > 2:  # a segment and a point have no disc
         write_normals(corners, n, normals)
 
     # After the normals: a short side may vanish here.
@@ -152,6 +152,7 @@ def write_corner_speeds(normals: Points, n: int, speeds: Points) -> bool:
     is_closed = True
     for i in range(n):
         h = preceding(i, n)
+        # `towards` is 1 + cos and `turn` is sin of the angle by which the corner turns.
         towards = 1.0 + normals[h, 0] * normals[i, 0] + normals[h, 1] * normals[i, 1]
         turn = normals[h, 0] * normals[i, 1] - normals[h, 1] * normals[i, 0]
         is_closed &= turn > 0.0

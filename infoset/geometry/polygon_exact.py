@@ -84,7 +84,8 @@ def exact_sum(terms: Floats) -> float:
 @compiled
 def exact_cross(u: DoubleVector, v: DoubleVector) -> float:
     """Return the cross product of two vectors within a few ulp of itself; its sign is exact."""
-    # All products of two parts with their rounding errors, from the smallest to the largest.
+    # All products of two parts with their rounding errors, from the smallest to the largest: eight
+    # products of two terms each.
     terms = np.empty(16)
     terms[0], terms[1] = two_product(u.x_low, v.y_low)
     terms[2], terms[3] = two_product(-u.y_low, v.x_low)
@@ -375,6 +376,7 @@ def reflex_vertex(points: Points, count: int) -> int:
     if is_flat:
         return -1
 
+    # The sense in which the ring goes around: 1 is counter-clockwise.
     sense = 1.0 if area > 0.0 else -1.0
     peaks = 0
     second_peak = -1

@@ -66,6 +66,7 @@ def add_products(one: Floats, two: Floats, sign: float, sums: Floats, made: int)
 @compiled
 def minor_terms(one: Floats, two: Floats, i: int, j: int) -> Floats:
     """Return one[i] two[j] - one[j] two[i] of two lines as numbers whose sum is exact."""
+    # Two products of sums, and two terms for each product of two numbers.
     sums = np.empty(4 * one.shape[1] * two.shape[1])
     made = add_products(one[i], two[j], 1.0, sums, 0)
     made = add_products(one[j], two[i], -1.0, sums, made)
@@ -77,7 +78,7 @@ def minor_terms(one: Floats, two: Floats, i: int, j: int) -> Floats:
 @compiled
 def height_over_line(along: Floats, start: Floats, point: Floats) -> float:
     """Return the cross product of `along` and point - start, shape (2,) each; its sign is exact."""
-    sums = np.empty(8)
+    sums = np.empty(8)  # four products of two terms each
     made = add_products(along[:1], point[1:], 1.0, sums, 0)
     made = add_products(along[:1], start[1:], -1.0, sums, made)
     made = add_products(along[1:], point[:1], -1.0, sums, made)
@@ -111,6 +112,7 @@ def beyond(values: Floats, lines: Floats, i: int, j: int, k: int) -> float:
     x = minor_terms(lines[i], lines[j], 2, 1)
     y = minor_terms(lines[i], lines[j], 0, 2)
     minus_w = minor_terms(lines[i], lines[j], 1, 0)
+    # Two terms for each product of two numbers.
     sums = np.empty(2 * lines.shape[2] * (x.size + y.size + minus_w.size))
     made = add_products(lines[k, 0], x, 1.0, sums, 0)
     made = add_products(lines[k, 1], y, 1.0, sums, made)
@@ -137,8 +139,9 @@ def intersect_lines(rows: Floats, out: Points) -> int:
             values[i, m] = exact_sum(lines[i, m])
 
     # The numbers of the borders in their order around the set, which begins as the box.
-    chain = np.arange(count + 4)
-    outside = np.empty(count + 4, dtype=np.bool_)
+    # Each row adds at most one to the four of the box, which `count` contains.
+    chain = np.arange(count)
+    outside = np.empty(count, dtype=np.bool_)
     size = BOX_SIDES
     for k in range(BOX_SIDES, count):
         a, b, c = values[k]
@@ -209,7 +212,8 @@ def write_corners(values: Floats, lines: Floats, chain: Integers, size: int, out
     made = 0
     for i in range(size):
         j = following(i, size)
-        # Vertices that coincide are written once: they may be rounded to different points.
+        # Vertices that coincide are written once: they may be rounded to different points. The last
+        # one is written if all others were left out.
         coincides = beyond(values, lines, chain[i], chain[j], chain[following(j, size)]) == 0.0
         if coincides and (made > 0 or i + 1 < size):
             continue
@@ -251,6 +255,7 @@ def difference(points: Points, count: int, other: Points, other_count: int, out:
     unit = np.ones(2)
     for axis in range(2):
         largest = max(np.abs(a[:, axis]).max(), np.abs(b[:, axis]).max())
+        # For coordinates that are all zero it is 1.
         unit[axis] = math.ldexp(1.0, math.frexp(largest)[1])
         a[:, axis] /= unit[axis]
         b[:, axis] /= unit[axis]
@@ -306,6 +311,7 @@ def write_side_row(start: Point, end: Point, other: Points, row: Floats) -> int:
     from_y = np.empty(2)
     from_x[0], from_x[1] = two_sum(start.x, -farthest.x)
     from_y[0], from_y[1] = two_sum(start.y, -farthest.y)
+    # The offset: the normal times the vector from the farthest vertex to the start of the side.
     terms = add_products(row[0, :2], from_x, 1.0, row[2], 0)
     add_products(row[1, :2], from_y, 1.0, row[2], terms)
     return 1
@@ -319,7 +325,7 @@ def farthest_along(line: Floats, points: Points) -> int:
     for i in range(1, len(points)):
         x = line[0, 0] * (points[i, 0] - points[best, 0])
         y = line[1, 0] * (points[i, 1] - points[best, 1])
-        farther = x + y
+        farther = x + y  # the normal times the vector from the best point so far
         if abs(farther) <= HEIGHT_ROUNDING * (abs(x) + abs(y)):
             made = add_products(line[0, :2], points[i, :1], 1.0, sums, 0)
             made = add_products(line[0, :2], points[best, :1], -1.0, sums, made)

@@ -118,7 +118,8 @@ def removed_edge(points: Points, before: int, i: int, j: int, after: int) -> Rem
     if bend <= 0.0:
         return Removal(-1.0, 0.0, 0.0)
 
-    # Neighbours that turn by half a revolution or more do not meet.
+    # Neighbours that turn by half a revolution or more do not meet. Nearly half a revolution, to
+    # rounding, counts as that: the point where they meet would be arbitrary.
     turn = cross(from_x, from_y, to_x, to_y)
     if turn <= HEIGHT_ROUNDING * (abs(from_x * to_y) + abs(from_y * to_x)):
         return Removal(np.inf, 0.0, 0.0)
@@ -201,6 +202,7 @@ def first_lowest_leaf(tree: Floats, leaves: int) -> int:
     """Return the number of the lowest leaf of a tree of minima; of equal ones the first."""
     at = 1
     while at < leaves:
+        # To the second child only if the first one is not the lowest.
         at = 2 * at + (tree[2 * at] > tree[1])
     return at - leaves
 

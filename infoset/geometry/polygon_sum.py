@@ -111,6 +111,7 @@ def add_polygon(points: Points, count: int, other: Points, other_count: int, out
     second, m = tidy(other, other_count)
     i = lowest_index(first, n)
     j = lowest_index(second, m)
+    # The sides that are left of each polygon. A segment has two, there and back, a point none.
     steps_i = n if n > 1 else 0
     steps_j = m if m > 1 else 0
     made = 0

@@ -144,6 +144,7 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         A. Girard, Reachability of uncertain linear systems using zonotopes, in HSCC (2005).
         """
         Limits(minimum=1.0).need("order", order)
+        # `fewer_generators` also returns few generators unchanged: here the set itself is returned.
         if len(self.generators) <= order * self.space:
             return self
         return Zonotope(self.centre, fewer_generators(self.generators, int(order * self.space)))
@@ -206,6 +207,7 @@ class Zonotope(ZonotopeArrays, ConvexSet):
                 f"no point of the zonotope is in strip {worst}, from {least:g} to {greatest:g}"
             )
 
+        # Strips that leave both ends of the set inside add no generator.
         is_cut = (low > middles - reach) | (high < middles + reach)
         if not is_cut.any():
             return self
@@ -286,6 +288,7 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         # that the point is a vertex.
         first = (self.generators != 0.0).argmax(axis=1)
         leading = np.take_along_axis(self.generators, first[:, None], axis=1)[:, 0]
+        # A generator of zeros has the sign 0: it moves nothing.
         signs = np.sign(np.where(heights != 0.0, heights, leading))
         return np.asarray(self.centre + signs @ self.generators)
 
@@ -369,6 +372,7 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         while chosen := list(islice(subsets, _SUBSETS_AT_ONCE)):
             numbers = np.fromiter(chain.from_iterable(chosen), np.int64).reshape(-1, space)
             total += float(np.abs(np.linalg.det(span.coefficients[numbers])).sum())
+        # The volume, within the affine hull, that steps of one in the own scaled coordinates span.
         stretch = np.prod(np.abs(np.diag(triangle_of(span.steps)[0])))
         return float(2.0**space * total * exact_determinant(span.base) * stretch)
 

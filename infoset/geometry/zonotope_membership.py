@@ -30,6 +30,7 @@ def are_inside(points: Floats, generators: Floats, basis: Integers, rounding: Fl
     are unit vectors along the axes, or their opposites. Most points are decided by the bounding
     box, or by coefficients of least squares; each of the others needs a linear program.
     """
+    # Outside of the bounding box a point is outside; all others are candidates.
     radius = np.abs(generators).sum(axis=0)
     found = (np.abs(points) <= radius + rounding).all(axis=1)
 
@@ -64,6 +65,7 @@ def _is_inside(point: Floats, generators: Floats, basis: Integers, rounding: Flo
         coefficients = np.clip(optimum.x[:-1], -1.0, 1.0) / multiple
         # The coefficients of the basis correct the error of the solver.
         missing = np.abs(point - coefficients @ generators)
+        # Only their sizes count now: a correction of either sign must leave them up to one.
         coefficients[basis] = np.abs(coefficients[basis]) + missing
         if np.abs(coefficients).max() <= 1.0:
             return True
@@ -77,6 +79,8 @@ def _separates(normal: Floats, point: Floats, generators: Floats, rounding: Floa
     """Return whether a plane with this normal is between a point, rounded, and the zonotope."""
     reach = np.abs(generators @ normal).sum()
     terms = np.abs(normal) @ (np.abs(generators).sum(axis=0) + np.abs(point))
+    # A sum over generators of scalar products is rounded m + d times; four more roundings are for
+    # the other sums of this function.
     unsure = np.abs(normal) @ rounding + (sum(generators.shape) + 4) * EPS * terms
     return bool(abs(normal @ point) > reach + unsure)
 

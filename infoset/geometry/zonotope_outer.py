@@ -41,8 +41,10 @@ def fewer_generators(generators: Floats, count: int) -> Floats:
     sizes = np.abs(generators)
     widths = sizes.sum(axis=0)
     shares = sizes / np.where(widths > 0.0, widths, 1.0)
+    # In ascending order of |g|_inf - |g|_1: the generators that stay come first.
     ranks = np.argsort(shares.max(axis=1) - shares.sum(axis=1), kind="stable")
 
+    # The box takes up to n generators.
     kept = count - generators.shape[1]
     box = box_generators(_sums_up(sizes[ranks[kept:]]))
     return np.vstack([generators[np.sort(ranks[:kept])], box])
@@ -73,7 +75,8 @@ def corrected_by_strips(
     corrected = np.vstack([generators - images @ gain.T, half[:, None] * gain.T])
     corrected = corrected[corrected.any(axis=1)]
 
-    # Rounding: each number is a sum of at most so many products, of these sizes.
+    # Rounding: each number is a sum of at most so many products, of these sizes. Eight more are for
+    # the centre, a bound and the rounding itself, as in `Zonotope._operations`.
     operations = sum(generators.shape) + 8 + len(rows)
     sizes = np.abs(centre) + np.abs(generators).sum(axis=0)
     terms = sizes + np.abs(gain) @ (np.abs(rows) @ sizes + np.abs(y) + half)

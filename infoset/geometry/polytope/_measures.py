@@ -31,10 +31,12 @@ def simplices_of(sides: Flags, dimension: int) -> Integers:
     def divide(face: int, facets: list[int], size: int) -> list[tuple[int, ...]]:
         if face in known:
             return known[face]
+        # With one vertex more than dimensions it is a simplex.
         if face.bit_count() <= size + 1:
             known[face] = [tuple(i for i in range(face.bit_length()) if face >> i & 1)]
             return known[face]
 
+        # The number of the lowest bit: the first vertex of the face.
         first = (face & -face).bit_length() - 1
         simplices: list[tuple[int, ...]] = []
         for facet in facets:
@@ -104,6 +106,7 @@ def triangle_of(columns: Floats) -> tuple[Floats, Integers]:
 
     The sizes of the rows may differ much.
     """
+    # The largest rows first: the small ones then keep their digits.
     order = np.argsort(-np.abs(columns).max(axis=1))
     triangle, pivots = qr(columns[order], mode="r", pivoting=True)
     return triangle[: columns.shape[1]], pivots

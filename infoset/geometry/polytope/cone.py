@@ -69,6 +69,7 @@ class Vertices(NamedTuple):
 
 def vertices_of(rows: list[Rationals], limits: Rationals) -> Vertices:
     """Return the vertices, directions and lines of {x: rows x <= limits}, with at least one row."""
+    # The row t >= 0 comes first. It is no half-space: `on` is returned without it.
     is_ahead = [0] * len(rows[0]) + [1]
     table = [is_ahead]
     for row, limit in zip(rows, limits, strict=True):
@@ -122,7 +123,7 @@ def rounded(row: Row) -> Floats:
 
 
 def _rounded(row: Row) -> list[float]:
-    largest = max(map(abs, row)) or 1
+    largest = max(map(abs, row)) or 1  # a row of zeros stays
     return [entry / largest for entry in row]
 
 
@@ -185,6 +186,7 @@ def _inserted(rows: list[Row], rays: list[Row], on: Flags, done: Flags, lines: l
     while not done.all():
         left = np.flatnonzero(~done)
         number = int(left[0])
+        # Rounded heights: they choose only the order of the rows.
         if rays:
             heights = units[left] @ np.array([_rounded(ray) for ray in rays]).T
             violations = (heights < 0.0).sum(axis=1)

@@ -98,6 +98,7 @@ def box(lower: Floats, upper: Floats) -> PolytopeArrays:
     centre, scale = coordinates(lower.copy(), upper.copy(), np.zeros(space), 0.0)
     least = (lower - centre) / scale
     most = (upper - centre) / scale
+    # Equal bounds give one end.
     ends = [dict.fromkeys(pair) for pair in zip(least, most, strict=True)]
     points = np.array(list(itertools.product(*ends)))
 
@@ -114,7 +115,9 @@ def box(lower: Floats, upper: Floats) -> PolytopeArrays:
 def of_polyhedron(found: Polyhedron) -> PolytopeArrays:
     """Return the arrays of an exact set.
 
-    Its numbers are rounded to nearest, and results that are computed from them once more.
+    Its vertices are rounded to nearest. The facets of a bounded set are computed again, from the
+    rounded vertices; those of an unbounded set are the exact ones, rounded, and the exact set is
+    kept (`PolytopeArrays.exact`).
     """
     if not found.points:
         return empty(found.space)
@@ -234,6 +237,7 @@ def _by_double_description(
     facets = dd.in_units(facets)
     is_ahead = np.eye(space + 1)[-1:]  # t >= 0, the first row of the cone
     rays, on = dd.extreme_rays(np.vstack([is_ahead, dd.rows_of_cone(facets)]), True, ON)
+    # Rays with t = 0 are directions in which the set is unbounded.
     is_bounded = len(rays) > 0 and (rays[:, -1] == 1.0).all()
     if not is_bounded:
         return None
@@ -367,7 +371,8 @@ def cut(
         again = _of_all_half_spaces(part, whole)
     if not again.is_empty:
         return again
-    # The set touches the half-spaces to rounding, and the exact intersection is empty.
+    # The set touches the half-spaces to rounding, and the exact intersection is empty: the points
+    # of the part are the result.
     return hull(part.points, part.centre, part.scale) if found is None else found
 
 
@@ -517,7 +522,8 @@ def _flat_part(whole: PolytopeArrays, known: int) -> PolytopeArrays | None:
     near = SNAP * largest_coordinate(whole.points)
     points = push_out(whole.points, whole.facets, whole.incidence, known, True, near)
 
-    # Rounding grows across the facets on which all points are, and in no other direction.
+    # Rounding grows across the facets on which all points are, and in no other direction. The
+    # greater thickness is for these directions alone: if the hull is flat in more, SNAP decides.
     planes = np.ascontiguousarray(whole.facets[whole.incidence.all(axis=0), :-1])
     expected = 0
     if len(planes):

@@ -89,6 +89,7 @@ def extreme_rays(rows: Floats, affine: bool, tolerance: float) -> tuple[Floats, 
         rays = in_units(rays)
 
     others = np.delete(np.arange(m), chosen)
+    # An edge of a cone of D dimensions lies on at least D - 2 of its rows.
     return insert_rows(rays, on, rows[others], others, size - 2, affine)
 
 
@@ -187,6 +188,7 @@ def crossings(
     shared = np.empty(k, np.int64)
     near = np.empty(k, np.int64)
 
+    # Pairs are searched from the side with fewer rays, which takes less time.
     fewer = heights < 0.0 if (heights < 0.0).sum() < (heights > 0.0).sum() else heights > 0.0
     count = 0
     for one in np.flatnonzero(fewer):

@@ -250,6 +250,8 @@ def without_parallel(span: Span) -> Distinct:
         coefficients[k] = (turned * span.coefficients[group]).sum(axis=0)
         if len(group) > 1:
             shares = members @ rows[k] / (rows[k] @ rows[k])
+            # For each member a product, a difference and a sum are rounded by half of EPS; the rest
+            # is for shares whose sum is 1 only to rounding.
             rounding = 4.0 * len(group) * EPS * np.abs(rows[k])
             missed += np.abs(members - shares[:, None] * rows[k]).sum(axis=0) + rounding
     return Distinct(rows, coefficients, missed)
@@ -331,8 +333,10 @@ def _sides(generators: Floats) -> Faces:
     """Return the sides and corners of a zonotope of the plane."""
     signs, order = _corners(generators)
     count = len(order)
+    # Along side i the factor of its own generator changes from -1 to 1, or back: 1 or -1.
     turns = 0.5 * (signs[np.arange(1, count + 1), order] - signs[np.arange(count), order])
     corners = np.arange(2 * count)
+    # Corner i is between the sides i - 1 and i.
     sides = np.column_stack([corners - 1, corners]) % (2 * count)
     return Faces(
         np.tile(order, 2)[:, None],
@@ -391,6 +395,7 @@ def _facets(generators: Floats) -> Faces | None:
 
     chosen = np.concatenate([part.pairs for part in parts])
     along = np.column_stack([first[chosen], second[chosen]])
+    # The second half are the opposite facets, whose normals are turned.
     ahead = np.repeat([1.0, -1.0], len(chosen))
     facet_of = np.repeat(np.arange(len(sizes)), sizes)
     order = np.argsort(vertex_of, kind="stable")
@@ -435,6 +440,8 @@ def _in_plane(rows: Floats, normal: Floats) -> Floats:
 
 def _different(signs: Floats) -> tuple[Floats, Integers]:
     """Return the different rows of signs, and for each row the number of its equal."""
+    # Eight bytes of bits are a word, and rows of words are sorted; the last word is filled by
+    # zeros.
     words = np.packbits(signs > 0.0, axis=1)
     words = np.pad(words, ((0, 0), (0, -words.shape[1] % 8))).view(np.uint64)
     order = np.lexsort(words.T)
@@ -479,6 +486,8 @@ def _of_faces(kind: Any, faces: Faces, span: Span, kept: Distinct) -> Any:
     sums, lost = affine_image(
         np.ones((1, len(rows))), np.ascontiguousarray(np.abs(products).T), levels[0]
     )
+    # `rounded` is the greatest rounding of a product for each normal, and there is one product for
+    # each generator.
     unsure = lost + away + len(rows) * rounded
     offsets = np.where(unsure > 0.0, np.nextafter(sums[0] + unsure, np.inf), sums[0])
     facets = dd.in_units(np.column_stack([normals, offsets]))
@@ -509,6 +518,7 @@ def _ahead(points: Floats, facets: Floats, faces: Faces) -> tuple[Floats, Flags]
     """
     vertex = faces.vertex
     facet = faces.facet
+    # Where the pairs of each vertex begin: `vertex` is in ascending order.
     first = np.flatnonzero(np.diff(vertex, prepend=-1))
     lengths = np.linalg.norm(facets[:, :-1], axis=1)
     units = (facets[:, :-1] / lengths[:, None])[facet]

@@ -117,6 +117,8 @@ def _checked_sides(points: Floats, rays: Floats, on: Flags) -> _Sides | None:
     each on some of its points: with all points within SNAP, they are one.
     """
     dimension = points.shape[1]
+    # All facets were computed (none is known before), and SNAP is taken as a distance, not relative
+    # to the largest coordinate.
     snapped, is_consistent = touching(points, rays, on, 0, 1.0, SNAP)
     if not is_consistent:
         return None

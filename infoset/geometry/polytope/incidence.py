@@ -1,7 +1,8 @@
 """Incidence of vertices and facets as bits, and the proof that no vertex or facet is missing.
 
-A set of bits has the shape (words,): bit i is set if a vertex lies on facet i. All of this is
-combinatorial: no number is rounded here. See `is_closed` for the proof.
+A set of bits has the shape (words,), in words of 64 bits: bit i, which is bit i % 64 of word
+i // 64, is set if a vertex lies on facet i. All of this is combinatorial: no number is rounded
+here. See `is_closed` for the proof.
 
 References
 ----------

@@ -119,6 +119,7 @@ def _next_pair(
     p = int(np.argmin(heights))
     q = int(np.argmax(other_heights))
 
+    # The bases of the heights cancel: x . x is the mean of the present pairs, by their shares.
     gap = other_heights[q] - heights[p]
     is_known = False
     for k in range(len(shares)):

@@ -28,6 +28,7 @@ def polytope_from_support(
     # Chosen: random and published projections have the same number of vertices from a quarter of
     # this to four times this (measured).
     tolerance: float = 1e-9,
+    # A guard: `furthest`, often a linear program, is called for each facet.
     max_facets: int = 10_000,
 ) -> Polytope:
     """Return a polytope from its support vectors, such as a projection of a set of programs.

@@ -180,6 +180,7 @@ def push_out(
     f = len(facets)
     result = points.copy()
     centre = points.sum(axis=0) / len(points)
+    # The basis is for sweeps of up to three moves (`_cross_facets`).
     work = (np.empty(f), np.empty(n), np.empty((min(3, n), n)))
     mine = np.empty(f, np.int64)
     # A facet with all points is a row of the affine hull.
@@ -264,7 +265,7 @@ def _cross_facets(
         free = basis[size]
         for j in range(len(free)):
             free[j] = normal[j]
-        # Orthogonalized twice, because of rounding.
+        # Orthogonalized twice, because of rounding: to the basis, and to the basis again.
         for k in range(2 * size):
             along = dot(free, basis[k % size])
             for j in range(len(free)):
@@ -279,5 +280,5 @@ def _cross_facets(
         for j in range(len(free)):
             step[j] += share * free[j]
             free[j] /= length
-        size = (size + 1) % len(basis)
+        size = (size + 1) % len(basis)  # a full sweep ends, and the next one begins
     return False

@@ -73,6 +73,8 @@ def of_generators(
     """
     both_ends = [*lines, *(_negative(line) for line in lines)]
     dual = extreme_rays([_turned(row) for row in (*points, *directions, *both_ends)])
+    # Lines of the dual are the equations of the set, and rays its facets: the equations are
+    # subtracted from them, so that each facet has one form.
     equations, pivots = _reduced(dual.lines)
     facets = []
     for ray in dual.rays:

@@ -218,7 +218,8 @@ class Polytope(PolytopeArrays, ConvexSet):
         directions = np.array([row for row in ratios if any(row)])
         directions /= np.linalg.norm(directions, axis=1)[:, None]
 
-        # A ball that is smaller than the rounding of its coordinates has no facets.
+        # A ball that is smaller than the rounding of its coordinates has no facets: the hull of the
+        # points is its polytope then.
         if not outer or size <= ON * np.abs(middle).max():
             return cls.from_vertices(middle + size * directions)
         limits = np.full(len(directions), size)
@@ -360,6 +361,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         may take long.
         """
         along = finite_values("half", half, self.space)
+        # In scaled coordinates, in which a tiny segment may underflow to zero.
         if self.is_empty or not (along / self.scale).any():
             return self
         if self.dimension < self.space or self.exact is not None:
@@ -374,6 +376,7 @@ class Polytope(PolytopeArrays, ConvexSet):
             convex = hull(points, self.centre, self.scale)
             return self._of(construction.enlarged(convex, errors))
         whole = self._of(found)
+        # The identity gives it coordinates of its own.
         return whole if np.abs(points).max() < _WIDE else whole.affine_map(np.eye(self.space))
 
     def enlarged(self, by: ArrayLike) -> Polytope:
@@ -446,6 +449,8 @@ class Polytope(PolytopeArrays, ConvexSet):
 
         less = _less(limits, supports(two.vertices, rows))
         lower, upper = np.array(self.bounding_box()) - two.bounding_box()
+        # Of an empty difference the box may be reversed: it has no width there, and serves only to
+        # choose coordinates.
         ends = lower, np.maximum(lower, upper)
         sizes = np.abs(self.vertices - self.centre).max(axis=0) + np.abs(two.vertices).max(axis=0)
         return self._of(construction.of_half_spaces(rows, less, self.centre, ends, sizes))
@@ -534,6 +539,8 @@ class Polytope(PolytopeArrays, ConvexSet):
 
         rows = np.vstack([rows, -rows])
         limits = np.concatenate([most + wider, wider - minimum])
+        # A strip that is empty by less than the rounding of a cut must be decided here: for
+        # `construction.cut` the set would touch both of its sides.
         if np.isneginf(limits).any() or (minimum > most + 2.0 * wider).any():
             return self.empty(self.space)
         rows = rows[limits < np.inf]
@@ -561,10 +568,11 @@ class Polytope(PolytopeArrays, ConvexSet):
     def reduce_outward(self, cap: int, max_vertices: int = 10**9) -> Polytope:
         """Return a polytope with few facets and vertices that contains the set.
 
-        It has at most `cap` (>= 2n) facets and `max_vertices` (>= 2^n) vertices. It starts with the
-        bounding box. Then it is cut by the facet with the greatest excess, relative to the width of
-        the set along its normal, until the next cut would exceed `cap` or `max_vertices`. A flat
-        set becomes thick by 3e-8 of its coordinates to each side.
+        It has at most `cap` (>= 2n) facets and `max_vertices` (>= 2^n) vertices, by default any
+        number in practice. It starts with the bounding box. Then it is cut by the facet with the
+        greatest excess, relative to the width of the set along its normal, until the next cut would
+        exceed `cap` or `max_vertices`. A flat set becomes thick by 3e-8 of its coordinates to each
+        side.
         """
         Limits(minimum=2 * self.space, whole=True).need("cap", cap)
         self.bounded()
@@ -648,7 +656,8 @@ class Polytope(PolytopeArrays, ConvexSet):
     def _outer_rows(self) -> tuple[Floats, Floats]:
         """The rows of `constraints`, with offsets that no vertex exceeds by their rounding."""
         rows, limits = self.constraints()
-        # Points within the thickness of a flat set count as in its affine hull.
+        # Points within the thickness of a flat set count as in its affine hull: the rows after the
+        # facets are its equations.
         near = SNAP * (np.abs(rows) @ np.abs(self.vertices).max(axis=0))
         near[: len(self.facets)] = 0.0
         return rows, np.maximum(limits, self.support_function(rows)) + near
@@ -688,6 +697,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         is_inside = bool(two.contains(self.vertices, tolerance).all())
         if self.is_empty or self.exact is None or not is_inside:
             return is_inside
+        # Unbounded along a normal of the other set, this set leaves it.
         rows, _ = two.constraints()
         return not self._rises(rows).any()
 
@@ -803,7 +813,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         if not self._any_is_unbounded(other):
             return nearest_pair(self.vertices, other.vertices).difference
         # The nearest difference is at most as long as the difference of any two points: it is in a
-        # box of this size.
+        # box of the next power of two.
         differences = self + -other
         some = differences.vertices[0]
         size = float(np.ldexp(1.0, np.frexp(np.linalg.norm(some))[1]))
@@ -826,6 +836,7 @@ class Polytope(PolytopeArrays, ConvexSet):
             return None
         between = two._nearest_difference(self)
         length = float(np.linalg.norm(between))
+        # Sets that touch have no difference: the direction is then zero, and proves nothing.
         direction = np.asarray(between / (length or 1.0))
         is_proof = self.support_function(direction) < -two.support_function(-direction)
         return direction if is_proof else None
@@ -896,6 +907,7 @@ def _less(limits: Floats, widths: Floats) -> Floats:
 
 def _has_null_space(matrix: Floats) -> bool:
     """Whether matrix x = 0 has solutions other than zero, exactly decided."""
+    # Pivots that are certainly not zero decide most cases; the others are decided by integers.
     units = dd.in_units(np.ascontiguousarray(matrix.T))
     chosen, _ = dd.pivots(units, REDUCED, -1)
     if len(chosen) == matrix.shape[1]:

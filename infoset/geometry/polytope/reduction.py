@@ -47,6 +47,7 @@ def _cut_by_worst(
     """
     f = len(facets)
     n = points.shape[1]
+    # The box has the first 2 n rows; each cut adds one, and at most `cap` are added.
     number = 2 * n
     sides = np.zeros((number + min(f, cap), n + 1))
     rays = np.ones((2**n, n + 1))
@@ -55,6 +56,7 @@ def _cut_by_worst(
 
     columns = np.ascontiguousarray(rays.T)
     turned = np.ascontiguousarray(-points.T)
+    # The support along the normal plus that along its opposite; ON keeps the divisor positive.
     widths = np.array([max(facets[i, n] + _highest(turned, facets[i]), ON) for i in range(f)])
     excess = np.full(f, np.inf)
     round_of = np.zeros(f, np.int64)
@@ -74,14 +76,15 @@ def _cut_by_worst(
         cut, cut_bits = dd.insert(rays, bits, row, number, n - 1, np.bool_(True))
         if len(cut) > max_vertices:
             break
-        # A cut can make facets redundant, so that the cap may allow it.
+        # A cut can make facets redundant, so that the cap may allow it. A facet has at least n
+        # vertices.
         if number >= cap and _count_sides(cut_bits, number + 1, n) > cap:
             break
         rays = cut
         bits = cut_bits
         columns = np.ascontiguousarray(cut.T)
         sides[number] = facet
-        excess[worst] = -np.inf
+        excess[worst] = -np.inf  # it is not chosen again
         number += 1
     return rays[:, :n].copy(), sides[:number], unpacked(bits, number)
 

@@ -42,6 +42,7 @@ def touching(
         for j in range(len(facets)):
             height = dot(points[i], facets[j]) - facets[j, n]
             limit = far * units[j]
+            # Positive heights are outside.
             is_consistent &= height <= limit and (height >= -limit or not on[i, j])
             result[i, j] |= height >= -SNAP * size * units[j]
     return result, is_consistent
