@@ -236,6 +236,7 @@ class _AdversarySearch:
     """A search in progress."""
 
     guarantee = False
+    """Whether flights compute Phi; no value that a search maximises uses it."""
 
     def __init__(
         self,
@@ -331,6 +332,7 @@ class _AdversarySearch:
         if constructions is not None:
             side = constant_side(self.scenario.target, draws.target)
             if target_m_s2 is not None:
+                # The sign at step 0: where the noise shifts, the target keeps its sign.
                 side = by_axis(plans.sides[:, :, 0])
             game = constructions.noise(self._shift_m, side)
             noise = _Recorded(game, plans, self._planner.sensors)
@@ -413,6 +415,8 @@ class _Recorded:
         errors = errors_made(sight, self.game.measure(sight, predicted))
         for row, sensor in enumerate(self.sensors):
             if sensor.name in errors:
+                # Shape (B, C), of ranges (B, 1): these are written for all axes, and the first is
+                # used.
                 self.plans.errors[:, row, :, sight.step] = np.atleast_2d(errors[sensor.name]).T
         return measure_with_errors(sight, errors)
 

@@ -275,6 +275,7 @@ class Planner:
 
         Plans with a greater value are chosen more often.
         """
+        # The square of a uniform number is small more often: rank 0 has the greatest value.
         ranks = np.floor(len(elite) * self._random.random(count) ** 2).astype(np.int64)
         plans = elite.take(ranks)
         for i in range(count):
@@ -307,6 +308,7 @@ class Planner:
 
     def _last_step(self, plans: Plans, i: int) -> int:
         """Return the last step before the closest approach of a start, plus one."""
+        # x comes after the lateral axes, and V_x is last.
         x = float(plans.start[i, self._axes])
         vx = float(plans.start[i, -1])
         return min(self._steps - 1, int(x / (-vx * self._model.step_s)) + 1)

@@ -19,6 +19,8 @@ from infoset.sim.covariance import Covariance, covariance_of
 from infoset.sim.results import b_plane
 from infoset.sim.scenario import Sun
 
+DAY_S = 86_400.0
+"""A day, s."""
 STEP_TOLERANCE = 1e-12
 """Relative error of a step of the integration: 1 mm of a relative position of a million kilometres,
 and well above rounding errors.
@@ -90,7 +92,7 @@ def find_approach(
     start_s = 0.0 if flight_s is None else arrival_s - flight_s
     if arrival_s <= start_s:
         raise ValueError(
-            f"the closest approach is {-arrival_s / 86400.0:.6g} d before the epoch: give earlier "
+            f"the closest approach is {-arrival_s / DAY_S:.6g} d before the epoch: give earlier "
             "states, or flight_s"
         )
 
@@ -105,22 +107,25 @@ def find_approach(
     if miss_m > WIDEST * range_m:
         raise ValueError(
             f"the states do not meet: the closest approach is {miss_m / 1e3:.6g} km, "
-            f"{arrival_s / 86400.0:.6g} d after the epoch, from {range_m / 1e3:.6g} km at the "
+            f"{arrival_s / DAY_S:.6g} d after the epoch, from {range_m / 1e3:.6g} km at the "
             "start; check the units, the epoch and the reference frame"
         )
 
     sun = None
     if parameter_m3_s2:
         sun = _sun(axes @ own_start, axes @ own_velocity, parameter_m3_s2)
+    # The axes turn position and velocity alike.
     change = np.kron(np.eye(2), axes) @ transition
     speeds = np.linalg.norm([velocity_start, velocity_end], axis=1)
     turn = np.linalg.norm(np.cross(velocity_start, velocity_end)) / speeds.prod()
     return Approach(
         start_s=start_s,
         flight_s=arrival_s - start_s,
+        # S is opposite to the relative velocity, which has no other component.
         state=np.array([*map(_rounded, place), 0.0, 0.0, _rounded(-speeds[0])]),
         covariance=covariance_of(change @ covariance @ change.T),
         sun=sun,
+        # The axis y is T.
         miss_m=b_plane((axes @ relative_end)[None, :2], 0.0)[0],
         speed_change_m_s=float(speeds[1] - speeds[0]),
         turn_rad=float(turn),
@@ -171,6 +176,7 @@ def closest_approach_s(states: Floats, parameter_m3_s2: float) -> float:
         raise ValueError("spacecraft and object have the same velocity")
     horizon_s = float(-SEARCH * (relative @ velocity) / (velocity @ velocity))
 
+    # Values 6 to 11 are the relative position and velocity.
     def radial(_time: float, state: Floats) -> float:
         return float(state[6:9] @ state[9:12])
 
@@ -183,7 +189,7 @@ def closest_approach_s(states: Floats, parameter_m3_s2: float) -> float:
         times_s = _integrate(states, parameter_m3_s2, horizon_s, radial).t_events[0]
         if not len(times_s):
             raise ValueError(
-                f"the states have no closest approach within {abs(horizon_s) / 86400.0:.4g} d of "
+                f"the states have no closest approach within {abs(horizon_s) / DAY_S:.4g} d of "
                 "their epoch"
             )
         time_s = times_s[0]
@@ -252,6 +258,7 @@ def _integrate(states: Floats, parameter_m3_s2: float, duration_s: float, event:
 
 def _sun(place_m: Floats, velocity_m_s: Floats, parameter_m3_s2: float) -> Sun:
     """Return the attracting body, from position and velocity (y, z, x) of the spacecraft."""
+    # From the spacecraft toward the attracting body.
     y, z, x = -place_m
     return Sun(
         gravitational_parameter_m3_s2=parameter_m3_s2,

@@ -18,6 +18,7 @@ after at most 110 in 20 000 random cases. Near a root of zero, a point on the ed
 to 2^-1074; after 200 the distance, which is proportional to the root, does not change.
 """
 TURN = 2.0 * math.pi
+"""A full turn, rad: a direction may be counted from -180 or from 0 degrees."""
 
 
 @dataclass(frozen=True)
@@ -177,6 +178,9 @@ class Body(Checked):
         longer_m, shorter_m = self.axes_m
         distance = np.asarray(distance_m, dtype=np.float64)
         is_between = (distance > shorter_m) & (distance < longer_m)
+        # A point at the distance r is inside where the sine of its angle to the longer axis is at
+        # most q2/r ((q1^2 - r^2)/(q1^2 - q2^2))^(1/2). The divisor 1 is for a circle, which has no
+        # distances between.
         between = np.where(is_between, distance, longer_m)
         sine = (shorter_m / between) * np.sqrt(
             np.where(is_between, longer_m**2 - between**2, 0.0)
@@ -211,6 +215,7 @@ def _distance_to_edge(along_m: float, across_m: float, longer_m: float, shorter_
     """
     is_inside = math.hypot(along_m / longer_m, across_m / shorter_m) < 1.0
     eccentric_m = (longer_m**2 - shorter_m**2) / longer_m
+    # On the longer axis the root may be -q2^2, where the second coordinate is 0/0.
     if across_m == 0.0:
         if along_m >= eccentric_m:
             return longer_m - along_m
@@ -218,6 +223,8 @@ def _distance_to_edge(along_m: float, across_m: float, longer_m: float, shorter_
         height_m = shorter_m * math.sqrt(1.0 - (nearest / longer_m) ** 2)
         return math.hypot(nearest - along_m, height_m)
 
+    # At `lower` the second term alone is 1. At `upper` the sum would be 1 with q2 in place of q1 in
+    # the denominator; the true sum is not greater.
     lower = shorter_m * (across_m - shorter_m)
     upper = math.hypot(longer_m * along_m, shorter_m * across_m) - shorter_m**2
     for _ in range(HALVINGS):

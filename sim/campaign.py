@@ -134,6 +134,7 @@ class Campaign:
                 f"noise must be None, a CampaignNoise, or have the method measure: got {own!r}"
             )
 
+        # A campaign has no axes and no cells.
         combinations = math.prod(len(axis.values) for axis in self.axes) if self.axes else 0
         if len(self.cells) != combinations:
             raise ValueError(
@@ -264,6 +265,7 @@ class Campaign:
         of files. Chunks of a sweep are not larger than the minimum number of runs of a cell or
         `FEWEST_A_CELL`, because cells may be extended later.
         """
+        # Rounded up.
         batches = -(-self._max_runs // (FEWEST_CHUNKS * ENGAGEMENTS_AT_ONCE))
         size = max(1, min(batches, MAX_CHUNK // ENGAGEMENTS_AT_ONCE)) * ENGAGEMENTS_AT_ONCE
         return min(size, max(self._min_runs, FEWEST_A_CELL)) if self.axes else size
@@ -328,6 +330,7 @@ class _Progress:
             self._running[cell, runs.start] = share * len(runs)
             # A list, because other threads change the dictionary.
             running = sum([*self._running.values()])
+            # A chunk that is being finished may count twice for a moment.
             self._report(min(1.0, (self._done + running) / self._total))
 
         return report

@@ -70,6 +70,7 @@ def possible_miss_m(
 
     of_pixel_m_s = pixel_error_rad * closing_speed_m_s
     bound_m = of_pixel_m_s * last_image_s + (0.0 if constant_bias else centroid_error_m)
+    # s of `worst_shift_m`, which is a difference of two motions: twice the slopes of the Notes.
     slope_m_s: Any = 2.0 * of_pixel_m_s + np.where(
         4.0 * bound_m <= disturbance_m_s2 * arc_s**2,
         4.0 * np.sqrt(disturbance_m_s2 * bound_m),
@@ -185,6 +186,7 @@ def _worst_difference(model: SetModel, images_s: Floats, arrival_s: float) -> tu
     """
     range_m = images_s * model.closing_speed_m_s
     bound_m = model.angle_sensor.error_bound(range_m) * range_m
+    # The last image, and the times of the others before it.
     last_s = images_s[-1]
     earlier_s = images_s[:-1] - last_s
     disturbance = model.disturbance_m_s2
@@ -203,7 +205,8 @@ def _worst_shift_along_m(model: SetModel, images_s: Floats, arrival_s: float) ->
     disturbance = model.disturbance_m_s2
     last_s = images_s[-1]
 
-    # Times before the last image, up to the minimum of the difference.
+    # Times before the last image, up to the minimum of the difference; without a disturbance it has
+    # none. After the last image the time is zero.
     steps = np.arange(math.ceil((arrival_s - last_s) / model.step_s) + 1)
     times_s = arrival_s - last_s - model.step_s * steps
     of_minimum_s = 0.5 * speed_m_s / disturbance if disturbance else None

@@ -203,6 +203,7 @@ def documented(owner: type[_Owner]) -> type[_Owner]:
 
 def _described(name: str, declared: Sequence[Column]) -> list[str]:
     """Return the lines of a field with columns in a docstring."""
+    # The last of several columns stands for all: x, z, or B.R.
     last = declared[-1]
     array = "masked array" if last.nullable else "ndarray"
     if issubclass(last.kind, Enum):

@@ -75,4 +75,5 @@ def phase_magnitude(phase_deg: float) -> float:
         of_large_angles = math.exp(-a * tangent**b)
         functions.append(near * of_small_angles + (1.0 - near) * of_large_angles)
     first, second = functions
+    # A magnitude is -2.5 log10 of the brightness, by definition.
     return -2.5 * math.log10((1.0 - SLOPE) * first + SLOPE * second)

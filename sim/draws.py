@@ -241,6 +241,7 @@ def draw_starts(scenario: Scenario, runs: Sequence[int], seed: int) -> Starts:
     lower, upper = corners(scenario.dispersion)
     redraws = None
     if scenario.covariance is None:
+        # (z, x, V_z, V_x). In space y is inserted before z, and V_y before V_z.
         uniform = np.stack([generator(seed, run, START).uniform(size=4) for run in runs])
         if scenario.is_spatial:
             along_y = np.stack([generator(seed, run, START + Y).uniform(size=2) for run in runs])
@@ -289,7 +290,7 @@ def max_number_of_steps(scenario: Scenario) -> int:
     closest approach.
     """
     box = scenario.dispersion
-    slowest = -box.vx_m_s[1]
+    slowest = -box.vx_m_s[1]  # V_x is negative
     model = scenario.set_model
     model = with_gravity(model, scenario.sun, max_impulses_m_s(model, scenario.engine))
     speed_change = min(model.gravity_speed_change, MAX_SPEED_CHANGE)

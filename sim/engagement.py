@@ -230,8 +230,12 @@ class Engagements:
         return self.step * self.scenario.set_model.step_s
 
     def _measure(self, sight: Sight, pending: Pending, tracking: Flags) -> Measurements:
-        """Measure with the sensors that are due, cut the sets, and return the values of the sensors
-        that measured. `sight` is the geometry in the axes of the camera, which the sets have too.
+        """Measure with the sensors that are due, cut the sets in the order of these sensors, and
+        return the values of the sensors that measured.
+
+        `sight` is the geometry in the axes of the camera, which the sets have too. If the image of
+        the step can be lost, there is a cut with the image where it was taken and, with other
+        sensors due, one without it where it was lost; no engagement is in both.
         """
         measured = self._instruments.measure(self.step, sight, pending, tracking, self._view)
         for values, where in measured.cuts:
@@ -334,6 +338,7 @@ class Engagements:
         information = self._information
         is_over = self._impulses.is_over(self.step) & ~self._flight.arrived
         if not (self._label_ends.ends_now(is_over) or information.sections_are_leaving()):
+            # No section must be stored, as in most steps.
             information.drop_below_threshold()
             return
         feasible = information.feasible.copy()
@@ -360,6 +365,8 @@ class Engagements:
         if body.is_sphere_around_aim:
             return np.ma.MaskedArray(miss.distance_m <= body.inscribed_m, mask=False)
 
+        # The silhouette is symmetric: the centre seen from the spacecraft is inside where the
+        # spacecraft seen from the centre is.
         angle_rad: Floats | float | None = self._draws.axis_angle_rad
         if not body.is_turned_by_chance:
             angle_rad = body.axis_angle_rad

@@ -101,7 +101,7 @@ class _Motion:
         return np.asarray(np.linalg.norm(self.relative[0], axis=0))
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=64)  # a simulation needs the bounds of its scenario several times
 def flight_bounds(
     bounds: StateBox, disturbances_m_s2: tuple[float, ...], sun: Sun, impulses_m_s: float
 ) -> FlightBounds:
@@ -137,7 +137,8 @@ def flight_bounds(
     half = np.concatenate([np.linalg.norm(half, axis=1, keepdims=True), half], axis=1)
 
     # Deviations at t = 0 and accelerations of spacecraft and object. All impulses are given at
-    # once, along each axis: the deviations are largest then.
+    # once, along each axis: the deviations are largest then. Axes of `first`: position and
+    # velocity; spacecraft and object; modulus, lateral axes and x.
     impulses = np.array([impulses_m_s, *(impulses_m_s for _ in boxes), 0.0])
     nothing = np.zeros_like(half[0])
     first = np.array([[nothing, half[0]], [impulses, half[1]]])
@@ -188,6 +189,7 @@ def _deviation(
     for _ in range(TRIALS):
         size_m = place[:, MODULUS]
         size_m_s = speed[:, MODULUS]
+        # Less the way of half a step, at the speed of the instant.
         nearest_m = far_m - size_m - 0.5 * step_s * (fast_m_s + size_m_s)
         too_near = (nearest_m < NEAREST_SHARE * far_m).any(axis=0)
         if too_near.any():
@@ -196,6 +198,7 @@ def _deviation(
         gradient = (sun.gravitational_parameter_m3_s2 / nearest_m**3)[:, None]
         growth = gradient * (1.5 * size_m[:, None] + 0.5 * place) + disturbance_m_s2[..., None]
         new_speed = first[1, ..., None] + step_s * _sums(greater_of_neighbours(growth))
+        # Speeds do not decrease: the later one of two instants is a bound between them.
         new_place = first[0, ..., None] + step_s * _sums(new_speed[..., 1:])
         grows = ((new_place > place) | (new_speed > speed)).any(axis=(0, 1))
         if not grows.any():
@@ -228,7 +231,7 @@ def _bounds(nominal: _Motion, deviation: _Motion, times_s: Floats, instants: int
     place_error = deviation.place_m.sum(axis=0)
     speed_error = deviation.speed_m_s.sum(axis=0)
     offset = np.abs(place) + place_error[1:]
-    # Flights end at x = 0.
+    # Flights end at x = 0: x is not negative, and its maximum is that of its modulus.
     offset[X] = np.maximum(place[X] + place_error[X], 0.0)
     across = np.linalg.norm(place[:X], axis=0) + place_error[MODULUS]
     distance = np.minimum(nominal.range_m + place_error[MODULUS], np.hypot(offset[X], across))

@@ -41,7 +41,9 @@ def on_board_model(scenario: Scenario) -> SetModel:
 
 def max_impulses_m_s(model: SetModel, thruster: Thruster) -> float:
     """Return the maximum sum of a flight's impulses, m/s: the budget, or one in every step."""
+    # At the lowest closing speed of the start, and one in step 0.
     steps = model.bounds.x_m[1] / (-model.bounds.vx_m_s[1] * model.step_s) + 1.0
+    # An executed impulse may be greater than the commanded one, which the budget limits.
     most = min(thruster.budget_m_s, thruster.max_impulse_m_s * steps)
     return most * (1.0 + thruster.execution_error_relative)
 
@@ -78,14 +80,17 @@ def with_gravity(model: SetModel, sun: Sun | None, impulses_m_s: float) -> SetMo
     flight = flight_bounds(model.bounds, disturbances, sun, impulses_m_s)
     gradient = sun.gravitational_parameter_m3_s2 / flight.nearest_m**3
     distance = flight.distance_m
+    # Bounds at each time, shape (N,).
     pull = 2.0 * gradient * flight.distance_m
     jerk = (
         2.0 * gradient * (flight.speed_m_s + 3.0 * distance * flight.fastest_m_s / flight.nearest_m)
     )
 
+    # Equation (5) holds for bounds from each time on. The symbol m is that of Lemma 2.
     m = flight.closing_speed_m_s
     later_pull = _max_later(pull)
     later_jerk = _max_later(jerk)
+    # Shapes (axes, N), the lateral axes: the last row of both is x.
     offset = flight.offset_m[:-1]
     velocity = flight.velocity_m_s[:-1]
     tide = gradient * (1.5 * distance + 0.5 * offset)
@@ -97,6 +102,8 @@ def with_gravity(model: SetModel, sun: Sun | None, impulses_m_s: float) -> SetMo
     # Change of the closing speed until the end of each step, as a share of the lowest one.
     slowest_m_s = min(m, model.closing_speed_m_s)
     changes = np.cumsum(greater_of_neighbours(pull)) * flight.times_s[1] / slowest_m_s
+    # The guaranteed model needs a `speed_error` below 1, of which the closing speeds of the start
+    # take a part. If they take all, `allowed` is not positive: the cause is not gravity.
     allowed = 1.0 - replace(model, gravity_speed_change=0.0).speed_error
     if model.is_guaranteed and changes[-1] >= allowed > 0.0:
         cause = (

@@ -334,7 +334,8 @@ def leap(
             first = state[ACCELERATION, axis, craft]
             second = stage[ACCELERATION, axis, craft]
             stage[POSITION, axis, craft] = before + duration_s * (speed + 0.5 * duration_s * second)
-            # Rounding errors must not accumulate: the set allows for those of one step.
+            # Rounding errors of positions must not accumulate: the set allows for those of one
+            # step. Those of velocities are not kept.
             way = duration_s * (speed + sixth * (first + 2.0 * second)) + state[LOST, axis, craft]
             position = before + way
             state[POSITION, axis, craft] = position
@@ -373,6 +374,7 @@ def longest_leap_s(
             )
             squared += place * place
             speed_squared += speed * speed
+        # The square of the speed of a circular orbit, in place of a lower speed.
         of_orbit = gravitational_parameter_m3_s2 / math.sqrt(squared)
         time_s = math.sqrt(squared / max(speed_squared, of_orbit))
         share = acceleration_error_m_s2 * squared / gravitational_parameter_m3_s2
@@ -636,8 +638,10 @@ def advance_all(
                 )
             if is_receding and not passed[b]:
                 passed[b] = True
+                # `before` changes: it is not needed again.
                 to_zero = arrive(before, manoeuvre, gravitational_parameter_m3_s2, error, stage)
                 arrival_s[b] = step_s - left + to_zero
+            # Exactly zero after the last leap, without a rounding error.
             left = left - duration if leaps > 1.0 else 0.0
 
 

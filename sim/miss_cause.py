@@ -165,6 +165,7 @@ class DecisionLog:
     ) -> Floats:
         """Return the misses M_i without the impulses from each decision on, shape (K + 1, C, B)."""
         effects_m = np.zeros((len(steps) + 1, *lateral_miss_m.shape))
+        # An impulse whose delay ends after the last step has the last row, which is zero.
         effects_m[:-1] = self._executed_m_s[np.minimum(steps, len(self._executed_m_s) - 1)]
         sizes = modulus(effects_m[:-1].swapaxes(0, 1))
         middles_s = times_s[:, None] + 0.5 * self._scenario.engine.burn_s(sizes)
@@ -193,6 +194,7 @@ class DecisionLog:
         critical = _last(possible)
         last = _last(flights.tracking)
         is_before_last = critical < last
+        # The decision after the critical one; without a critical one it is the first.
         after = np.minimum(critical + 1, len(times_s))
         later_corrects_m = corrects_m(after)
 

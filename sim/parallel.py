@@ -202,6 +202,7 @@ def simulate_task(task: Task, stopped: Callable[[], bool] | None = None) -> Resu
             parts.append(results_of_kind)
             before += len(runs)
 
+    # The parts are in the order of their noises; `take` below restores the order of the runs.
     results = join(parts)
     if not is_finite(results):
         raise FloatingPointError(

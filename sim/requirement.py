@@ -302,6 +302,7 @@ def _decision(holding: Integers, share: float, watched: bool) -> Decision:
         met = at_most <= _TAIL
         missed = at_least <= _TAIL
     else:
+        # One value each: only the number of all runs is tested.
         first, last = _ranks(size, share, watched)
         met = holding[-1:] >= last
         missed = holding[-1:] < first

@@ -303,6 +303,7 @@ class Scenario:
         got = repr(asked_s)
         if asked_s is not None and steps is not None:
             scheduled_s = self.nominal_arrival_s - steps[-1] * step_s
+            # Compared with six digits, with which the message shows the step.
             if f"{scheduled_s:.6g}" != f"{asked_s:.6g}":
                 got += f", rounded to the step at {scheduled_s:.6g} s"
         raise ValueError(

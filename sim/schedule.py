@@ -153,6 +153,7 @@ def _asked_impulses(scenario: Scenario, scheduled_s: Sequence[float]) -> Iterato
         return
     yield nearest_step("last_impulse_s", last_s)
     if thruster.impulse_period_s is not None:
+        # The last impulse, 0 periods, is reported above.
         for periods in range(1, len(scheduled_s)):
             time_s = last_s + periods * thruster.impulse_period_s
             yield nearest_step("impulse_period_s", time_s)

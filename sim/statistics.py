@@ -280,6 +280,7 @@ def correlation_interval(
     variance = (SPEARMAN_VARIANCE if ranks else 1.0) / (size - 3)
     half = NormalDist().inv_cdf(0.5 + 0.5 * confidence) * math.sqrt(variance)
     with np.errstate(divide="ignore"):  # the interval of 1 is the point 1
+        # A coefficient may exceed 1 by rounding.
         z = np.arctanh(np.clip(correlation, -1.0, 1.0))
     return float(np.tanh(z - half)), float(np.tanh(z + half))
 

@@ -36,6 +36,7 @@ def acceleration_m_s2(
     elif target.manoeuvre is Manoeuvre.RANDOM_TELEGRAPH:
         # Probability of an odd number of switches within a step of a Poisson process.
         odd = 0.5 * (1.0 - math.exp(-2.0 * step_s / target.switching_period_s))
+        # Number 0 is the side at the start; each later step may change it.
         uniform = 0.5 * (1.0 + draws[..., 1 : step + 1])
         switches = uniform < odd
         side = first * (-1.0) ** switches.sum(axis=-1)

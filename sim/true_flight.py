@@ -152,6 +152,7 @@ class TrueFlight:
             return None
 
         # Signed misses of the true states without further impulses.
+        # The velocity across the line of sight, less the impulse, times the time to x = 0.
         left_s = np.maximum(self._arrival_s - step * self._step_s, 0.0)
         centre_m = (sight.omega_rad_s * sight.range_m - impulse_m_s) * left_s
         predicted_m = np.asarray(centre_m + self._aim_m)

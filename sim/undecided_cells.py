@@ -143,4 +143,5 @@ class UndecidedCells:
                 sample.add(self._rule.numbers(values))
             cell.judged += 1
 
+        # Of a decided cell; without a decision nothing waits after the last chunk.
         cell.waiting.clear()

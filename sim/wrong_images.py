@@ -106,6 +106,7 @@ def draw_wrong_measurements(
         Errors in units of the bounds; zero for measurements that are not wrong.
     """
     earliest_s, latest_s = math.inf, -math.inf
+    # Times before the arrival: the minimum is the latest one.
     if wrong.when_s is not None:
         latest_s, earliest_s = wrong.when_s
     possible = np.flatnonzero((before_arrival_s >= latest_s) & (before_arrival_s <= earliest_s))

@@ -197,11 +197,12 @@ class _Report:
 
         After all bars are finished, a new bar has a new estimate.
         """
-        if all(done >= 1.0 for done in self._done.values()):
-            self._done.clear()
-            self._first, self._is_told = None, False
-        bar = self._bars.add_task(name, total=1.0)
-        self._done[bar] = 0.0
+        with self._lock:
+            if all(done >= 1.0 for done in self._done.values()):
+                self._done.clear()
+                self._first, self._is_told = None, False
+            bar = self._bars.add_task(name, total=1.0)
+            self._done[bar] = 0.0
         return partial(self._update, bar, name)
 
     def _update(self, bar: TaskID, name: str, done: float) -> None:

@@ -265,6 +265,8 @@ def _kepler_flight(relative: Floats, craft: Floats, parameter: float) -> _Kepler
         method="DOP853",
         events=along_x,
         dense_output=True,
+        # The absolute tolerance is for values near zero; chosen: a tenth of the relative error of a
+        # value of one.
         rtol=INTEGRATION_TOLERANCE,
         atol=0.1 * INTEGRATION_TOLERANCE,
     )

@@ -419,6 +419,7 @@ class AxisDifferences:
         positions = transition[:, 0]
         speeds = transition[:, 1]
         to_go_s = motion.range_m / motion.closing_speed_m_s[:-1]
+        # Two starts differ by at most the width of the box, two accelerations by twice the bound.
         self._widths = np.array([np.ptp(box.z_m), np.ptp(box.vz_m_s)])
         self._pushes = 2.0 * model.disturbance_m_s2 * np.diff(motion.pushed[:, own, axis], axis=0)
         self._normals = np.stack(
@@ -431,6 +432,7 @@ class AxisDifferences:
         for name, sensor in sensors.items():
             measured = due[name]
             speeds_m_s = motion.closing_speed_m_s[measured]
+            # Two motions can have equal measurements if they differ by at most two error bounds.
             band = sensor.band(motion.range_m[measured], speeds_m_s, 2.0 * (1.0 - MARGIN))
             if band is not None:
                 column = PREDICTED_MISS if band[0] else POSITION

@@ -180,7 +180,8 @@ def _course(scenario: Scenario) -> _Course:
     if scenario.impulse_steps is not None:
         may_decide = np.isin(np.arange(steps), scenario.impulse_steps)
 
-    # The set has the accelerations of a step as velocities at its ends (Lemma 3).
+    # The set has the accelerations of a step as velocities at its ends, half of them at each: at
+    # t = 0 there is one half only (Lemma 3).
     arms_m = model.acceleration_m_s2 * step_s * ranges_m / e
     farthest_m = max(abs(z + v * box.x_m[0] / e) for z in box.z_m for v in box.vz_m_s)
     return _Course(

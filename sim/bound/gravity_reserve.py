@@ -206,6 +206,8 @@ def _domain(
     horizon = arrival_s + gap
     impulses = _impulses_until(horizon, thruster, step_s)
 
+    # The greatest deviation of a target within the gap after each time: at its rate, and by its
+    # engine.
     size = float((half.half_m + gap * half.rate_m_s).max()) + 0.5 * half.disturbance_m_s2 * gap**2
     nearest = (
         near
@@ -219,6 +221,7 @@ def _domain(
 
     gradient = parameter / nearest**3
     turned = 2.0 * gradient * horizon**2
+    # The three conditions of Lemma 21, in its symbols k, G gamma^2 and 12 h (k - 1).
     # cosh(2) is more than the limit of 2 below, so that a greater argument is refused too.
     growth = math.cosh(min(math.sqrt(turned), 2.0))
     if growth > 2.0 or gradient * gap**2 > 1.0 / 3.0 or 12.0 * size * (growth - 1.0) > nearest:
@@ -232,6 +235,7 @@ def _lemma_21(motion: Coasting, domain: _Domain) -> _GravityChanges:
     distances = np.linalg.norm(motion.states[:axes], axis=0)
     speeds = np.linalg.norm(motion.states[axes:], axis=0)
     farthest = float((distances + domain.gap_s * speeds).max())
+    # Part 1 of the lemma, then the two terms of v' in part 3.
     position = 6.0 * domain.size_m**2 / domain.nearest_m * domain.turned * domain.growth
     by_size = 4.0 * domain.gradient_per_s2 * domain.size_m * domain.horizon_s
     by_impulses = 0.5 * domain.impulses_m_s * domain.turned * domain.growth

@@ -69,6 +69,7 @@ class PairNoise:
             true = sensor.true_value(sight)
             is_wrong = name == BearingSensor.name and sight.step in self._exact_in
             if is_wrong:
+                # Of each pair of neighbours the first, or the second, engagement.
                 of_motion = true[..., self._exact_in[sight.step] :: 2]
                 measured[name] = np.repeat(of_motion, 2, axis=-1)
             else:

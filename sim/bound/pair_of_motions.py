@@ -392,6 +392,8 @@ class PairApproach:
         # Measurements count while a motion can still be nearer than the bound.
         left_m = max(0.0, half_m - correction.straight_m)
         shares = self._shares(last_common_step, difference, reserve, slope, left_m)
+        # Each motion has half of the difference, which is reduced until the largest share is 1 less
+        # `MARGIN`. A smaller one is not increased.
         share = 0.5 * (1.0 - MARGIN) / max(1.0 - MARGIN, shares.largest)
         pair = self._truths(
             last_common_step,
@@ -420,6 +422,7 @@ class PairApproach:
         track = (1.0 - MARGIN) * (motion.states + change)
         last = self.steps - 1
         far_m = float(np.hypot.reduce(track[lateral, -1]))
+        # The motion deviates from the middle by half of a difference of two.
         reserve = self._reserve(2.0 * change, far_m)
         if reserve is None:
             return self._truths(last, track, start, (1.0, 1.0), _NO_PROOF)

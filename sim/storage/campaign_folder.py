@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SHARDS = "shards"
+"""Name of the folder with the files of runs, in the folder of a campaign."""
 
 
 class CampaignFolder:
@@ -160,7 +161,11 @@ def _names(manifest: Manifest) -> set[str]:
 
 
 def _name(cell: int, runs: Sequence[int]) -> str:
-    """Return the name of the file of a chunk."""
+    """Return the name of the file of a chunk.
+
+    Leading zeros put names into the order of cells, of which there are at most `MAX_CELLS`, and
+    runs.
+    """
     return f"cell-{cell:05d}-runs-{runs[0]:08d}-{runs[-1]:08d}.parquet"
 
 
