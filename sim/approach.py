@@ -184,6 +184,7 @@ def closest_approach_s(states: Floats, parameter_m3_s2: float) -> float:
     # positive to negative if the integration is backward.
     radial.terminal = True  # type: ignore[attr-defined]
     radial.direction = np.sign(horizon_s)  # type: ignore[attr-defined]
+    # Zero if the approach is now; negative, for a backward integration, if the two recede.
     time_s = 0.0
     if horizon_s:
         times_s = _integrate(states, parameter_m3_s2, horizon_s, radial).t_events[0]
@@ -206,6 +207,7 @@ def propagate(states: Floats, parameter_m3_s2: float, duration_s: float) -> tupl
     the integration fails.
     """
     end = _integrate(states, parameter_m3_s2, duration_s).y[:, -1]
+    # As in `pair_rates`: 12 numbers of the pair, then 36 of the matrix.
     return end[:12].reshape(4, 3), end[12:].reshape(6, 6)
 
 

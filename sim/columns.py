@@ -169,6 +169,7 @@ def _array_of(column: Column, cells: Sequence[Cell]) -> Any:
             )
         if isinstance(cell, int | float) and not abs(cell) <= MAXIMUM:
             raise ValueError(f"column {column.name!r} has a number beyond {MAXIMUM:g}")
+    # Zeros below the mask.
     values: NDArray[Any] = np.array(
         [0 if cell is None else cell for cell in cells], dtype=column.kind
     )

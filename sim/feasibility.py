@@ -64,6 +64,7 @@ def feasibility(scenario: Scenario) -> Feasibility | None:
         return None
 
     position_m, velocity_m_s, _ = draw_starts(scenario, range(STARTS), 0)
+    # x is the last component.
     arrivals_s = position_m[:, -1] / -velocity_m_s[:, -1]
     lateral_m = position_m[:, :-1] + velocity_m_s[:, :-1] * arrivals_s[:, None]
     unguided_m = np.hypot.reduce(lateral_m + model.lateral_aim_m, axis=1)

@@ -270,6 +270,7 @@ def _distances_of_segment(nominal: _Motion, deviation: _Motion) -> tuple[Floats,
     own = nominal.place_m[0]
     relative, _ = nominal.relative
     length = np.maximum(np.linalg.norm(relative, axis=0), np.finfo(float).tiny)
+    # Length, along the line of the segment, of its point nearest to the body.
     foot = -(own * relative / length).sum(axis=0)
     height = np.sqrt(np.maximum((own * own).sum(axis=0) - foot**2, 0.0))
 
@@ -277,6 +278,7 @@ def _distances_of_segment(nominal: _Motion, deviation: _Motion) -> tuple[Floats,
         """Return the minimum over the segment, with deviations at its two ends."""
         # With a slope of one the minimum is at an end, as it is with almost one.
         slope = np.clip((of_object - of_craft) / length, -1.0 + 1e-12, 1.0 - 1e-12)
+        # The derivative of the distance less the deviation is zero here.
         at = np.clip(foot + height * slope / np.sqrt(1.0 - slope**2), 0.0, length)
         deviation_m = (of_object - of_craft) * (at / length)
         return np.asarray(np.hypot(height, at - foot) - of_craft - deviation_m)

@@ -13,8 +13,11 @@ from infoset.sim.flight_bounds import flight_bounds, greater_of_neighbours, no_b
 from infoset.sim.scenario import Scenario, Sun
 
 MIN_SPEED_CHANGE = 1e-8
-"""Minimum bound of the relative change of the closing speed (docs/guarantee.md, after Lemma 2):
-above the change by gravity in the 1997 scenario, and far above rounding errors.
+"""Minimum bound of the relative change of the closing speed, also in free space: an allowance for
+rounding (docs/guarantee.md, after Lemma 2). Without it, an exactly known closing speed leaves
+only the other allowances in the bounds that grow with eta, of labels, starts and impulses, and
+those of a computed truth are rounded. It is far above rounding errors, and above the change by
+gravity in the 1997 scenario.
 """
 
 

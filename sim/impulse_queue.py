@@ -134,6 +134,7 @@ class ImpulseQueue:
         if self._last_step is not None and step >= self._last_step:
             is_over = np.ones(len(self.budget_left_m_s), dtype=bool)
         else:
+            # With a minimum impulse of zero, only a budget of zero is over.
             is_over = self.budget_left_m_s < max(self._thruster.min_impulse_m_s, MIN_FLOAT)
         for waiting in self._waiting:
             is_over &= modulus(waiting) == 0.0
@@ -141,5 +142,6 @@ class ImpulseQueue:
 
     def given_m_s(self) -> Floats:
         """Return the sum of the moduli of the impulses given so far, m/s, shape (B,)."""
+        # The budget left is without the impulses that wait, and those after the closest approach.
         not_given = self._not_given_m_s + sum(map(modulus, self._waiting))
         return np.maximum(self._thruster.budget_m_s - self.budget_left_m_s - not_given, 0.0)

@@ -136,6 +136,7 @@ class KeplerMotion:
 
         parameter = 0.0
         if sun is not None:
+            # Components (y, z, x), of which a plane has the last two.
             toward_sun, along_orbit = sun_and_orbit(sun)
             speed = np.sqrt(sun.gravitational_parameter_m3_s2 / sun.distance_m)
             self._motion[:, POSITION, :, SPACECRAFT] = -sun.distance_m * toward_sun[-axes:]

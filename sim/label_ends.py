@@ -58,6 +58,7 @@ class LabelEnds:
         Impulses that were decided before can still be given then. A label whose range is zero at
         `time_s` keeps its miss.
         """
+        # In most steps nothing changes; these two returns only save time.
         if not self._engagements.size:
             return
         impulse = np.where(where, impulse_m_s, 0.0)
@@ -140,6 +141,8 @@ class LabelEnds:
         model = self._model
         if not model.is_guaranteed:
             return np.ones_like(labels)
+        # The range by the label is 1 + eta of the mean closing speed. At the arrival eta may be
+        # greater, by at most the change by gravity.
         farthest = model.bounds.x_m[1] * (1.0 + model.gravity_speed_change) / labels
         return np.asarray(np.minimum(1.0 + model.speed_error, farthest))
 

@@ -325,6 +325,8 @@ def _ranks(size: int, share: float, watched: bool) -> tuple[int, int]:
     """
     if not watched:
         return order_statistics(size, share, CONFIDENCE)
+    # For each number of runs that satisfy the bound: small ones reject the requirement, large ones
+    # meet it.
     met, missed = p_values(size, np.arange(size + 1), share)
     return int((missed <= _TAIL).sum()), int((met > _TAIL).sum())
 

@@ -188,6 +188,7 @@ def simulate_runs(
 def _run_numbers(runs: int | Sequence[int]) -> Integers:
     """Return run numbers from their number or a sequence of them."""
     numbers = np.asarray(runs)
+    # An empty sequence has the type float.
     is_integer = numbers.dtype.kind in "iu" or not numbers.size
     if isinstance(runs, bool) or numbers.ndim > 1 or not is_integer:
         raise TypeError(

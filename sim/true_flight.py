@@ -116,6 +116,7 @@ class TrueFlight:
         present_m = self._motion.position_m.T
         distance_m = np.where(passed, self._distance_m, self._motion.sight().range_m)
         lateral_m = np.where(passed, self._lateral_m, present_m[:-1])
+        # The stored distances are those of the centre.
         if self._aim_m.any():
             distance_m = np.where(
                 passed,

@@ -75,6 +75,7 @@ class Coasting:
     @property
     def range_m(self) -> Floats:
         """Range x at the steps, m, shape (n - 1,)."""
+        # x is the last of the positions.
         ranges_m = self.states[self.axes - 1]
         return np.asarray(np.maximum(ranges_m[:-1], MIN_RANGE * ranges_m[0]))
 

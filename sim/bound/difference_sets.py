@@ -253,6 +253,7 @@ def cut_by_strip(
             # Away from the corner; past the end of the list the edges are reversed segments.
             i = (corner + step) % count if side == 0 else (corner - 1 - step) % count
             sign = 1.0 if (i >= corner) == (side == 0) else -1.0
+            # The other side may have removed the whole segment.
             if segments.share[i] > 0.0:
                 to_remove, removed = remove_part(segments, i, sign, to_remove, strip, removed)
 

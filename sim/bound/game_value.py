@@ -225,6 +225,7 @@ def _half_widths_m(model: SetModel, nearest_m: float, measured: Flags) -> Floats
         if not widest.tracking.all():
             break
         if measured[i]:
+            # The images belong to the classes in turn.
             widest.measure_angle(0.0, ~left_out[:, i // every % classes])
         half_width_m[i] = widest.predicted_miss().upper_m[0].max()
         widest.drop_below_threshold()
@@ -246,7 +247,7 @@ def _guarantee(scenario: Scenario, course: _Course, case: _Case) -> tuple[float,
     speed_m_s = max(abs(v) for v in model.bounds.vz_m_s)
     worst_m = course.first_m
     wider = 1.0
-    last_to_go_s = math.inf
+    last_to_go_s = math.inf  # before the first impulse: its inverse is zero
     by_parts_m_s = 0.0
     spent_m_s = 0.0
     for i in range(len(to_go_s)):

@@ -252,6 +252,7 @@ def _corollary(
     motion: Coasting, half: _HalfDifference, domain: _Domain, changes: _GravityChanges
 ) -> GravityReserve | None:
     """Return the bounds of equation (25), or None if the closest approach may be after H."""
+    # Lateral velocities: after the positions, and before the velocity along x.
     lateral = motion.states[motion.axes : -1]
     turn = float(np.linalg.norm(lateral - lateral[:, :1], axis=0).max())
     slowest = float(motion.closing_speed_m_s.min())
@@ -259,10 +260,12 @@ def _corollary(
     times_s = np.append(motion.times_s[:-1], domain.horizon_s)
     nearer_m = domain.impulses_m_s * changes.stretch_per_s2 * times_s**3
     nearer_end = float(nearer_m[-1])
+    # The assumption of the corollary: x = 0 and the closest approach are before the horizon.
     to_pass = nearer_end + changes.position_m + float(half.half_m[-1]) + half.reach_m
     if minimum <= 0.0 or to_pass > domain.gap_s * minimum:
         return None
 
+    # tau and zeta of equation (25).
     late = (nearer_end + 0.5 * changes.position_m) / minimum
     acceleration = half.disturbance_m_s2 + 4.0 * domain.gradient_per_s2 * domain.size_m
     drift = late * (2.0 * float(half.rate_m_s[-1]) + changes.speed_m_s + acceleration * late)

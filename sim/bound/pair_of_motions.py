@@ -385,6 +385,7 @@ class PairApproach:
         speeds = np.abs(self._middle[1]) + np.abs(half.velocity_m_s) + by_manoeuvre
         slope = self._slope(speeds, reserve)
         beyond_m = reserve.position_m + reserve.drift_m
+        # Half of the difference along x at the arrival, whose row follows the lateral ones.
         along_m = (
             0.5 * (abs(float(difference[self.lateral, -1])) + beyond_m) + correction.by_gravity_m
         )
@@ -601,6 +602,7 @@ class PairApproach:
         """Return the terms of equation (26) of docs/guarantee-bound.md after the first one, m."""
         closing = reserve.closing_m_s
         to_go = sighting.to_go_s
+        # The last row is along x.
         rates = np.abs(difference[self.motion.axes :, sighting.due]) + reserve.speed_m_s
         mistimed = (sighting.moved_m + to_go * reserve.deviation_m_s) / closing
         beyond = reserve.position_m + reserve.speed_m_s * to_go + rates[: self.lateral] * mistimed
