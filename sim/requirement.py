@@ -251,7 +251,7 @@ def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Requ
         return RequirementVerdict(decision, size, value, lower, upper, needed, known)
 
     # A decision at an earlier run stays valid, although the last interval may contain the bound
-    # again.
+    # again. The interval is below the bound if a quantile meets it, or a share of hits does not.
     if (decision is Decision.MET) == isinstance(requirement, Requirement):
         upper = requirement.bound if upper is None else min(upper, requirement.bound)
     else:

@@ -190,6 +190,8 @@ def order_statistics(size: int, level: float, confidence: float) -> tuple[int, i
     """
     from scipy.stats import binom  # slow to load, and few commands need it
 
+    # Let K values be below the quantile: the value of rank r is not below it if K < r. P(K < r) is
+    # at most the tail for the lower rank, and at least one minus the tail for the upper one.
     tail = 0.5 * (1.0 - confidence)
     return int(binom.ppf(tail, size, level)), int(binom.ppf(1.0 - tail, size, level)) + 1
 

@@ -300,6 +300,7 @@ class PairApproach:
         for index in np.argsort(-estimates_m, kind="stable").tolist():
             if best is not None and (estimates_m[index] <= best.bound_m or not self.arrives):
                 break
+            # The last of this number of common steps, which are counted from 0.
             pair = self.pair(int(common_steps[index]) - 1)
             best = pair if best is None else max(best, pair, key=UNLIMITED)
         assert best is not None
@@ -377,6 +378,7 @@ class PairApproach:
         half_m = 0.5 * float(np.hypot.reduce(difference[: self.lateral, -1]))
         reserve = self._reserve(difference, half_m)
         if reserve is None:
+            # Its bound is minus infinity: any pair with a proof is better.
             pair = self._truths(last_common_step, 0.5 * difference, half, (1.0, -1.0), _NO_PROOF)
             return pair, np.zeros((self.steps, 2))
 
@@ -428,6 +430,7 @@ class PairApproach:
         if reserve is None:
             return self._truths(last, track, start, (1.0, 1.0), _NO_PROOF)
 
+        # Change of x at the arrival: by impulses, by start and manoeuvre, and beyond first order.
         along_m = reserve.nearer_m[-1] + abs(change[self.lateral, -1]) + 0.5 * reserve.position_m
         late_s = float(along_m) / reserve.closing_m_s
         correction = self._correction(-1, late_s, reserve)

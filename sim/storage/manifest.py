@@ -150,6 +150,7 @@ class Manifest:
     def values_of(self, cell: int) -> dict[str, float]:
         """Return the varied values of a cell of a sweep, by key."""
         values = {}
+        # The last axis varies fastest: its number is the remainder.
         for axis in reversed(self.axes):
             cell, number = divmod(cell, len(axis.values))
             values[axis.key] = axis.values[number]
@@ -162,6 +163,7 @@ class Manifest:
     @property
     def identity(self) -> str:
         """Fingerprint of `decisive`; every file of runs contains it."""
+        # 32 digits of a hash, 128 bits, tell all campaigns apart.
         text = json.dumps(self.decisive(), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:32]
 
