@@ -128,12 +128,17 @@ class Arc:
         return self.motion.breaks(self.start_s, self.end_s)
 
     def effects(self, time_s: Floats) -> Floats:
-        """Return the effect of a unit control for a second at times (k,), shape (k, c, 3)."""
+        """Return the effect of a unit control for a second at times (k,), shape (k, c, 3).
+
+        A control acts on the velocities, the last three columns of a transition.
+        """
         to_end = self.motion.transition(time_s, np.full(time_s.shape, self.end_s))
         return np.asarray(to_end[:, : len(self.missing), 3:])
 
     def whitener(self) -> Floats:
         """Return C^-1 S^-1, shape (c, c), with S the units and C C' the Gramian in these units.
+
+        The units are the duration for positions and 1 for velocities.
 
         Raises
         ------
@@ -198,6 +203,7 @@ class BoundedFlight:
         times = np.asarray(time_s, dtype=np.float64)
         grid = np.union1d(self.edges_s, times)
         nodes, weights = _rule(grid)
+        # Each node acts until the end of its own interval.
         last = np.repeat(grid[1:], len(_NODES))
 
         effects = self.motion.transition(nodes, last)[:, :, 3:]
@@ -209,6 +215,7 @@ class BoundedFlight:
         states[0] = self.start_state
         for index in range(len(grid) - 1):
             states[index + 1] = transitions[index] @ states[index] + changes[index]
+        # All times are places of the grid.
         return np.asarray(states[np.searchsorted(grid, times)])
 
 
@@ -240,7 +247,7 @@ class LeastBound(NamedTuple):
 def saturated(wanted: Floats, max_m_s2: float) -> Floats:
     """Return vectors, shape (..., 3), shortened to the length `max_m_s2` where they are longer."""
     sizes = np.linalg.norm(wanted, axis=-1, keepdims=True)
-    return np.asarray(wanted * np.minimum(1.0, max_m_s2 / np.maximum(sizes, max_m_s2)))
+    return np.asarray(wanted * (max_m_s2 / np.maximum(sizes, max_m_s2)))
 
 
 def power(sizes: Floats, max_m_s2: float) -> Floats:
@@ -278,6 +285,7 @@ def solve_bounded(arcs: Sequence[Arc], max_m_s2: float) -> BoundedOptimum:
         ]
         sampled = list(map(_sample, arcs, whiteners, edges))
 
+        # The point is of the old nodes, and is judged with those of its own switching times.
         judged = dual.judged(sampled, point)
         if judged.violation < best.violation:
             best = judged
@@ -301,8 +309,8 @@ def least_bound(arcs: Sequence[Arc]) -> LeastBound:
     Krasovskii's problem of moments: sum lambda_k . e_k <= u_max sum int |s_k| dt for all costates,
     so each costate with sum L_k' lambda_k = 0 gives the lower bound sum lambda_k . d_k / sum int
     |s_k| dt. A cone program (Clarabel) with the integral as a sum finds the best costates; the
-    result is their lower bound with the exact integral, whatever the solver found. If all d_k are
-    zero, the bound is 0 and the shares are equal.
+    result is their lower bound with the exact integral, whatever the solver found. The weights of
+    the arcs do not matter. If all d_k are zero, the bound is 0 and the shares are equal.
     """
     whiteners = [arc.whitener() for arc in arcs]
     goals = [white @ arc.missing for arc, white in zip(arcs, whiteners, strict=True)]
@@ -318,6 +326,7 @@ def least_bound(arcs: Sequence[Arc]) -> LeastBound:
     ]
     slopes = [white @ arc.slope for arc, white in zip(arcs, whiteners, strict=True)]
 
+    # Goals of length one: the tolerances of the solver are relative to one.
     efforts = _longest_goal(sampled, [goal / size for goal in goals], slopes)
 
     # Rounding leaves the efforts slightly outside the space in which they are bounds.
@@ -332,6 +341,7 @@ def least_bound(arcs: Sequence[Arc]) -> LeastBound:
     )
     reached = float(np.concatenate(efforts) @ np.concatenate(goals))
     total = float(integrals.sum()) * (1.0 + _EXACT_INTEGRAL)
+    # Zero is a lower bound too, should the solver have found a worse one.
     return LeastBound(max(reached / total, 0.0), integrals / integrals.sum())
 
 
@@ -398,6 +408,7 @@ class _Dual:
         It is the last point of the search also if that has not settled: `judged` finds the error.
         """
         value, slope, curvature = self._expand(sampled, point)
+        # This norm is that of the slope without control, at the point zero.
         settled = _SETTLED * float(np.linalg.norm(self.basis.T @ self._weighted_goal()))
 
         for _ in range(_MAX_NEWTON_STEPS):
@@ -419,9 +430,11 @@ class _Dual:
                 length *= 0.5
                 trial = self._expand(sampled, point + length * step)
 
+            # Beyond `_FARTHEST`, after the shortest step, or after one that was not compared.
             if not np.isfinite(trial.value):
                 break
-            # If the value changes by its rounding only, the slope has more digits.
+            # If the value changes by its rounding only, the slope has more digits: a step that does
+            # not halve it (chosen) is rounding too.
             if not compared and not np.linalg.norm(trial.slope) < 0.5 * np.linalg.norm(slope):
                 break
             point = point + length * step
@@ -483,10 +496,12 @@ class _Dual:
             control = saturated(wanted, self.max_m_s2)
             sizes = np.linalg.norm(wanted, axis=1)
             energies[index] = samples.weights @ (control**2).sum(axis=1)
+            # Twice the dual: the cost is half of the energy.
             lower[index] = 2.0 * (effort @ goal - samples.weights @ power(sizes, self.max_m_s2))
             reached.append(_effect(samples, control) - goal)
 
         slopes = np.concatenate(self.slopes)
+        # What free values z do not explain is an error: the effect may be d + L z for any z.
         missed = np.concatenate(reached)
         free = np.linalg.lstsq(slopes, missed, rcond=None)[0] if slopes.shape[1] else np.zeros(0)
         # 1e-300, here and below: goals of zero need no control, and keep the quotients defined.
@@ -549,7 +564,7 @@ def _curvature(samples: _Samples, wanted: Floats, sizes: Floats, max_m_s2: float
     second derivative of h is I inside the bound, and u_max (I - s s' / |s|^2) / |s| beyond it.
     """
     inside = sizes <= max_m_s2
-    share = np.where(inside, 1.0, max_m_s2 / np.maximum(sizes, max_m_s2))
+    share = max_m_s2 / np.maximum(sizes, max_m_s2)
     matrix = np.einsum(
         "k,kai,kbi->ab", samples.weights * share, samples.effects, samples.effects, optimize=True
     )

@@ -59,6 +59,7 @@ def step_of(
         flat = z.reshape(-1)
         flat_next = z_next.reshape(-1)
         flat_slopes = kz.reshape(STAGES, -1)
+        # After the last stage, the last row of weights gives the state at t + h.
         for stage in range(first, STAGES + 1):
             for i in range(len(y)):
                 y_next[i] = 0.0

@@ -40,6 +40,7 @@ def chebyshev_points(count: int) -> Floats:
 def chebyshev_fit(count: int) -> Floats:
     """Return the matrix of Chebyshev coefficients from values at `chebyshev_points(count)`."""
     matrix = (2.0 / count) * chebyshev.chebvander(chebyshev_points(count), count - 1).T
+    # The coefficient of degree zero is the mean; the others are twice a mean.
     matrix[0] *= 0.5
     return np.asarray(matrix)
 
@@ -94,9 +95,11 @@ def resolve(function: Callable[[Floats], Floats], breaks_s: Floats) -> tuple[Flo
     evaluated there. Returns half the lengths of the panels, s, and the coefficients, shape (P, 12,
     m), of Chebyshev polynomials of the position in the panel, -1 to 1.
 
-    A panel is halved until the last two coefficients are below 1e-11 of the maximum value on all
-    panels, or below 1e-7 of this value and no longer decreasing (rounding), or below the effect of
-    the rounding of times. Sinusoids on panels of one radian have an error below 1e-13 at once: the
+    A panel is halved until the last two coefficients are below 1e-11 of the largest coefficient
+    found so far, or below 1e-7 of it and no longer decreasing (rounding), or below the effect of
+    the rounding of times. Two, because every second one of an even or odd function is zero. The
+    effect of the rounding of times grows as panels get shorter, so that halving ends also at a jump
+    within a panel. Sinusoids on panels of one radian have an error below 1e-13 at once: the
     remainder of the interpolation is at most (1/2)^12 / (2^11 12!) = 2.5e-16 of their amplitude.
     Raise `ValueError` if a value is not finite, or no break is later than another.
     """
@@ -106,6 +109,8 @@ def resolve(function: Callable[[Floats], Floats], breaks_s: Floats) -> tuple[Flo
     if not len(starts):
         raise ValueError("no break is later than another")
     latest = float(np.abs(breaks_s).max())
+    # Coefficients of a panel before it was halved: infinite for initial panels, which are not yet
+    # rounding.
     before = np.full(len(starts), np.inf)
     scale = 0.0
     half_s = []
@@ -176,6 +181,7 @@ def max_control(control: Callable[[Floats], Floats], breaks_s: Floats) -> float:
         bounds = 0.5 * (top + bottom) + 0.5 * _FACTOR * (top - bottom)
         maximum = max(maximum, float(top.max()))
 
+        # A square has twice the relative difference of its root.
         may_be_larger = bounds > maximum * (1.0 + 2.0 * PEAK_TOLERANCE)
         if not may_be_larger.any():
             break
@@ -204,6 +210,7 @@ def integral_of_size(function: Callable[[Floats], Floats], breaks_s: Floats) -> 
             scale = float(parts.sum())
 
         left = np.abs(parts - whole) > _SIZE_TOLERANCE * scale * share
+        # Intervals that are left after the last halving count too: they are too short to matter.
         if level == _MAX_SIZE_HALVINGS:
             left[:] = False
         total += float(parts[~left].sum())

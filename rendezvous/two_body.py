@@ -25,8 +25,8 @@ Chosen: far above the rounding of a perigee, some 1e-15, and far below the radiu
 _STUMPFF_SERIES = np.array(
     [[(-1) ** k / math.factorial(order + 2 * k) for order in (2, 3)] for k in range(10)]
 )
-"""Coefficients of Stumpff's c_2 and c_3 up to the power 9: the next term is at most 1 / 22! for
-arguments up to 1.
+"""Coefficients of Stumpff's c_2 and c_3, the columns, up to the power 9: the next term is at most
+1 / 22! for arguments up to 1.
 """
 _MAX_ROUNDS = 200
 """Maximum number of rounds for the anomaly: Newton's method needs about 10, and bisection 60."""
@@ -208,7 +208,8 @@ def closest_approach_m(
     if _to_perigee(start) * start.unit_s < duration_s:
         return perigee_m(position_m, velocity_m_s, gravitational_parameter_m3_s2)
 
-    # Between two perigees the distance is smallest at one of the ends.
+    # Between two perigees the distance is smallest at one of the ends. A flight without an end has
+    # only its start: it is a parabola or a hyperbola after its perigee.
     start_m = float(np.linalg.norm(position_m))
     if not math.isfinite(duration_s):
         return start_m
@@ -262,6 +263,7 @@ def coast(states: Floats, duration_s: ArrayLike, gravitational_parameter_m3_s2: 
     direction = np.where(duration < 0.0, -1.0, 1.0)
     ahead = start._replace(outward=direction * start.outward)
 
+    # The equation of energy, in the units of `_Start`.
     speed_squared = 2.0 - start.binding
     is_straight = start.transverse_squared <= _STRAIGHT * speed_squared
     if (is_straight & (_to_perigee(ahead) <= np.abs(duration))).any():
@@ -311,11 +313,13 @@ def _to_perigee(start: _Start) -> Floats:
     outward = start.outward
     transverse_squared = start.transverse_squared
     size = np.abs(binding)
+    # Smaller sizes use the formula of a parabola, and are only kept from a division by zero.
     rate = np.maximum(size, _NEARLY_PARABOLIC) ** 1.5
     eccentricity = np.sqrt(np.maximum(1.0 - binding * transverse_squared, 0.0))
     # e sin E on an ellipse, e sinh H on a hyperbola.
     sine = outward * np.sqrt(size)
 
+    # Times since the perigee, negative before it.
     on_ellipse = (np.arctan2(sine, 1.0 - binding) - sine) / rate
     on_hyperbola = (sine - np.arcsinh(sine / np.maximum(eccentricity, 1.0))) / rate
     on_parabola = 0.5 * outward * (transverse_squared + outward**2 / 3.0)
@@ -341,6 +345,8 @@ def _universal_anomaly(binding: Floats, outward: Floats, duration: Floats) -> Fl
     with np.errstate(divide="ignore"):
         revolution = 2.0 * np.pi / np.sqrt(np.maximum(binding, 0.0))
     low = np.zeros_like(rest)
+    # On an ellipse the root is within a revolution; otherwise the bracket is doubled until it
+    # contains the root, from 1, the anomaly of about a unit of time.
     high = np.where(np.isfinite(revolution), revolution, 1.0)
     while True:
         time, _ = _time_of(high, binding, outward)
@@ -349,6 +355,7 @@ def _universal_anomaly(binding: Floats, outward: Floats, duration: Floats) -> Fl
             break
         high = np.where(is_short, 2.0 * high, high)
 
+    # For short times the anomaly is the time, because the distance is one at the start.
     anomaly = np.minimum(rest, high)
     for _ in range(_MAX_ROUNDS):
         time, radius = _time_of(anomaly, binding, outward)
@@ -384,6 +391,7 @@ def _stumpff(square: Floats) -> tuple[Floats, Floats, Floats]:
     near = np.where(is_near, square, 0.0)
     second_near, third_near = np.polynomial.polynomial.polyval(near, _STUMPFF_SERIES)
 
+    # 1 in place of near arguments, for which the closed forms lose digits and are not used.
     far = np.where(is_near, 1.0, np.abs(square))
     root = np.sqrt(far)
     on_ellipse = square > 0.0
@@ -391,5 +399,6 @@ def _stumpff(square: Floats) -> tuple[Floats, Floats, Floats]:
     half_sine = np.where(on_ellipse, np.sin(0.5 * root), np.sinh(0.5 * root))
     first = np.where(is_near, 1.0 - near * third_near, sine / root)
     second = np.where(is_near, second_near, 2.0 * half_sine**2 / far)
+    # root - sin(root) on an ellipse, sinh(root) - root on a hyperbola.
     third = np.where(is_near, third_near, np.abs(root - sine) / (far * root))
     return first, second, third

@@ -52,6 +52,7 @@ def keeps_distances(found: NonlinearPlan, coasting: Coasting) -> Acceptance:
     `found` is the plan before the flight, and `coasting` that of `nonlinear_plan`.
     """
     periods = len(found.assumed)
+    # The remainder of gravity is among the accelerations that are given to the tube.
     flight = replace(coasting, impulses=periods, periods=1, semi_major_axis_m=None)
     later = [_later_coasts(flight, time) for time in range(periods)]
 
@@ -93,7 +94,7 @@ def keeps_limits(limits: PathLimits, part: ProblemPart) -> Acceptance:
 
 
 def _later_coasts(coasting: Coasting, time: int) -> Coasting:
-    """Return the coasts after the impulses from a period on."""
+    """Return the coasts after the impulses from a period on, whose start is then t = 0."""
     orbit = coasting.orbit
     anomaly = float(orbit.true_anomaly(coasting.period_s * time))
     turned = replace(orbit, true_anomaly_rad=anomaly)

@@ -332,6 +332,7 @@ def _in_own_axes(fixed: Floats, turned: Floats, unit: float = 1.0) -> _ThrustInA
     """
     axes, movements, _ = np.linalg.svd(turned, full_matrices=False)
     moving = movements > _STILL * unit
+    # Where v moves the thrust in all directions, axes of its own change nothing.
     if moving.sum() == len(fixed):
         return _ThrustInAxes(fixed, turned, 0.0)
     along = axes[:, moving].T
@@ -357,10 +358,12 @@ def with_thrust(program: ConeProgram, lifted: Lifted, *, deep: bool = False) -> 
         thrust = _in_own_axes(fixed, turned)
         if deep:
             top = np.zeros(len(program.cost))
+            # A change of v by the radius moves the thrust by at most this norm times the radius.
             top[-1] = -np.linalg.norm(turned, ord=2)
             _bound_norm(program, thrust, top, 1.0)
         else:
             constant = thrust.constant
+            # (1 - constant^2)^(1/2): what the constant part leaves of the bound.
             room = float(np.sqrt(max((1.0 - constant) * (1.0 + constant), 0.0)))
             program.bound(thrust.response, thrust.free, np.zeros(len(program.cost)), room)
     return program
@@ -491,7 +494,7 @@ def _solution(program: ConeProgram, lifted: Lifted) -> Floats:
 def _absolute(lifted: Lifted, scale: Floats, tops: Floats) -> tuple[Floats, Floats]:
     """Rows and limits of |controls| <= tops w, in the units of the controls.
 
-    The variables w are after the variables of the set.
+    `tops` has the shape (T m, w). The variables w are after the variables of the set.
     """
     turned = scale[:, None] * lifted.control_response
     fixed = scale * lifted.control_free
@@ -502,7 +505,10 @@ def _absolute(lifted: Lifted, scale: Floats, tops: Floats) -> tuple[Floats, Floa
 def _with_norms_below(
     program: ConeProgram, lifted: Lifted, scale: Floats, tops: Floats
 ) -> ConeProgram:
-    """Add |u(t)| <= tops[t] . v, in the units of the controls."""
+    """Add |u(t)| <= tops[t] . v, in the units of the controls.
+
+    `tops` has a row for each period, for all variables v of the program.
+    """
     group = len(scale) // len(tops)
 
     for t, top in enumerate(tops):
@@ -572,6 +578,7 @@ class Maximiser:
         size = float(np.abs(cost).max())
         if size == 0.0:
             size = 1.0
+        # Gaps are relative to a cost whose largest entry is one.
         down = -cost / size
 
         self._solver.update(q=down)
@@ -581,4 +588,6 @@ class Maximiser:
         except NoSolutionError:
             if self._lifted.ball:
                 return self._with_cost(down).solve()
+            # A vertex is on its active rows already: without multipliers `maximise_sharply` finds
+            # no active row.
             return Optimum(self._with_cost(down).vertex(), np.zeros(len(self._lifted.rows)))

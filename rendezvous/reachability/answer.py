@@ -35,7 +35,8 @@ from infoset.rendezvous.reachability.sparse_program import (
 )
 
 _SPARES = (1e-7, 1e-6, 1e-5)
-"""As in `guaranteed`: margins of the constraints against the solver's errors."""
+"""As in `guaranteed`: margins of the constraints against the solver's errors, the smallest first,
+because a margin makes the guarantee larger."""
 _SINGULAR = 1e-12
 """Determinant of a basis, with columns of length one, below which the columns are dependent to
 rounding: they do not define a vertex. Relative singular values and residuals below it are zero."""
@@ -86,6 +87,7 @@ def multipliers(problem: OutputProblem) -> Multipliers:
     # Columns are divided by the largest pull of each component, and s by it too.
     scale = np.abs(pulls).max(axis=0)
     scale[scale == 0.0] = 1.0
+    # Columns of mu, s+ and s-.
     balance = np.vstack([pulls / scale, -unit, unit])
     is_weight = np.arange(len(balance)) < len(rows)
     columns = _independent(np.column_stack([is_weight, balance]))
@@ -99,6 +101,7 @@ def multipliers(problem: OutputProblem) -> Multipliers:
 def _independent(columns: Floats) -> Floats:
     """Return columns in coordinates of their span after the sum of weights, shape (c, 1 + rank)."""
     _, sizes, basis = np.linalg.svd(columns[:, 1:], full_matrices=False)
+    # Relative to 1 at least: entries of the columns are at most 1 in size.
     rank = int((sizes > _SINGULAR * sizes.max(initial=1.0)).sum())
     return np.column_stack([columns[:, 0], columns[:, 1:] @ basis[:rank].T])
 
@@ -152,7 +155,7 @@ def _vertices(problem: OutputProblem, *, one_of_two: bool) -> list[_Vertex]:
     kept = np.zeros((0, len(rows)))
     for weights, cost in zip(found.weights, found.costs, strict=True):
         opposite = np.concatenate([weights[half:], weights[:half]])
-        is_known = (np.abs(kept - opposite).max(axis=1, initial=0.0) <= _SAME).any() and len(kept)
+        is_known = (np.abs(kept - opposite).max(axis=1, initial=0.0) <= _SAME).any()
         if one_of_two and is_known:
             continue
         kept = np.vstack([kept, weights])
@@ -195,6 +198,7 @@ class AnsweredPlan:
         vertices = _vertices(problem, one_of_two=both)
         for vertex, given in zip(vertices, self.multipliers, strict=True):
             effects = problem.effects_on(problem.periods, vertex.direction)
+            # All multipliers add up to the effect of the outputs on d . x(T): the last one follows.
             last = np.einsum("tm,tsmq->sq", effects, plan.gains) - given.sum(axis=0)
             spread = 0.0
             for normal, multiplier in zip(vertex.normals, [*given, last], strict=True):
@@ -237,6 +241,7 @@ def answered_plan(problem: OutputProblem, window: int | None = None) -> Answered
             if not (broken & ~entered).any():
                 break
             entered = entered | broken
+        # Constraints in the program that are still broken need a larger margin.
         if broken.any():
             continue
         if not _follow(found, rows.chosen(late)):
@@ -250,6 +255,7 @@ def _follow(found: AnsweredPlan, rows: PathRows) -> bool:
     problem = found.plan.problem
     last = problem.periods - 1
     before = rows.chosen(rows.times == last)
+    # A control that does not act may be unlimited, and 0 times infinity is no number.
     limits = np.where(before.controls == 0.0, 0.0, problem.limits[-1])
     push = (np.abs(before.controls) * limits).sum(axis=1)
     states = found.plan.ranges_of(before._replace(controls=np.zeros_like(before.controls)))
@@ -355,8 +361,10 @@ def last_answer(problem: OutputProblem) -> AffinePlan:
     ends = np.concatenate([-heights, limits[limited], limits[limited]])
     # A row may be repeated: fewer rows decide if a control has no effect.
     bases = np.array(list(combinations_with_replacement(range(len(ends)), problem.controls + 1)))
+    # The last component of a point is tau, which is computed again below.
     points = (np.linalg.pinv(matrix[bases]) @ ends[bases][..., None])[:, :-1, 0]
 
+    # Points outside the limits are no optima; cut to them they are candidates as any other.
     controls = np.clip(points, -limits, limits)
     worst = (heights + controls @ pulls.T).max(axis=1)
     return replace(resting, nominal=controls[[np.argmin(worst)]])
@@ -447,6 +455,7 @@ def _hidden_errors(problem: OutputProblem, vertex: _Vertex, last: int) -> Floats
         same = variable_sum(point, later).plus(variable_sum(points[0], -later))
         program.meet(same)
 
+    # The program minimises: the sum of alpha_i E z_i has the opposite sign.
     gain = -(vertex.normals @ problem.free_states[-1]).reshape(1, -1)
     return program.minimise(variable_sum(points.ravel(), gain))[points]
 
@@ -479,6 +488,7 @@ def _certified(problem: OutputProblem, vertex: _Vertex, points: Floats, last: in
     differences = np.eye(count)[1:] - np.eye(count)[:1]
     equations = np.vstack([np.kron(np.eye(count), hidden), np.kron(differences, later)])
     flat = points.ravel()
+    # The second step removes the rounding of the first.
     for _ in range(2):
         flat = flat - np.linalg.lstsq(equations, equations @ flat, rcond=None)[0]
     flat = flat / max(1.0, problem.errors.size_of(flat.reshape(points.shape)))

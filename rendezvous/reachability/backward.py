@@ -32,6 +32,7 @@ def _bounds(optimum: BlockOptimum) -> Floats:
     result[-1] = optimum.terminal[:, None]
     for t in range(block.periods):
         lifted = lift_from_any_start(block.rest(t))
+        # `free` is zero: states are variables, also the first.
         lifted = lifted.where(lifted.response[-1], optimum.terminal)
         program = Maximiser(lifted)
         start = lifted.response[0]

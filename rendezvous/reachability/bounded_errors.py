@@ -86,6 +86,7 @@ def with_errors(
         constraint_rows(problem, largest, at_instants=at_instants),
     )
     if problem.thrust is ThrustShape.BALL:
+        # All bounds of a ball are equal.
         acting = np.arange(problem.controls) if all_act else _acting(whole, problem.further[0])
         return with_norm_limit(whole, float(problem.control_bounds[0]), acting)
     return whole

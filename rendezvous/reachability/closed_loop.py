@@ -110,6 +110,7 @@ def _plan(
             return optimal_controls(wider.rest(start, estimated), relative=relative), fraction
         except InadmissibleStartError:
             needed = _relaxation_for_start(problem, start, estimated)
+            # Doubled, so that the search ends where rounding makes `needed` too small.
             fraction = max(2.0 * fraction, needed * _MORE, _MIN_RELAXATION)
         except EmptyTubeError as error:
             # The error's relaxation is a part of the bounds that were relaxed already.

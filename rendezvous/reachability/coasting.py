@@ -24,6 +24,8 @@ _MAX_RADIUS_ROUNDS = 60
 RADIUS_RESERVE = 1.02
 """Ratio of the next assumed distance to the one that was found last: it is above 1 because the
 acceleration of gravity, and so the plan and its distances, change with it. Chosen."""
+_STARTS_AND_ENDS = (slice(None, -1), slice(1, None))
+"""The starts and the ends of the N intervals, among the N + 1 times of a coast."""
 
 
 class UnboundedCoastError(ArithmeticError):
@@ -181,6 +183,8 @@ class Coasting:
         execution = IMPULSE * (problem.execution[:count] @ to_controls.T)[:, None, :]
         columns = np.concatenate([known, execution], axis=2)
 
+        # By the inequality of Cauchy and Schwarz, an acceleration of at most M(t) has an effect
+        # along a of at most the root of int M dt times a . (int M Phi B B' Phi' dt) a.
         integrals = np.zeros((count, 1))
         shapes = np.zeros((count, 1, 6, 6))
         steps = self.segments
@@ -192,6 +196,7 @@ class Coasting:
             integrals = np.concatenate([integrals, total[:, None]], axis=1)
         return CoastTube(
             self,
+            # Three execution errors of the last impulse come after the errors of the problem.
             problem.errors._replace(size=problem.errors.size + 3),
             np.einsum("kinm,km->kin", self.transitions, middles),
             self.transitions @ columns[:, None],
@@ -258,6 +263,8 @@ class CoastTube:
         h = coasting.interval_s
         blocks = coasting.rates.reshape(*self.accelerations.shape, 3, 2, 3)
         norms = np.linalg.norm(blocks, ord=2, axis=(2, 4))
+        # If M is the largest acceleration, positions and velocities exceed the larger end by at
+        # most M h^2 / 8 and M h / 2: M is at most its bound for the ends plus (1 - share) M.
         share = 1.0 - norms[..., 0] * h**2 / 8.0 - norms[..., 1] * h / 2.0
         if not (share > 0.0).all():
             raise ValueError(
@@ -306,6 +313,7 @@ class CoastTube:
         """
         position = np.linalg.norm(normals[:, :3], axis=1)
         velocity = np.linalg.norm(normals[:, 3:], axis=1)
+        # M h / 2 = (4 / h) (M h^2 / 8).
         per_sagitta = position + 4.0 / self.coasting.interval_s * velocity
         return np.asarray(self.sagittas[..., None] * per_sagitta)
 
@@ -316,7 +324,7 @@ class CoastTube:
         """
         execution = self.columns[:, :, :3, self.errors.size - 3 :]
         ends = []
-        for end in (slice(None, -1), slice(1, None)):
+        for end in _STARTS_AND_ENDS:
             along = np.einsum("kia,kiae->kie", directions, execution[:, end])
             shapes = self.shapes[:, end, :3, :3]
             squares = np.einsum("kia,kiab,kib->ki", directions, shapes, directions)
@@ -329,7 +337,7 @@ class CoastTube:
         The `directions`, shape (K, N, 3), are unit vectors: it is then a bound of the distance too.
         """
         lowest = np.full(directions.shape[:2], np.inf)
-        for end in (slice(None, -1), slice(1, None)):
+        for end in _STARTS_AND_ENDS:
             middle = np.einsum("kia,kia->ki", directions, self.middles[:, end, :3])
             along = np.einsum("kia,kiaz->kiz", directions, self.columns[:, end, :3])
             shapes = self.shapes[:, end, :3, :3]
@@ -345,12 +353,13 @@ class CoastTube:
         """
         points = []
         heights = []
-        for end in (slice(None, -1), slice(1, None)):
+        for end in _STARTS_AND_ENDS:
             columns = self.columns[:, end, :3]
             worst = farthest(self.errors, -np.einsum("kia,kiaz->kiz", directions, columns))
             shapes = self.shapes[:, end, :3, :3]
             pushed = np.einsum("kiab,kib->kia", shapes, directions)
             squares = np.einsum("kia,kia->ki", directions, pushed)
+            # The smallest double keeps the quotient zero where nothing pushes.
             sizes = np.sqrt(np.maximum(squares, np.finfo(float).tiny))[..., None]
             point = self.middles[:, end, :3] + np.einsum("kiaz,kiz->kia", columns, worst)
             point = point - pushed / sizes

@@ -45,7 +45,8 @@ Rounding, and so the machine, decides in which programs with cones the last iter
 each setting fails in other programs. Of 300 random problems, half of them at the edge of
 feasibility, the first setting alone leaves up to three without a solution, and all settings leave
 one. With rescaling, the solver's default, some gaps are 3e-2 in place of 1e-7, because rows are in
-units of their limits already. Programs without cones are always rescaled."""
+units of their limits already: it is tried last. The order of the other two is chosen. Programs
+without cones are always rescaled."""
 
 
 class NoSolutionError(ArithmeticError):
@@ -105,6 +106,7 @@ class ConeProgram:
         self, response: Floats, free: Floats, top: Floats, height: float = 0.0
     ) -> ConeProgram:
         """Add |free + response v| <= top . v + height."""
+        # Slacks are ends - rows v: the height of the cone first, then the vector.
         block = np.vstack([-top[None, :], -self._widened(response)])
         ends = np.concatenate([[height], free])
         return self._add("cone", block, ends, clarabel.SecondOrderConeT(len(block)))
@@ -165,6 +167,7 @@ class ConeProgram:
             raise NoSolutionError(f"a linear program was not solved: {optimum.message}")
 
         scaled = ConeProgram(self.cost).meet(equal, levels).keep(rows, limits)
+        # Marginals are derivatives of the cost by the limits, and multipliers their opposites.
         multipliers = -np.concatenate([optimum.eqlin.marginals, optimum.ineqlin.marginals])
         return scaled.checked(np.asarray(optimum.x), multipliers).point
 
@@ -188,12 +191,13 @@ class ConeProgram:
 
         violation, gap = self.violation_and_gap(point, multipliers, cost)
         if violation <= max_violation and gap > max_gap:
+            # The point may be good enough, and only its multipliers not.
             balanced = self._balanced(point, multipliers, cost)
             _, gap = self.violation_and_gap(point, balanced, cost)
         if not (violation <= max_violation and gap <= max_gap):
             raise NoSolutionError(
                 f"a convex program was not solved to {max_gap:g}: relative gap {gap:.2g}, "
-                f"constraints violated by {max(violation, 0.0):.2g}"
+                f"constraints violated by {violation:.2g}"
             )
 
         parts = [part for kind, part in self.parts(multipliers) if kind == "rows"]
@@ -276,6 +280,7 @@ class ConeProgram:
             if kind == "rows":
                 free.append(part > slack)
             else:
+                # The height of a cone follows from the vector, in `violation_and_gap`.
                 first_free = 1 if kind == "cone" else 0
                 free.append(np.arange(len(part)) >= first_free)
         moving = np.concatenate(free)

@@ -40,15 +40,17 @@ from infoset.rendezvous.reachability.sparse_program import (
 _NORMAL_STEPS = 60
 """Steps towards the nearest point of a set; the last ones change a distance by less than 1 %."""
 _MAX_CHECKS = 40
-"""Maximum number of programs with the same normals: each one has more rows, or larger caps."""
+"""Maximum number of programs with the same normals: each one has more rows, larger
+allowances or smaller caps. Chosen."""
 _SPARE = 1e-6
-"""Margin of the constraints in the program of the least violation, relative to their sizes."""
+"""Margin of the constraints in the program of the least violation, relative to their sizes. Chosen:
+the second one of `guaranteed`; the plan is only where the search goes on."""
 _CAP_RESERVE = 1e-3
 """Part of a limit that is added to a cap, because the solver cannot keep caps of nearly
 zero; it makes an error of 3 % larger by 0.003 % of the limit."""
 _AHEAD = 0.05
 """Part of the keep-out distance by which the least violation may be negative: it leaves room for
-the bounds between instants, which change with the plan."""
+the bounds between instants, which change with the plan. Chosen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,6 +143,7 @@ def _best_normals(tube: CoastTube, known: Floats | None) -> Floats:
     best = best.copy()
     if known is not None:
         offer(_unit(centres))
+    # The axes, and the directions halfway between two or three of them.
     for corner in product((-1.0, 0.0, 1.0), repeat=3):
         if any(corner):
             offer(np.broadcast_to(_unit(np.array(corner)), best.shape))
@@ -151,6 +154,7 @@ def _best_normals(tube: CoastTube, known: Floats | None) -> Floats:
         change = tube.nearest(_unit(point)) - point
         square = np.einsum("kia,kia->ki", change, change)
         down = -np.einsum("kia,kia->ki", point, change)
+        # The part of the change at which the distance from the origin is least.
         share = np.divide(down, square, out=np.zeros_like(down), where=square > 0.0)
         point = point + np.clip(share, 0.0, 1.0)[..., None] * change
         offer(_unit(point))
@@ -243,6 +247,7 @@ def safe_plan(
     found = _first_safe(search, best._replace(plan=free))
     for _ in range(MAX_ROUNDS):
         guarantee = found.certificate.plan.guarantee
+        # A safe plan is hardly better than the best one without safety.
         if guarantee <= (1.0 + MIN_GAIN) * free.guarantee:
             break
         better = _safe_with(search, found)
@@ -273,7 +278,8 @@ def _first_safe(search: _Search, free: PlanWithRows) -> _SafePlan:
 
     Errors proportional to the controls are bounded at caps, which are constraints: those of the
     plan without safety may exclude the safe plans, and larger ones make the errors larger. The
-    largest cap of each axis at all times is tried first: it was enough in the tests.
+    largest cap of each axis at all times is tried first: it was enough in the tests. Then come the
+    smallest errors, those of the plan without safety, and the most room, the limits.
     """
     problem = search.problem
     safety = search.safety
@@ -326,6 +332,7 @@ def _safe_with(search: _Search, found: _SafePlan) -> _SafePlan | None:
     for _ in range(_MAX_CHECKS):
         rows = _rows(safety, normals, extents + sagittas[..., None], intervals)
         limited = replace(problem, caps=caps, path=joined(problem.path, rows))
+        # The rows of the drifts are all in the program at once.
         known = np.concatenate([path, np.ones(len(rows.times), dtype=bool)])
         try:
             plan, entered = plan_with_rows(limited, search.window, known)
@@ -381,6 +388,7 @@ def _rows(safety: PassiveSafety, normals: Floats, allowances: Floats, entered: F
         np.concatenate([drifts, drifts]),
         states,
         states @ IMPULSE,
+        # All begins, then all ends, as in `states`.
         safety.keep_out_m + allowances[drifts, intervals].T.ravel(),
         np.full(len(states), np.inf),
     )
@@ -411,8 +419,10 @@ def _least_violation(search: _Search, found: _SafePlan) -> _SafePlan:
         violation = float((rows.lower - plan.ranges_of(rows).lower).max())
         tube = safety.coasting.tube(plan)
         distances = tube.certain_distances(certificate.normals)
+        # The rows were for the bounds between instants of the certificate, not of this plan.
         distances = distances + tube.sagittas - known.sagittas
         reached = min(aim, safety.keep_out_m - violation)
+        # `reached` is the distance that the intervals in the program have.
         new = _lowest(distances, reached - MIN_GAIN * safety.keep_out_m) & ~intervals
         if not new.any():
             renewed = drift_certificate(plan, safety.coasting, certificate.normals)
@@ -430,6 +440,7 @@ def _plan_of_least_violation(
     """
     kept = problem.rows
     limits = len(kept.times) - len(known)
+    # The limits of single controls come first, and are all in the program.
     entered = ~problem.is_on_path
     entered[limits:] |= known
     while True:

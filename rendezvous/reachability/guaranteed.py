@@ -21,7 +21,8 @@ from infoset.rendezvous.reachability.sparse_program import (
 
 _SPARES = (1e-7, 1e-6, 1e-5)
 """Margins of the constraints in the program, relative to their sizes, tried in turn: the solver's
-errors must not break a constraint. The first one is ten times the usual error."""
+errors must not break a constraint. The first one is ten times the usual error. A margin makes the
+guarantee larger, so larger ones come later: reserves, chosen."""
 MAX_ROUNDS = 12
 """Maximum number of rounds of a local search: of caps, normals or lines of sight. Most end after
 three to five."""
@@ -103,6 +104,7 @@ class PlanVariables:
         weights = effects[reacting].ravel()
         matrix = np.zeros((count, columns.size))
         for output in range(count):
+            # Columns are ordered by control, and then by output.
             matrix[output, output::count] = weights
         if len(reacting) == 1:
             return Term(columns.ravel(), matrix)
@@ -188,6 +190,7 @@ def best_with_rows(problem: OutputProblem, window: int | None, known: Flags) -> 
         raise ValueError("errors proportional to the controls need limits of all controls")
 
     found = _with_first_caps(problem, window, known)
+    # The plan at the first caps was the first round.
     for _ in range(MAX_ROUNDS - 1):
         smaller = replace(problem, caps=found.plan.control_ranges.largest)
         try:
@@ -261,6 +264,7 @@ def plan_with_rows(
     """
     rows = problem.rows
     limits = len(rows.times) - len(known)
+    # The limits of single controls come first, and are all in the program.
     entered = ~problem.is_on_path
     entered[limits:] |= known
     for spare in _SPARES:

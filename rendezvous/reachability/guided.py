@@ -265,6 +265,7 @@ class GuidedCraft:
         if self.observer.estimate().is_empty:
             return
 
+        # The problem of the kept plan begins in the period `_first`, not at t = 0.
         kept = self._plan.problem
         since = self.time - self._first
         for start in self._start_sets():
@@ -291,6 +292,7 @@ class GuidedCraft:
 
     def control(self) -> Floats:
         """Return the control u(t), shape (m,), after the output; the next period begins."""
+        # The kept plan knows only what came since its first period.
         measured = np.array(self._outputs[self._first :])
         applied = np.array(self._applied[self._first :])
         control = self._plan.control(measured, applied)
@@ -367,6 +369,7 @@ def _bases(problem: OutputProblem, time: int) -> list[Floats]:
         goal = goal @ problem.transition[t]
     candidates = [goal, np.eye(problem.states)]
     if time > 0:
+        # Rows on the state before, as rows on the present state.
         before = problem.output[time - 1] @ np.linalg.inv(problem.transition[time - 1])
         candidates.append(np.vstack([problem.output[time], before]))
     bases = []

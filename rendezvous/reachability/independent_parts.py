@@ -46,6 +46,7 @@ def independent_parts(problem: OutputProblem) -> tuple[ProblemPart, ...]:
     linked = np.zeros((size, size), dtype=bool)
     for group in _groups(problem):
         acting = np.flatnonzero(group)
+        # The first member of a group is linked to all others.
         linked[acting[:1], acting] = True
     labels = connected_components(csr_array(linked), directed=False)[1]
 
@@ -72,9 +73,8 @@ def _groups(problem: OutputProblem) -> Flags:
     motion = np.eye(problem.states) + np.abs(problem.transition).max(axis=0)
     measured = np.abs(problem.output).max(axis=0)
     noise = np.abs(problem.noise).max(axis=0).T
-    on_states = [problem.goal]
-    if isinstance(problem.start, Zonotope):
-        on_states.append(problem.start.generators)
+    assert isinstance(problem.start, Zonotope)
+    on_states = [problem.goal, problem.start.generators]
     if problem.disturbance is not None:
         on_states.append(np.abs(problem.disturbance).max(axis=0).T)
 

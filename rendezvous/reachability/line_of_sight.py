@@ -66,6 +66,7 @@ class SightSensor:
         across = np.linalg.norm(caps[:, 1:], axis=1)
         largest = np.hypot(sight.distances + along, across)
         turned = np.arctan2(across, sight.distances - along) + self.angle_error_rad
+        # `turned` bounds the angle between the axis and any measured direction.
         sine = np.where(turned < 0.5 * np.pi, np.sin(turned), 1.0)
         by_angle = largest * self.angle_error_rad
         bounds = np.empty_like(caps)
@@ -85,6 +86,7 @@ class SightSensor:
         upper = np.zeros(len(rows))
         if self.range_error is not None:
             rows = np.vstack([rows, direction])
+            # Along the measured direction a true position is its range times a cosine.
             nearest = (distance - self.range_error) * np.cos(self.angle_error_rad)
             lower = np.append(lower, max(0.0, nearest))
             upper = np.append(upper, distance + self.range_error)
@@ -110,6 +112,7 @@ class SightSensor:
         angles = (self.angle_error_rad * errors[0])[:, None]
         return (
             np.cos(angles) * directions + np.sin(angles) * across,
+            # None counts as no error.
             distances + (self.range_error or 0.0) * errors[1],
         )
 
@@ -143,6 +146,7 @@ def axes_of(positions: Floats) -> Floats:
 
 def sight_of(plan: AffinePlan, size: int) -> SightRows:
     """Return the lines of sight of a plan without errors; positions have `size` components."""
+    # Nothing is measured at the time T.
     positions = plan.nominal_states[:-1, :size]
     rows = np.zeros((len(positions), size, plan.problem.states))
     rows[:, :, :size] = axes_of(positions)
@@ -166,6 +170,7 @@ def sighted(
         np.full(periods * size, np.inf),
     )
     middle = np.zeros((periods, size))
+    # Without errors the position is on its line of sight: zero across it.
     middle[:, 0] = sight.distances
     ranges = plan.ranges_of(rows)
     above = ranges.upper.reshape(periods, size) - middle

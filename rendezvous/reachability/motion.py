@@ -128,6 +128,7 @@ class NonlinearMotion:
         k2 = self.orbit.semi_latus_rate_rad_s
         parameter = self.semi_major_axis_m * (1.0 - e * e)
         gravity = k2 * k2 * parameter**3
+        # The integrator returns no states for an empty interval.
         if times[-1] == start_s:
             return np.repeat(initial[:, None, :], len(times), axis=1)
 
@@ -167,6 +168,7 @@ class NonlinearMotion:
         )
         if not solution.success:
             raise ArithmeticError(f"the motion could not be integrated: {solution.message}")
+        # Without the true anomaly.
         return np.asarray(solution.y[1:].reshape(6, count, len(times)).transpose(1, 2, 0))
 
     def fly(

@@ -69,9 +69,12 @@ def nonlinear_plan(
     """
     if coasting.semi_major_axis_m is None:
         raise ValueError("nonlinear motion needs the semi-major axis of the orbit")
+    # The same periods twice: as linear motion, whose tube is given its accelerations, and with the
+    # size of the orbit, for the remainder of gravity.
     flight = replace(coasting, impulses=problem.periods, periods=1, semi_major_axis_m=None)
     gravity = replace(coasting, impulses=problem.periods, periods=1)
 
+    # The first distances are those of a plan without the remainder.
     assumed = RADIUS_RESERVE * flight.tube(solve(problem)).radii.max(axis=1)
     for _ in range(_MAX_ROUNDS):
         distances = np.broadcast_to(assumed[:, None], gravity.starts_s.shape)
@@ -107,6 +110,7 @@ def with_acceleration(
     gramians = motion.gramian(begins, begins + part)
     to_end = motion.transition(begins + part, starts + coasting.period_s)
     squares = np.einsum("tpij,tpjk,tpik->tpi", to_end, gramians, to_end)
+    # By the inequality of Cauchy and Schwarz in each part.
     widths = np.sqrt(part * np.maximum(squares, 0.0)).sum(axis=1)
 
     added = accelerations[:, None, None] * widths[:, :, None] * np.eye(6)

@@ -70,8 +70,9 @@ def acting_controls(problem: OutputProblem) -> Places:
 def with_norm_limit(problem: OutputProblem, limit: float, acting: Places) -> OutputProblem:
     """Return the problem with a limit of the norm of each control, by faces inside the ball.
 
-    Controls that are not `acting` must be zero.
+    Controls that are not `acting` must be zero, and `limit` is also a limit of each control.
     """
+    # The norm of a single control is its absolute value, which has its own limit.
     if len(acting) < 2:
         return problem
     faces = norm_faces(len(acting))

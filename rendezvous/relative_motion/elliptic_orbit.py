@@ -131,10 +131,12 @@ def eccentric_of_mean(mean_rad: ArrayLike, eccentricity: ArrayLike) -> Floats:
     mean = np.asarray(mean_rad, dtype=np.float64)
     e = np.asarray(eccentricity, dtype=np.float64)
 
+    # E - M is odd and periodic: what is left of M after whole turns is solved for its size.
     turns = 2.0 * np.pi * np.round(mean / (2.0 * np.pi))
     sign = np.where(mean < turns, -1.0, 1.0)
     rest = np.abs(mean - turns)
 
+    # Three bounds above the root: sin E <= 1, sin E <= E, and the rest is at most pi.
     eccentric = np.minimum(np.minimum(rest + e, rest / (1.0 - e)), np.pi)
     for _ in range(_MAX_KEPLER_STEPS):
         excess = eccentric - e * np.sin(eccentric) - rest

@@ -161,6 +161,8 @@ def _rates(matrices: Floats) -> Floats:
     """Rates, rad/s, shape (...), at which motions of matrices A, shape (..., 6, 6), turn."""
     if not np.isfinite(matrices).all():
         raise ValueError("A(t) is not finite")
+    # Norms of the blocks of r' = V v and v' = G r + W v: r'' = V G r turns at sqrt(|V| |G|), and
+    # v' = W v at |W|.
     velocity = np.abs(matrices[..., :3, 3:]).sum(axis=-1).max(axis=-1)
     gravity = np.sqrt(velocity * np.abs(matrices[..., 3:, :3]).sum(axis=-1).max(axis=-1))
     turning = np.abs(matrices[..., 3:, 3:]).sum(axis=-1).max(axis=-1)

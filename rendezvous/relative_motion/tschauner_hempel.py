@@ -125,6 +125,7 @@ class TschaunerHempel(HeldMotion):
         panels = (last - first) / self._panel_rad
         need_panels(start_s, end_s, panels)
         times = self.orbit.time_of_eccentric(even_breaks(first, last, panels))
+        # Kepler's equation rounds the ends, and may move neighbours beyond them.
         times[0] = start_s
         times[-1] = end_s
         return np.maximum.accumulate(np.minimum(times, end_s))
