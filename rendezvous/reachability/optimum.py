@@ -116,6 +116,8 @@ def block_optimum(block: StateBlock, *, relative: bool = False) -> BlockOptimum:
     """
     block = admissible(block)
     lifted = lift(block)
+    # States are divided by their bounds. A common factor of the weights changes no minimiser: the
+    # largest weight is one.
     minimum = min_norm(lifted, np.ones(block.size) if relative else block.scale / block.scale.max())
     # The solution itself must not be outside by rounding.
     lifted = replace(lifted, limits=np.maximum(lifted.limits, lifted.rows @ minimum.point))
@@ -169,6 +171,7 @@ def block_reaches_zero(block: StateBlock) -> bool:
     relaxation, _ = min_relaxation(lift(block))
     if relaxation > _KEPT:
         return False
+    # Zero is reached in any weights or in none.
     search = _OptimumSearch(lift(_relaxed(block, relaxation)), np.ones(block.size))
     search.solve()
     return not search.above_zero and search.result().reached
@@ -190,6 +193,7 @@ def admissible(block: StateBlock) -> StateBlock:
     def conflicts(time: int) -> bool:
         return min_relaxation(lifted.until(time))[0] > _KEPT
 
+    # Constraints up to T conflict: if those up to T - 1 do not, the first time is T.
     first = 1 + bisect_left(range(1, block.periods), True, key=conflicts)
     _, point = min_relaxation(lifted.until(first))
     gaps = lifted.limits - lifted.rows @ point
@@ -339,7 +343,10 @@ class _OptimumSearch:
 
         parts = list(program.parts(dual))
         multipliers = np.zeros(len(self._multipliers))
+        # The rows are the first constraint of the program, if there are any. Multipliers of the
+        # limit `_REACH` are left out: any multipliers give a lower bound.
         multipliers[kept] = parts[0][1] if len(kept) else ()
+        # The first cone is that of the norm: its slack is the state, behind a height.
         direction = -next(part for kind, part in parts if kind == "cone")[1:]
         point = self._point + scale * inner[:-1]
         self._offer_point(point)
@@ -373,6 +380,7 @@ class _OptimumSearch:
         cost = np.zeros(size + 1)
         cost[-1] = 1.0
         program = ConeProgram(cost).keep(lifted.rows[kept], slack[kept])
+        # In units of one the bounds of the controls are enough.
         if scale < 1.0:
             unit = np.eye(size)
             program.keep(np.vstack([unit, -unit]), np.full(2 * size, _REACH))
@@ -393,6 +401,8 @@ class _OptimumSearch:
             if is_out_of_reach:
                 continue
 
+            # With w = (room - start . z) / size and b = (scale / size)^(1/2) z it is |b|^2 <= 2 w,
+            # the cone |(b, (w - 1) / sqrt(2))| <= (w + 1) / sqrt(2).
             size = max(1.0, room)
             top = np.zeros(self._lifted.size + 1)
             top[mine] = -start[mine] / size
@@ -474,6 +484,7 @@ class _OptimumSearch:
         moving = np.repeat(~held, lifted.ball or 1)
         polished = point.copy()
         if not lifted.ball:
+            # Held components of a box are at 1 or -1.
             polished[~moving] = np.sign(point[~moving])
 
         rows = lifted.rows[np.ix_(active, moving)]

@@ -85,6 +85,7 @@ class ErrorSet(NamedTuple):
         """Return the least factor f >= 0 such that +-z / f is in Z for all z of `points`."""
         needed = np.abs(points[..., self.start_size :]).max(initial=0.0)
         along = np.abs(points[..., : self.start_size] @ self.normals.T)
+        # Where an offset is zero, only points with normal . z0 = 0 are inside, whatever the factor.
         outside = (along > 0.0) & (self.offsets <= 0.0)
         if outside.any():
             return float(np.inf)
@@ -260,6 +261,7 @@ class OutputProblem:
     @cached_property
     def pure_outputs(self) -> Floats:
         """P of the purified outputs y(t) - C xhat(t) = P(t) z, shape (T, q, size)."""
+        # There is no output at the time T.
         outputs = self.output @ self.free_states[:-1]
         count = self.noise.shape[2]
         first = self.errors.size - self.periods * count

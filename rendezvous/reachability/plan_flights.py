@@ -192,6 +192,7 @@ class _AffineFlights:
         problem = plan.problem
         t = self._time
         self._shown[t] = measured.outputs - self._predicted @ problem.output[t].T
+        # Gains of later outputs are zero, and so are these outputs until they are shown.
         control = plan.nominal[t] + np.einsum("sjq,sfq->fj", plan.gains[t], self._shown)
         moved = self._predicted @ problem.transition[t].T
         self._predicted = moved + control @ problem.control[t].T
@@ -230,6 +231,7 @@ class _PartCrafts:
         """Return half-spaces of the states of the whole problem, if the sensor shows them."""
         if sights is None or self._sensor is None:
             return None
+        # Positions and velocities.
         states = 2 * sights.directions.shape[1]
         return self._sensor.cuts(sights.directions[0], float(sights.ranges[0]), states)
 
@@ -284,6 +286,7 @@ def _fly(
         )
         path = move(t, states, acting, draw(np.ones(pushes)))
         broken |= _breaks(problem, t, states, control, acting)
+        # States within a period obey the constraints of its start; the last one is its end.
         for inner in range(path.shape[1] - 1):
             broken |= _exceeds(problem, t, path[:, inner])
         states = path[:, -1]

@@ -13,6 +13,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from infoset.rendezvous._arrays import Floats, Places
+from infoset.rendezvous.reachability.conic import ConeProgram
 
 MAX_PERIODS = 256
 """Maximum number of periods in a file. Chosen: with three controls the dense constraints of a
@@ -119,6 +120,7 @@ class ReachabilityProblem:
         """Raise `ValueError` if a set of controls contains no cube of a small size."""
         normals, offsets = self.limits
         rows = normals * self.control_bounds
+        # For controls divided by their bounds; a program finds the centre of the cube.
         half_cube = _MIN_ROOM * np.abs(rows).sum(axis=1)
         different, times = np.unique(offsets, axis=0, return_index=True)
         for ends, time in zip(different, times, strict=True):
@@ -132,10 +134,27 @@ class ReachabilityProblem:
                 bounds=(_MIN_ROOM - 1.0, 1.0 - _MIN_ROOM),
                 method="highs",
             )
-            if found.status != 0:
+            if found.status != 0 or not self._has_room_in_ball(
+                rows[held], (ends - half_cube)[held]
+            ):
                 raise ValueError(f"the limits on the controls leave no room at t = {time}")
 
+    def _has_room_in_ball(self, rows: Floats, limits: Floats) -> bool:
+        """Whether some control with rows u <= limits is inside the ball; true for thrust in a box.
+
+        Controls are divided by their bounds, and some satisfy the limits.
+        """
+        if self.thrust is ThrustShape.BOX:
+            return True
+        # The least norm of a centre; a corner of its cube is farther by half the diagonal.
+        top = np.append(np.zeros(self.controls), 1.0)
+        program = ConeProgram(top).keep(rows, limits)
+        program.bound(np.eye(self.controls), np.zeros(self.controls), top)
+        least = program.solve().point[-1]
+        return bool(least + _MIN_ROOM * np.sqrt(self.controls) <= 1.0)
+
     def _check_growth(self) -> None:
+        # Deviations as large as the bounds of the states.
         moved = np.diag(self.state_bounds)
         with np.errstate(over="ignore", invalid="ignore"):
             for matrix in self.transition:
@@ -150,6 +169,7 @@ class ReachabilityProblem:
             )
 
     def _check_start(self) -> None:
+        # A bound is compared with the state itself, in which nothing was rounded.
         over = np.abs(self.initial) - self.state_bounds
         broken = [(self.state_name(i), float(over[i])) for i in np.flatnonzero(over > 0.0).tolist()]
 
@@ -210,6 +230,7 @@ class ReachabilityProblem:
             acting = n + np.flatnonzero(normal)
             linked[acting[0], acting] = True
         if self.thrust is ThrustShape.BALL:
+            # A common bound couples all controls.
             linked[n, n:] = True
 
         labels = connected_components(csr_array(linked), directed=False)[1]

@@ -79,6 +79,7 @@ def relative_interior(
         lengths = np.linalg.norm(rows, axis=1)
         if not basis.shape[1]:
             return RelativeInterior(point, basis, rows[:0], limits[:0], used[:0], np.zeros(0))
+        # A shorter row hardly depends on z.
         kept = np.flatnonzero(lengths > FLAT)
         rows = rows[kept] / lengths[kept, None]
         limits = limits[kept] / lengths[kept]
@@ -90,6 +91,7 @@ def relative_interior(
         if radius > flat:
             return interior
         tight = _always_tight(rows, limits, flat)
+        # A thin set that is not flat has no row that is always tight.
         if not len(tight):
             return interior
 

@@ -82,6 +82,7 @@ def feedback_plan(problem: ReachabilityProblem, disturbance: Floats) -> AffinePl
             f"a plan with feedback from disturbances can have at most {MAX_PERIODS_WITH_FEEDBACK} "
             f"periods, found {problem.periods}"
         )
+    # Half-widths of a known start and of exact measurements, and the target.
     known = np.zeros(problem.states)
     exact = np.zeros(problem.controls)
     errors = ErrorBounds(known, exact, exact, known, disturbance)

@@ -84,6 +84,7 @@ def minimum_l1(optimal: OptimalControls) -> Floats:
 
     It is found by a linear program.
     """
+    # A single control needs no program.
     if not optimal.dimension:
         return optimal.at(np.zeros(0))
     return optimal.at(min_l1(optimal.space, optimal.scale))
@@ -94,6 +95,7 @@ def minimum_norms(optimal: OptimalControls) -> Floats:
 
     The sum is the propellant of a single thruster. The control is found by a cone program.
     """
+    # A single control needs no program.
     if not optimal.dimension:
         return optimal.at(np.zeros(0))
     return optimal.at(min_sum_of_norms(optimal.space, optimal.scale, optimal.problem.controls))
@@ -127,6 +129,7 @@ def minimum_peak(optimal: OptimalControls) -> Floats:
         return optimal.at(point)
 
     # The face |controls| <= bound of the set, in coordinates of its affine hull.
+    # A constant control is within the peak already.
     moving = np.linalg.norm(space.control_response, axis=1) > _STILL
     turned = (scale[:, None] * space.control_response)[moving]
     fixed = (scale * space.control_free)[moving]
@@ -185,6 +188,7 @@ def analytic_point(space: Lifted, start: Floats) -> tuple[Floats, Floats]:
             return point, _with_positive_diagonal(root)
 
         rounding = _ROUNDED_DECREASE * max(1.0, abs(barrier.value))
+        # Steps are halved until the value decreases enough, or by rounding only.
         length = 1.0
         after = _barrier(space, point + step)
         while (
@@ -233,6 +237,7 @@ def _barrier(space: Lifted, point: Floats) -> _Barrier:
     turned = space.control_response.reshape(-1, space.ball, size)
     thrust = space.controls(point).reshape(-1, space.ball)
     moving = np.linalg.norm(turned, axis=(1, 2)) > _STILL
+    # A thrust that does not depend on z would add a constant.
     turned = turned[moving]
     thrust = thrust[moving]
     left = 1.0 - (thrust**2).sum(axis=1)
@@ -285,10 +290,10 @@ def samples(optimal: OptimalControls, count: int, generator: np.random.Generator
     if not space.size:
         return optimal.at(points)
 
-    # In these coordinates the set is about as wide in all directions.
-    rounding = solve_triangular(root, np.eye(space.size))
+    # From the coordinates root z, in which the set is about as wide in all directions.
+    to_set = solve_triangular(root, np.eye(space.size))
     for _ in range(_STEPS_A_DIMENSION * space.size):
-        directions = generator.standard_normal(points.shape) @ rounding.T
+        directions = generator.standard_normal(points.shape) @ to_set.T
         directions /= np.linalg.norm(directions, axis=1)[:, None]
         backward, forward = _chord(space, points, directions)
         along = backward + (forward - backward) * generator.random(count)
@@ -316,6 +321,7 @@ def _chord(space: Lifted, points: Floats, directions: Floats) -> tuple[Floats, F
         a = (change**2).sum(axis=2)
         b = (thrust * change).sum(axis=2)
         c = (thrust**2).sum(axis=2) - 1.0
+        # A thrust that does not move along the chord bounds it nowhere.
         moving = a > _STILL**2
         root = np.sqrt(np.maximum(b * b - a * c, 0.0))
         divisor = np.where(moving, a, 1.0)
@@ -323,6 +329,7 @@ def _chord(space: Lifted, points: Floats, directions: Floats) -> tuple[Floats, F
         before = np.where(moving, (-root - b) / divisor, -np.inf)
         forward = np.minimum(forward, after.min(axis=1))
         backward = np.maximum(backward, before.max(axis=1))
+    # Points on the boundary may be outside by rounding.
     return np.minimum(backward, 0.0), np.maximum(forward, 0.0)
 
 

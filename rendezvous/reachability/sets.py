@@ -341,7 +341,8 @@ class LiftedSets:
         return self._known[key]
 
     def _admissible_until(self, time: int) -> Lifted:
-        block = self._optimum.block.first(max(time, 1))
+        """Return the admissible controls of the first `time` >= 1 periods; no other one matters."""
+        block = self._optimum.block.first(time)
         if block.periods * len(block.controls) <= _FEW_CONTROLS:
             return lift(block)
         return lift_with_states(block)

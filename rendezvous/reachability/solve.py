@@ -124,6 +124,7 @@ class OptimalControls:
             best = np.zeros(len(costs))
             best[moving] = np.einsum("kp,kp->k", costs[moving], points)
 
+            # `down` are maxima of minus the change of a control: minima with the opposite sign.
             down, up = np.split(best, 2)
             ends = np.stack([lifted.control_free - down, lifted.control_free + up], axis=-1)
             result[:, part.block.controls] = ends.reshape(periods, -1, 2)

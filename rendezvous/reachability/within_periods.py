@@ -29,7 +29,8 @@ from infoset.rendezvous.reachability.outputs import (
 )
 
 _MAX_CHECKS = 40
-"""Maximum number of programs: each one has more rows, or larger shifts. Most plans need two."""
+"""Maximum number of programs: each one has more rows, or larger allowances. Most plans need two.
+Chosen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,6 +164,7 @@ def answers_within(
     for _ in range(_MAX_CHECKS):
         parts = independent_parts(whole)
         answers = [answered_plan(part.problem, window) for part in parts]
+        # Both are None, or none of them.
         if limits is None or rows is None:
             return answers
         pairs = zip(parts, answers, strict=True)
@@ -170,6 +172,7 @@ def answers_within(
         tube = limits.flight.tube(_with_free_end(plan))
         excess = limits.excess(tube)
         last = excess[-1].copy()
+        # The last period is not in the programs: its constraints must follow, as is checked below.
         excess[-1] = -np.inf
         if (excess > 0.0).any():
             whole = rows.problem_with_broken(tube, excess)
@@ -188,6 +191,7 @@ def answers_within(
 def _with_free_end(plan: AffinePlan) -> AffinePlan:
     """Return a plan without a last control, whose last execution error is any control."""
     problem = plan.problem
+    # These bounds contain the errors at the caps, which are left out below.
     execution = problem.execution.copy()
     execution[-1] += problem.limits[-1]
     return plan.under(replace(problem, execution_error=execution, relative_error=None, caps=None))
@@ -216,6 +220,7 @@ def _from_end(tube: CoastTube, problem: OutputProblem, guarantee: float) -> Coas
         back = np.linalg.inv(steps.transition[-1, i])
         acceleration = tube.accelerations[-1, i]
         integral += acceleration * h
+        # As in `Coasting.tube_under`, backward in time.
         shape = back @ (shape + acceleration * steps.gramian[-1, i]) @ back.T
         middles[-1, i] = back @ middles[-1, i + 1]
         columns[-1, i] = back @ columns[-1, i + 1]

@@ -112,6 +112,7 @@ def fill_transitions(rate: float, durations: Floats, matrices: Floats) -> None:
         theta = rate * durations[row]
         matrix = matrices[row]
         fill_effect(theta, matrix[:, 3:])
+        # From unit rate: positions of a unit of velocity are divided by the rate.
         for first in range(3):
             for second in range(3, 6):
                 matrix[first, second] /= rate

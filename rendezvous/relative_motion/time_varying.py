@@ -189,6 +189,7 @@ def _collocated(dynamics: OfTime, starts: Floats, ends: Floats, panels: int) -> 
     """Solve on equal panels from the end to the start, in states divided by (T, T, T, 1, 1, 1)."""
     nodes, weights, integrals = _gauss_collocation()
     durations = ends - starts
+    # Parts of the duration before the end: panels are counted from the end backward.
     positions = (np.arange(panels)[:, None] + nodes) / panels
     places = ends[:, None, None] - durations[:, None, None] * positions
     steps = durations[:, None, None] * np.ones_like(positions) / panels

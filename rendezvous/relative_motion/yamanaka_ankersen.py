@@ -126,6 +126,7 @@ def fill_integrals(
 
         for panel in range(panels):
             for node in range(len(NODES)):
+                # Panels are counted from the end backward.
                 to_go_rad = half_rad * (2 * panel + 1 + NODES[node])
                 place = place_at(ellipse, end.eccentric_rad - to_go_rad)
                 mean_to_go_rad = mean_anomaly(
@@ -133,6 +134,7 @@ def fill_integrals(
                 )
                 leg = leg_between(ellipse, place, end, to_go_rad, mean_to_go_rad)
                 fill_effect(ellipse, leg, effect)
+                # Kepler's equation: n dt = (r / a) dE.
                 time_s = half_rad * WEIGHTS[node] * place.distance / ellipse.mean_motion_rad_s
                 add_integrand(effect, time_s, gramians[row], helds[row])
 
@@ -258,6 +260,7 @@ def fill_column(
         - 3.0 * rho_end * rho_end * leg.secular * drift
     )
     x_rate_change = by_s * s_rate_change + by_c * c_rate_change - 3.0 * e * drift_rate * drift
+    # Position and velocity of an axis are three rows apart. As y'' = -2 x', y' + 2 x is constant.
     fill_axis(ellipse, sine_end, rho_end, x + x_change, x_rate + x_rate_change, column[0::3])
     fill_axis(ellipse, sine_end, rho_end, y + y_change, y_rate - 2.0 * x_change, column[1::3])
 

@@ -92,3 +92,11 @@ def test_excess_contains_the_limits() -> None:
 def test_empty_set_of_controls_is_refused() -> None:
     with pytest.raises(ValueError, match="leave no room at t = 1"):
         walk(np.array([1.0, -2.0]))
+
+
+def test_limits_that_only_corners_outside_the_ball_satisfy_are_refused() -> None:
+    # In the unit circle u_1 + u_2 is at least -sqrt(2), in the square at least -2.
+    walk(np.array([1.0, -1.9]))
+    walk(np.array([1.0, -1.41]), shape=ThrustShape.BALL)
+    with pytest.raises(ValueError, match="leave no room at t = 1"):
+        walk(np.array([1.0, -1.42]), shape=ThrustShape.BALL)
