@@ -612,6 +612,7 @@ def _resolved(arc: Arc, costate: Floats, max_m_s2: float) -> Floats:
 
     even = _parts_of(arc, _PARTS)
     edges = np.union1d(even, _switches(wanted, _rule(even)[0], max_m_s2))
+    # Intervals that are still to be checked; `kept` has all ends.
     low = edges[:-1]
     high = edges[1:]
     kept = [edges]

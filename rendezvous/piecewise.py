@@ -178,6 +178,8 @@ def max_control(control: Callable[[Floats], Floats], breaks_s: Floats) -> float:
         values = squares @ _AT_SAMPLES.T
         top = values.max(axis=1)
         bottom = values.min(axis=1)
+        # Less the middle, samples are at most half their spread in size, and other values at most
+        # `_FACTOR` times that.
         bounds = 0.5 * (top + bottom) + 0.5 * _FACTOR * (top - bottom)
         maximum = max(maximum, float(top.max()))
 

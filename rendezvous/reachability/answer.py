@@ -154,6 +154,7 @@ def _vertices(problem: OutputProblem, *, one_of_two: bool) -> list[_Vertex]:
     vertices = []
     kept = np.zeros((0, len(rows)))
     for weights, cost in zip(found.weights, found.costs, strict=True):
+        # The multipliers of goal and of -goal change places.
         opposite = np.concatenate([weights[half:], weights[:half]])
         is_known = (np.abs(kept - opposite).max(axis=1, initial=0.0) <= _SAME).any()
         if one_of_two and is_known:
@@ -366,6 +367,7 @@ def last_answer(problem: OutputProblem) -> AffinePlan:
 
     # Points outside the limits are no optima; cut to them they are candidates as any other.
     controls = np.clip(points, -limits, limits)
+    # Of all candidates the best is kept, so that one that is no vertex does no harm.
     worst = (heights + controls @ pulls.T).max(axis=1)
     return replace(resting, nominal=controls[[np.argmin(worst)]])
 

@@ -99,6 +99,7 @@ class Coasting:
         end = self.orbit.true_anomaly(self.starts_s + self.interval_s)
         highest = np.maximum(np.cos(begin), np.cos(end))
         turn = 2.0 * np.pi
+        # The anomaly increases without bound: a periapsis is where a number of turns is whole.
         passes_periapsis = np.floor(begin / turn) != np.floor(end / turn)
         highest[passes_periapsis] = 1.0
         return np.asarray(1.0 + self.orbit.eccentricity * highest)
@@ -146,6 +147,7 @@ class Coasting:
         UnboundedCoastError
             If nonlinear motion is not proved to stay within any distance.
         """
+        # Accelerations are bounded alike in all intervals, before the remainder is added.
         known = np.full(self.starts_s.shape, self.acceleration_m_s2)
         tube = self.tube_under(plan, known, part)
         if self.semi_major_axis_m is None:

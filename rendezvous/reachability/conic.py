@@ -278,6 +278,7 @@ class ConeProgram:
             self.parts(ends - rows @ point), self.parts(multipliers), strict=True
         ):
             if kind == "rows":
+                # A row is active if its multiplier is above its slack.
                 free.append(part > slack)
             else:
                 # The height of a cone follows from the vector, in `violation_and_gap`.

@@ -185,6 +185,7 @@ class UnsafeDriftsError(NoRobustPlanError):
         coasting = certificate.tube.coasting
         distances = certificate.distances
         impulse, interval = np.unravel_index(distances.argmin(), distances.shape)
+        # Intervals of a drift are counted from its impulse.
         begin_s = coasting.interval_s * interval
         self.certificate = certificate
         super().__init__(

@@ -72,6 +72,7 @@ class PlanVariables:
         """Return state . x(time) + control . u(time) as functions of the variables."""
         problem = self.problem
         effects = np.zeros((problem.periods, problem.controls))
+        # Controls before the time act through the state, and u(time) itself; at the end is none.
         effects[:time] = problem.effects_on(time, state)
         if time < problem.periods:
             effects[time] = control
@@ -308,6 +309,7 @@ def keep_goal(
 ) -> None:
     """Add |goal_i . (x(T) - target)| <= guarantees for all errors, one for all rows or for each."""
     no_control = np.zeros(problem.controls)
+    # One column is repeated for all rows.
     columns = np.broadcast_to(guarantees, len(problem.goal))
     for row, column in zip(problem.goal, columns, strict=True):
         less_guarantee = variable_sum(np.array([column]), -np.ones((1, 1)))

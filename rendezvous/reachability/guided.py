@@ -272,6 +272,7 @@ class GuidedCraft:
             self._adopt_if_better(_rest_of(kept, since, start))
 
     def _adopt_if_better(self, rest: OutputProblem) -> None:
+        # The best control of a last period is computed without a solver if there is no path.
         is_answer = rest.periods == 1 and rest.path is None
         try:
             plan = last_answer(rest) if is_answer else plan_at_caps(rest, self._window)
@@ -311,6 +312,7 @@ class GuidedCraft:
             lower, upper = estimate.output_hull(rows)
             columns = np.linalg.inv(rows)
             centre = columns @ (lower + upper) / 2.0
+            # Generators are the columns, half as long as the strips are wide.
             starts.append(Zonotope(centre, (columns * (upper - lower) / 2.0).T))
         return starts
 

@@ -48,6 +48,7 @@ def independent_parts(problem: OutputProblem) -> tuple[ProblemPart, ...]:
         acting = np.flatnonzero(group)
         # The first member of a group is linked to all others.
         linked[acting[:1], acting] = True
+    # The labels of states come first, then those of controls and of outputs.
     labels = connected_components(csr_array(linked), directed=False)[1]
 
     parts = []
@@ -70,6 +71,7 @@ def whole_problem(problem: OutputProblem) -> ProblemPart:
 
 def _groups(problem: OutputProblem) -> Flags:
     """Return which states, controls and outputs act together, shape (k, n + m + q)."""
+    # Row i: what acts on state i in some period, and the state itself.
     motion = np.eye(problem.states) + np.abs(problem.transition).max(axis=0)
     measured = np.abs(problem.output).max(axis=0)
     noise = np.abs(problem.noise).max(axis=0).T

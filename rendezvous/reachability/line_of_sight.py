@@ -81,6 +81,7 @@ class SightSensor:
         in units of the position, which is not used without a range sensor.
         """
         tangents = _tangents(direction)
+        # Across the direction a position is at most tan(angle error) times what it is along it.
         rows = tangents - np.tan(self.angle_error_rad) * direction
         lower = np.full(len(rows), -np.inf)
         upper = np.zeros(len(rows))

@@ -450,6 +450,7 @@ class _OptimumSearch:
             outside = max(outside, float(self._norms(point).max()) - 1.0)
 
         value = float(np.linalg.norm(self._free + self._response @ point))
+        # A violation counts as this part of the largest possible norm.
         merit = value + outside * self._reach
         if merit < self._merit:
             self._point = point

@@ -234,6 +234,7 @@ class OutputProblem:
         """The effects of all errors on x(0), shape (n, size)."""
         columns = np.zeros((self.states, self.errors.size))
         if isinstance(self.start, Polytope):
+            # Errors of a start in a polytope are the state itself, from the centre.
             columns[:, : self.states] = np.eye(self.states)
         else:
             columns[:, : len(self.start.generators)] = self.start.generators.T
@@ -301,6 +302,7 @@ class OutputProblem:
     def effects_on(self, time: int, row: Floats) -> Floats:
         """Return the effects of u(0), ..., u(time - 1) on row . x(time), shape (time, m)."""
         effects = np.zeros((time, self.controls))
+        # Backward in time: row A(time - 1) ... A(t + 1) at the start of each step.
         costate = row
         for t in range(time - 1, -1, -1):
             effects[t] = costate @ self.control[t]
