@@ -49,7 +49,10 @@ class CostToCome(NamedTuple):
     covariance: Floats
     """P, shape (m, G, 3, 3)."""
     back: Shorts
-    """The visit before, shape (m, G, 4), in columns TARGET, TIME, ROW and DECIDED."""
+    """The visit before, shape (m, G, 4), in columns TARGET, TIME, ROW and DECIDED.
+
+    If there is no visit, TARGET is none of the numbers of targets and of the start.
+    """
 
 
 class Kept(NamedTuple):
@@ -102,6 +105,7 @@ def extend(
             spent = earlier.cost[row, leave]
             first = 0
             decided = leave
+            # `visits` have rows for each time of the target before: those of `leave` are changed.
             if len(best) > ranks:
                 first = leave * ranks
                 decided = row // ranks
@@ -155,7 +159,7 @@ def write_quadratics(
             )
 
             # With L of the blocks (A, 0; B, C), m = -(e_V - B A^-1 e_r) and P = C C', in which
-            # nothing cancels.
+            # nothing cancels. `half_square` replaces e_r by A^-1 e_r; C is lower triangular.
             factorise(matrix, SIX)
             half_square(matrix, error, 3)
             for axis in range(3):
@@ -180,12 +184,12 @@ def insert(
     `kept.ranks` energies rise from row to row; the greatest is dropped if another is inserted.
     """
     last = first + kept.ranks - 1
+    # The row to replace: that of a near way or, without one, that of the greatest energy.
     place = last
     for rank in range(first, last + 1):
         if (
             back[rank, TARGET] == origin.target
             and abs(back[rank, DECIDED] - origin.decided) <= kept.apart
-            and best[rank] < np.inf
         ):
             place = rank
             break

@@ -153,7 +153,8 @@ def propagate(z: Floats, duration: float) -> bool:
         if not column_size(z, R) > MIN_RADIUS:
             return False
         step = min(left, longest_step(z))
-        # No tiny last step, which rounding of `left` would leave.
+        # No tiny last step, which rounding of `left` would leave. A thousandth, chosen, lengthens
+        # the last step by so little that its error stays the same.
         if left - step < 1e-3 * step:
             step = left
         _step(0.0, step, 0, no_y, z, (), no_slopes, slopes, no_y, z_next)
@@ -257,7 +258,7 @@ class Shot:
     def segments(self) -> tuple[Floats, Floats, float]:
         """Return states and costates at the ends of segments, shape (k, 12), and the energy: SI."""
         block = self.block
-        count = len(self.block.time_s)
+        count = len(block.time_s)
         z = _initial(block, self.unknowns[:6])
         starts = np.empty((count, 12))
         ends = np.empty((count, 12))
@@ -275,6 +276,7 @@ class Shot:
         )
 
     def _jump(self, z: Floats, node: int) -> None:
+        """Subtract the jump at a node, costate before minus costate after, from lambda_r."""
         z[6:9, 0] -= self.unknowns[6 + 3 * node : 9 + 3 * node]
 
 
@@ -317,12 +319,16 @@ class ShotPath(Path):
         """Return states and costates, shapes (k, 6), at k times from the start to the last node."""
         times = np.asarray(time_s, dtype=np.float64)
         values = np.zeros((len(times), 12))
+        # A time belongs to the last block that starts before it or at it: the stay after a block
+        # belongs to this block.
         starts_s = [shot.block.start_s for shot in self.shots]
         which = np.searchsorted(starts_s, times, side="right") - 1
         for index, shot in enumerate(self.shots):
             rows = np.flatnonzero(which == index)
             end = float(shot.block.time_s[-1])
+            # `Shot.along` needs times that do not decrease.
             rows = rows[np.argsort(times[rows], kind="stable")]
+            # The path ends at the last node, without a stay.
             stays = (times[rows] >= end) & (index < len(self.shots) - 1)
             values[rows[~stays]] = shot.along(times[rows[~stays]])
             rows = rows[stays]
@@ -339,6 +345,7 @@ def shoot(block: Block, near: Floats | None = None) -> Shot | None:
     The residual is reduced in steps. The initial unknowns are `near`, of other times; if Newton's
     method fails from them, or they are None, those of the coasting orbit.
     """
+    # Without lambda and jumps the chaser coasts: six numbers, and three for each node but the last.
     coasting = np.zeros(3 + 3 * len(block.time_s))
     initials = [] if near is None else [(near, MIN_STEP_FROM_NEAR)]
     for initial, min_step in (*initials, (coasting, MIN_STEP)):
@@ -351,7 +358,8 @@ def shoot(block: Block, near: Floats | None = None) -> Shot | None:
 def _initial(block: Block, costate: Floats, variations: int = 0) -> Floats:
     """Return an array for the state, costate and energy of a block, with variations.
 
-    Column 0 has the values at the start of the block.
+    Column 0 has the values at the start of the block. The columns of the variations are zero: the
+    caller sets the derivatives.
     """
     z = np.zeros((13, 1 + variations))
     z[:12, 0] = np.concatenate([block.start_state / block.value_units[:6], costate])
@@ -372,6 +380,7 @@ def _residual(block: Block, unknowns: Floats, slopes: Floats | None = None) -> F
     size = len(unknowns)
     last = len(block.time_s) - 1
     z = _initial(block, unknowns[:6], size)
+    # The first six unknowns are lambda at the start. A jump is an unknown of the node where it is.
     z[6:12, 1:7] = np.eye(6)
     residual = np.empty(size)
     for node, duration in enumerate(block.durations):
@@ -412,10 +421,11 @@ def _follow(block: Block, initial: Floats, min_step: float) -> Floats | None:
     if first is None:
         return None
     unknowns = initial
-    done = 0.0
-    step = min(1.0, _FIRST_STEP / max(float(np.abs(first).max()), _FIRST_STEP))
+    done = 0.0  # share of the first residual that is removed
+    step = _FIRST_STEP / max(float(np.abs(first).max()), _FIRST_STEP)
 
     while True:
+        # Derivative of the unknowns by the share.
         ahead = _solved(slopes, -first)
         if ahead is None:
             return None
@@ -426,7 +436,7 @@ def _follow(block: Block, initial: Floats, min_step: float) -> Floats | None:
                 unknowns + (share - done) * ahead,
                 share,
                 (1.0 - share) * first,
-                slopes.copy(),
+                slopes.copy(),  # a shorter step begins with the same derivatives
             )
             if solved is not None:
                 break
@@ -438,7 +448,7 @@ def _follow(block: Block, initial: Floats, min_step: float) -> Floats | None:
         if share == 1.0:
             return unknowns
         done = share
-        # Longer steps after fast convergence; both factors are chosen.
+        # Longer steps after fast convergence; the numbers of rounds and both factors are chosen.
         if rounds <= 2:
             step *= 2.0
         elif rounds <= 4:
@@ -452,6 +462,7 @@ def _newton(
 ) -> tuple[Floats, int] | None:
     """Return unknowns with a residual `goal` by Newton's method, and the number of rounds.
 
+    `share` is that of the first residual which is removed at `goal`: at 1 the result is final.
     `slopes` are derivatives near by, which are computed again, in place, if the convergence is
     slow. The result is None without convergence.
     """
@@ -467,8 +478,10 @@ def _newton(
         is_rounding = fresh and size <= RESIDUAL_ROUNDING and size > 0.3 * before
         if size <= enough or is_rounding:
             return unknowns, rounds
+        # A residual that more than doubles diverges; chosen.
         if size > _MAX_CORRECTION or size > 2.0 * before:
             return None
+        # Never in the first round, in which `before` is infinite.
         fresh = size > _FAST * before
         if fresh and _residual(block, unknowns, slopes) is None:
             return None

@@ -77,6 +77,7 @@ def bound_path(path: LinearPath, max_m_s2: float) -> LinearPath:
     velocities[~nodes.rendezvous] = optimum.free.reshape(-1, 3)
     free = ~nodes.rendezvous
     arrive[free, 3:] = velocities[free]
+    # The segment after a flyby starts with the velocity at it.
     begin[1:][free[:-1], 3:] = velocities[:-1][free[:-1]]
     before = np.array(optimum.costates)
     transition = motion.transition(path.starts_s, nodes.arrive_s)
@@ -90,7 +91,7 @@ def bound_path(path: LinearPath, max_m_s2: float) -> LinearPath:
     )
     return BoundedPath(
         nodes,
-        0.5 * float(optimum.energies.sum()),
+        0.5 * float(optimum.energies.sum()),  # an energy is int |u|^2 dt
         path.starts_s,
         begin,
         arrive,
@@ -124,7 +125,10 @@ def _arcs(path: LinearPath) -> list[Arc]:
     motion = path.motion
     arrive, begin = _at_rest(path)
     transition = motion.transition(path.starts_s, nodes.arrive_s)
+    # By its control a segment has to change its state by `missing` plus `slope` times the free
+    # velocities: that at its end less the effect of that at its start.
     missing = arrive - (transition @ begin[:, :, None])[:, :, 0]
+    # First column of the velocity at each node, used at flybys only.
     columns = 3 * (np.cumsum(~nodes.rendezvous) - 1)
     arcs = []
     for index, end_s in enumerate(nodes.arrive_s):
@@ -166,6 +170,7 @@ def bound_visits(
 
     if limits is None:
         bounded = fly_bounded(path.nodes.arrive_s)
+        # At the same times the price of the time is the same.
         return replace(best, path=bounded, objective=best.objective - path.cost + bounded.cost)
     dwell_s = tour.dwell_s[list(best.order)]
     starts = [path.nodes.arrive_s, *guesses]

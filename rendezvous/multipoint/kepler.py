@@ -49,6 +49,7 @@ class KeplerTour(Visits):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        # Raises ValueError if the start is at the attracting point or not finite.
         coast(self.start_state, 0.0, self.gravitational_parameter_m3_s2)
 
     def target_states(self, which: Integers, time_s: Floats) -> Floats:

@@ -133,6 +133,7 @@ def best_order(
                     + len(rest) * limits.min_gap_s
                 )
                 held = TimeLimits(horizon - float(later), limits.min_gap_s, limits.price_per_s)
+            # A partial order below this cost is continued in any case: its minimum is not needed.
             if np.isfinite(search.best_objective):
                 enough = search.best_objective
         effort = Effort.BOUND if warm and not careful else Effort.RUGGED
@@ -194,6 +195,8 @@ def best_order_of_slots(
         search.evaluations += 1
         return path.cost, path
 
+    # In linear motion the path of given times is unique, and the cost of a partial order is a bound
+    # of those that begin with it.
     slack = tour.ruggedness if tour.ruggedness > SMOOTH else 1.0
     search = _OrderSearch(
         solve, count, progress, tour.start_s, None, slack, looks_twice=False, fits=fits
@@ -245,6 +248,7 @@ def _best_order_on_grid(
     def report_rest(share: float) -> None:
         report(_GRID_SHARE + (1.0 - _GRID_SHARE) * share)
 
+    # If the grid has no candidate, an order that fits is tried.
     order, best = _best_on_grids(
         tour, orders or [tuple(fitting)], limits, bounded, guesses, report_rest
     )
@@ -254,7 +258,7 @@ def _best_order_on_grid(
         order,
         best.path,
         best.objective,
-        count * 2 ** (count - 1),
+        count * 2 ** (count - 1),  # sets of targets with one of them as the last
         best.evaluations,
         time_search=best.search,
         order_search=order_search,
@@ -291,12 +295,14 @@ def _best_on_grids(
         report((index + 1) / len(followed))
     minima.sort(key=lambda minimum: minimum[1].objective)
 
-    best_order = minima[0][0] if minima else orders[0]
-    starts = [times.time_s for order, times in minima if order == best_order][:_MAX_POLISHED]
-    best = descend(best_order, [*starts, *guesses], Effort.LAST)
+    # Without a minimum the last descents start from guesses and from even gaps.
+    chosen = minima[0][0] if minima else orders[0]
+    starts = [times.time_s for order, times in minima if order == chosen][:_MAX_POLISHED]
+    best = descend(chosen, [*starts, *guesses], Effort.LAST)
     evaluations = best.evaluations + sum(times.evaluations for _, times in minima)
+    # The grids of all orders have as many times, and end at the same time.
     search = TimeSearch(len(candidates), len(followed), grids[0].grid)
-    return best_order, replace(best, evaluations=evaluations, search=search)
+    return chosen, replace(best, evaluations=evaluations, search=search)
 
 
 def _bounded(
@@ -380,6 +386,7 @@ class _OrderSearch:
             else:
                 children.append((objective, order, path))
 
+        # Of equal objectives, the lower order is first: paths cannot be compared.
         for objective, order, path in sorted(children, key=lambda child: child[:2]):
             complete = len(order) == self.count
             lowest = objective

@@ -130,7 +130,9 @@ class LinearPath(Path):
                 last = self.costate_before[segment]
                 grid = np.concatenate([[self.starts_s[segment]], times[flying], [end]])
                 states[flying], costates[flying] = _carried(self.motion, grid, start, last)
-            if len(staying):  # coasting with a target, from the arrival there
+            if len(staying):
+                # Coasting with a target, from the arrival there. The last time is repeated, because
+                # `_carried` leaves out both ends.
                 grid = np.concatenate([[end], times[staying], times[staying[-1:]]])
                 states[staying] = _carried(
                     self.motion, grid, self.arrival_states[segment], np.zeros(6)
@@ -141,6 +143,7 @@ class LinearPath(Path):
         """Return the segment of each time, and whether the chaser moves in it or stays."""
         which = np.searchsorted(self.nodes.leave_s, time_s, side="right")
         last = len(self.nodes.leave_s) - 1
+        # The path ends at the arrival at the last node, which belongs to the motion before it.
         ended = (which > last) & (time_s <= self.nodes.arrive_s[last])
         which = np.minimum(which, last)
         return which, (time_s < self.nodes.arrive_s[which]) | ended
@@ -175,6 +178,7 @@ def solve_segments(
     missing = (arrive - (segment.transition @ begin[:, :, None])[:, :, 0]) / scale
     try:
         lower = np.linalg.cholesky(segment.gramian / (scale[:, :, None] * scale[:, None, :]))
+        # Effects of the velocity at the end of each segment, and of that at its start.
         slopes = (
             np.broadcast_to(np.eye(6)[:, 3:], (len(starts), 6, 3)),
             segment.transition[:, :, 3:] / scale[:, :, None],
@@ -195,6 +199,7 @@ def solve_segments(
     at_start = np.einsum("kji,kj->ki", segment.transition, before)
     after = np.concatenate([at_start[1:], np.zeros((1, 6))])
     arrive[free, 3:] = velocities[free]
+    # The segment after a flyby starts with the velocity at it.
     begin[1:][free[:-1], 3:] = velocities[:-1][free[:-1]]
     cost = 0.5 * float((effort**2).sum())
     gradient = time_gradient(nodes, arrive, before, after)
@@ -207,13 +212,15 @@ def _velocities(effort: Floats, ahead: Floats, behind: Floats, free: Flags) -> F
     """Minimise sum |effort_k + ahead_k v_k - behind_k v_(k-1)|^2 over the free velocities v_k.
 
     The other velocities are zero. The normal equations have 3 x 3 blocks on three diagonals: a
-    banded matrix, shape (6, 3 N), of the lower diagonals.
+    banded matrix, shape (6, 3 N), of the lower diagonals. Row d has the entries d below the main
+    diagonal, by their columns.
     """
     diagonal = np.einsum("kra,krb->kab", ahead, ahead)
     diagonal[:-1] += np.einsum("kra,krb->kab", behind[1:], behind[1:])
     right = -np.einsum("kra,kr->ka", ahead, effort)
     right[:-1] += np.einsum("kra,kr->ka", behind[1:], effort[1:])
     below = -np.einsum("kra,krb->kab", ahead[1:], behind[1:])
+    # Equations v_k = 0 for the velocities that are not free.
     diagonal[~free] = np.eye(3)
     right[~free] = 0.0
     below[~(free[1:] & free[:-1])] = 0.0
@@ -232,6 +239,7 @@ def _carried(
     """Return states and costates at the inner times of a grid.
 
     They follow from the state at its start and the costate at its end. The times do not decrease.
+    A state is Phi x + G lambda, with x the state before and lambda the costate at its own time.
     """
     segment = motion.segment(grid[:-1], grid[1:])
     count = len(grid) - 2
@@ -276,9 +284,10 @@ def time_gradient(
     """Return dI/dt, shape (N,), from states and costates at the nodes.
 
     The states of the chaser and its costates before and after the nodes have shape (N, 6). D'(V_i -
-    V) at a flyby. H(t+) - H(t-) + (lambda- - lambda+)' x_i' at a rendezvous: as the target coasts
-    in the dynamics of the chaser, this is the power lambda_V' u - 1/2 |u|^2, after minus before;
-    1/2 |u|^2 below the bound.
+    V) at a flyby, with D the jump of the position's costate and V_i the target's velocity. H(t+) -
+    H(t-) + (lambda- - lambda+)' x_i' at a rendezvous: as the target coasts in the dynamics of the
+    chaser, this is the power lambda_V' u - 1/2 |u|^2, after minus before; 1/2 |u|^2 below the
+    bound.
     """
     flyby = ((before - after)[:, :3] * (nodes.arrive[:, 3:] - arrive[:, 3:])).sum(axis=1)
     sizes_before, sizes_after = (

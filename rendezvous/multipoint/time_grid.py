@@ -47,7 +47,7 @@ RANKS = 4
 With one, the valley of the minimum was lost in 1 of 90 cases.
 """
 START = -1
-"""Number of the chaser's coasting orbit among the targets."""
+"""Number of the chaser's coasting orbit among the targets; as an index of states, the last one."""
 _NONE = -2
 """Number in place of a target where there is no visit."""
 
@@ -120,13 +120,13 @@ class _TimeGrid:
         room = room_s(tour.start_s, stays, limits)
         self._min_gap_s = max(limits.min_gap_s, MIN_SHARE * room)
         # A sum of gaps at their minimum may exceed the room by rounding.
-        steps = max(room - self._count * self._min_gap_s, 0.0)
+        spare_s = max(room - self._count * self._min_gap_s, 0.0)
 
         # Between two of its breaks the motion turns by about a radian.
         radians = len(tour.motion.breaks(tour.start_s, self._latest_s)) - 1
         enough = max(MIN_TIMES, int(np.ceil(TIMES_PER_RADIAN * radians)))
         size = min(enough, self._most_times())
-        self._steps_s = np.linspace(0.0, steps, size)
+        self._steps_s = np.linspace(0.0, spare_s, size)
         self._apart = max(1, int(APART_RAD * size / radians))
         self._back: dict[tuple[int, int], Shorts] = {}
         self._departures: dict[float, _Departure] = {}
@@ -171,6 +171,7 @@ class _TimeGrid:
         It is at most `MAX_TIMES`, or `MAX_ORDER_TIMES` for all orders. Two visits have no such
         sequences.
         """
+        # Before the third visit one way leads to each pair of times: the other ranks are empty.
         passes = sum(
             self._pairs(visits) * (self._ranks if visits > 3 else 1)
             for visits in range(3, self._count + 1)
@@ -234,6 +235,7 @@ class _TimeGrid:
         legs.response[:, 0] = response
         legs.gramian[:, 0] = gramian
         for length in range(1, size):
+            # Row i: from departure i, on from arrival i + length - 1 to the next one.
             turn = step.transition[length - 1 :]
             response = turn @ response[:-1]
             gramian = turn @ gramian[:-1] @ np.swapaxes(turn, 1, 2) + step.gramian[length - 1 :]
@@ -250,6 +252,7 @@ class _TimeGrid:
         `since_zero`, shape (k, 6, 6), are the transition matrices from t = 0.
         """
         tour = self._tour
+        # The chaser's coasting orbit at t = 0, like the targets.
         chaser = tour.motion.transition(tour.start_s, 0.0) @ tour.start_state
         initial = np.concatenate([tour.initial, chaser[None]])
         return np.ascontiguousarray(np.moveaxis(since_zero @ initial.T, 2, 0))
@@ -271,13 +274,14 @@ class _TimeGrid:
             np.zeros((rows, size, 3, 3)),
             np.full((rows, size, 4), _NONE, dtype=np.int16),
         )
-        met = 3 if flyby else 6
+        met = 3 if flyby else 6  # components of a state that must agree
         kept = Kept(ranks, self._apart)
         # The cheapest first: most others cost more already than the whole ways known.
         for target, earlier in sorted(before.items(), key=lambda each: float(each[1].cost.min())):
             cheapest = np.argsort(earlier.cost, axis=0)
             relative = states[last] - states[target]
             extend(earlier, cheapest, legs, relative, target, met, kept, visits)
+        # After a rendezvous m and P are zero, and after the last visit no leg follows.
         if not flyby or final:
             return visits
 
@@ -314,6 +318,7 @@ class _TimeGrid:
         costs = np.pad(cost, edge)
         targets = np.pad(target, edge)
         decideds = np.pad(decided, edge)
+        # Beyond the edges there are no visits: the zeros that pad `costs` are not compared.
         targets[[0, -1]] = targets[..., [0, -1]] = _NONE
 
         lowest = np.isfinite(cost)

@@ -340,7 +340,8 @@ def _unsettled(trials: _Trials, best: _Trial) -> float:
         slope = slope + max(0.0, -float(excess @ slope) / float(excess.sum()))
     farthest = max(trials.total - gaps.sum(), 0.0) + excess.sum()
     gain = np.maximum(-slope * np.minimum(gaps, farthest), slope * excess)
-    # The objective of a path that costs nothing is the rounding of states.
+    # The objective of a path that costs nothing is the rounding of states: `size` is about the
+    # cost of a leg whose control changes the whole state.
     states = best.path.nodes.arrive
     size = (states[:, :3] ** 2).sum(axis=1) / gaps**3 + (states[:, 3:] ** 2).sum(axis=1) / gaps
     return float(gain.max() / max(best.objective + _OBJECTIVE_ROUNDING * size.sum(), _MIN))
@@ -399,8 +400,10 @@ def _valleys(starts: Sequence[_Trial], most: int) -> list[_Trial]:
     """
     ranked = sorted(starts, key=lambda trial: trial.objective)
     gaps = np.stack([trial.gaps for trial in ranked])
+    # With itself, so that a start of n gaps is compared with n + 1 others; chosen.
     neighbours = min(len(ranked), gaps.shape[1] + 2)
     nearest = cKDTree(gaps).query(gaps, k=neighbours)[1].reshape(len(ranked), -1)
+    # The starts are in ascending order of cost: an index that is not less costs no less.
     lowest = (nearest >= np.arange(len(ranked))[:, None]).all(axis=1)
     return [ranked[index] for index in np.argsort(~lowest, kind="stable")[:most]]
 
@@ -414,7 +417,8 @@ def _descend(
     """
     if start.objective < enough:
         return start
-    # Keeps the logarithm finite where a path costs nothing; not 0 even if the start costs nothing.
+    # Keeps the logarithm finite where a path costs nothing; not 0 even if the start costs nothing,
+    # as 1e-300 is above the smallest double. Costs so far below the start's are rounding.
     floor = 1e-30 * max(start.objective, 1e-270)
     shares = np.broadcast_to(scale, start.gaps.shape) / trials.total
     walls = 0
@@ -422,7 +426,7 @@ def _descend(
 
     def value(x: Floats) -> tuple[float, Floats]:
         nonlocal walls, lowest
-        # Whatever point is tried, no gap is below half the minimum one.
+        # Whatever point is tried, no gap is below half the minimum one; a gap of zero has no path.
         gaps = np.maximum(x * scale, 0.5 * trials.minimum)
         trial = trials.attempt(gaps)
         if trial is None:
@@ -451,6 +455,7 @@ def _descend(
             bounds=[(float(bound), None) for bound in bounds],
             constraints=within_total if np.isfinite(trials.total) else (),
             method="SLSQP",
+            # The number of iterations only stops descents that do not converge; chosen.
             options={"ftol": tolerance, "maxiter": 100},
         )
     except _StoppedError:
@@ -481,9 +486,11 @@ def _polish(trials: _Trials, best: _Trial) -> _Trial:
 
     directions = np.eye(len(gaps))[:, ~held]
     if full:
+        # An orthonormal basis of the changes whose sum is zero; none if only one gap is not held.
         directions = directions @ np.linalg.svd(np.ones((1, directions.shape[1])))[2][1:].T
     here = trials(gaps)
     step = _DIFFERENCE * float(gaps.min())
+    # Without a direction there is nothing to polish.
     for _ in range(_POLISH_ROUNDS if directions.shape[1] else 0):
         slopes = [
             trials(here.gaps + step * way).slope - trials(here.gaps - step * way).slope

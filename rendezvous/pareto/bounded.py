@@ -86,12 +86,14 @@ def bound_encounter(solution: EncounterSolution, max_m_s2: float) -> BoundedEnco
     optimum = solve_bounded(arcs, max_m_s2)
     energies = np.empty(len(encounter.craft))
     energies[counted] = optimum.energies
-    costates = dict(zip(counted, zip(optimum.costates, optimum.edges_s, strict=True), strict=True))
+    # The costate of each craft, and the edges of its time on the bound.
+    solved = dict(zip(counted, zip(optimum.costates, optimum.edges_s, strict=True), strict=True))
 
     for index, craft in enumerate(encounter.craft):
-        if index in costates:
+        if index in solved:
             continue
         arc = _arc(encounter, craft, 1.0)
+        # The meeting is given: no free values, of which `slope` would have the columns.
         to_point = Arc(
             arc.motion,
             arc.start_s,
@@ -108,7 +110,7 @@ def bound_encounter(solution: EncounterSolution, max_m_s2: float) -> BoundedEnco
                 f"{least_bound([to_point]).value_m_s2:.6g} m/s^2"
             ) from None
         energies[index] = alone.energies[0]
-        costates[index] = (alone.costates[0], alone.edges_s[0])
+        solved[index] = (alone.costates[0], alone.edges_s[0])
 
     flights = tuple(
         BoundedFlight(
@@ -116,9 +118,9 @@ def bound_encounter(solution: EncounterSolution, max_m_s2: float) -> BoundedEnco
             craft.start_s,
             encounter.meeting_s,
             craft.state,
-            costates[index][0],
+            solved[index][0],
             max_m_s2,
-            costates[index][1],
+            solved[index][1],
         )
         for index, craft in enumerate(encounter.craft)
     )

@@ -92,12 +92,14 @@ def analyse_coalitions(solution: EncounterSolution) -> Coalitions:
     for size in range(1, count + 1):
         for members in combinations(range(count), size):
             worth[members] = _worth(solution, members, weights)
+            # A regret is not negative, up to rounding.
             regret = max(float(common[list(members)].sum()) - worth[members], 0.0)
             coalitions.append(Coalition(members, worth[members], regret))
 
     shapley = np.zeros(count)
     for members, value in worth.items():
         for craft in members:
+            # The craft joins the others: their orders before it, and those of the rest after it.
             others = tuple(member for member in members if member != craft)
             orders = factorial(len(others)) * factorial(count - len(members))
             shapley[craft] += orders / factorial(count) * (value - worth[others])
@@ -117,6 +119,7 @@ def _worth(solution: EncounterSolution, members: tuple[int, ...], weights: Float
     weights.
     """
     costs = [solution.costs[member] for member in members]
+    # `weighted_point` needs a positive weight.
     if len(members) == 1 or not (weights[list(members)] > 0.0).any():
         return 0.0
     point = weighted_point(costs, weights[list(members)])

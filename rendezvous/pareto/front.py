@@ -41,10 +41,12 @@ def simplex_weights(craft: int, count: int) -> Floats:
         share = np.linspace(0.0, 1.0, max(count, 2))
         return np.stack([1.0 - share, share], axis=1)
     if craft == 3:
+        # A lattice with d divisions has (d + 1) (d + 2) / 2 points.
         divisions = max(1, int(np.sqrt(2.0 * count)) - 1)
         pairs = [(i, j) for i in range(divisions + 1) for j in range(divisions + 1 - i)]
         return np.array([(divisions - i - j, i, j) for i, j in pairs], dtype=np.float64) / divisions
     uniform = halton(craft, count)
+    # Shares of exponentially distributed numbers are uniform over all shares.
     spread = -np.log(uniform)
     return np.concatenate([np.eye(craft), spread / spread.sum(axis=1, keepdims=True)])
 

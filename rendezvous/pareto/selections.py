@@ -35,16 +35,18 @@ def min_sum_of_costs(solution: EncounterSolution) -> Floats:
     floors = floors / size**2 + _CORNER
 
     def costs(point: Floats) -> tuple[Floats, Floats]:
+        # The costs, shape (n,), and their gradients, shape (n, f).
         apart = np.einsum("nab,nb->na", roots, point - ideals)
-        size = np.sqrt(floors + (apart**2).sum(axis=1))
-        return size, np.einsum("nab,na->nb", roots, apart) / size[:, None]
+        norms = np.sqrt(floors + (apart**2).sum(axis=1))
+        return norms, np.einsum("nab,na->nb", roots, apart) / norms[:, None]
 
     def curvature(point: Floats) -> Floats:
-        size, slopes = costs(point)
+        norms, slopes = costs(point)
         bend = np.einsum("nca,ncb->nab", roots, roots) - slopes[:, :, None] * slopes[:, None, :]
-        return np.asarray(np.einsum("n,nab->ab", weights / size, bend))
+        return np.asarray(np.einsum("n,nab->ab", weights / norms, bend))
 
     # Ideals whose norm has nearly a corner: without a cost, up to ten times the radius (chosen).
+    # Zero is the mean of the ideals.
     starts = [np.zeros(len(middle)), *ideals[floors < 100.0 * _CORNER]]
     minimum = minimize(
         lambda point: tuple(weights @ part for part in costs(point)),
@@ -52,6 +54,7 @@ def min_sum_of_costs(solution: EncounterSolution) -> Floats:
         jac=True,
         hess=curvature,
         method="trust-exact",
+        # Both are chosen.
         options={"gtol": 1e-11, "maxiter": 300},
     )
     return np.asarray(middle + size * back @ minimum.x)
@@ -70,6 +73,7 @@ def minimax_excess(solution: EncounterSolution) -> Floats:
     weights = np.array([cost.craft.weight for cost in costs])
     roots = np.array([cost.root for cost in costs])
     centres = np.array([cost.ideal for cost in costs])
+    # The weights are in the matrices, so that the excesses below are weighted.
     matrices = np.einsum("n,nca,ncb->nab", weights, roots, roots)
     scale = np.linalg.inv(np.linalg.cholesky(matrices.mean(axis=0)).T)
     scaled = np.einsum("ca,ncd,db->nab", scale, matrices, scale)
@@ -99,6 +103,7 @@ def minimax_excess(solution: EncounterSolution) -> Floats:
             "jac": lambda x: np.column_stack([-slopes(x[:-1]), np.ones(len(ideals))]),
         },
         method="SLSQP",
+        # Both are chosen; Newton's method follows.
         options={"ftol": 1e-15, "maxiter": 200},
     )
     best = _bound_craft(np.asarray(minimum.x[:-1]), excess, slopes, scaled)
@@ -170,6 +175,7 @@ def _bound_craft(
     bound = np.flatnonzero(values >= values.max() * (1.0 - 1e-5))
     count = len(bound)
     free = len(point)
+    # Shares of the active craft, of sum one, with which their slopes cancel.
     shares = np.linalg.lstsq(
         np.vstack([slopes(point)[bound].T, np.ones(count)]),
         np.append(np.zeros(free), 1.0),

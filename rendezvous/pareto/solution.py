@@ -118,7 +118,7 @@ class EncounterSolution:
     def same_matrix(self) -> bool:
         """Whether all craft have one M, up to rounding, and not only up to a factor.
 
-        Then the Pareto set is the convex hull of the ideals.
+        Then the Pareto set is the convex hull of the ideals. Rounding is below 1e-12 of a number.
         """
         first = self.costs[0].matrix
         return all(np.allclose(cost.matrix, first, rtol=1e-12, atol=0.0) for cost in self.costs[1:])

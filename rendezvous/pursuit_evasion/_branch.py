@@ -83,6 +83,7 @@ def follow(
         left = latest - node.duration
         if left <= _SHORTEST_STEP:
             return Branch(tuple(nodes), Ending.TIME, work)
+        # No tiny last step.
         step = left if step > 0.9 * left else step
         work += node.duration + step
 
@@ -105,10 +106,12 @@ def follow(
             at = first_crossing(node, after, radius)
             if at is None:
                 nodes.append(after)
+                # 1e-12 only avoids a division by zero: the growth is limited to 2.
                 growth = 0.9 * (_PREDICTED_WITHIN / max(missed, 1e-12)) ** 0.25
                 step = min(_LONGEST_STEP, step * min(2.0, growth))
                 continue
             capture = polish(pair, _predicted(nodes, at), at, radius, latest)
+            # The capture of this step, not a later one; if it is not found, a shorter step follows.
             if (
                 capture is not None
                 and node.duration < capture.duration <= after.duration + _SHORTEST_STEP

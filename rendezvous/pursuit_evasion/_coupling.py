@@ -75,11 +75,13 @@ def couple(
     inverse = np.empty((3, 3))
     slope = np.empty(15)
     curvature = np.empty(2)
+    # d/dT of r_E - r_P at the same nu.
     drift = evader.by_time[:3] - pursuer.by_time[:3]
     for i in range(3):
         for j in range(2):
             outer[i, j] = pursuer.by_nu[i, j] - evader.by_nu[i, j] + distance * plane[j, i]
         outer[i, 2] = nu[i]
+    # The slope is at l free; if the time is free, the inverse is computed again below.
     solvable = invert(outer.copy(), inverse) != 0.0
 
     turn_0, turn_1 = 0.0, 0.0

@@ -92,6 +92,7 @@ def derivatives(
     """
     q = r[0] * r[0] + r[1] * r[1] + r[2] * r[2]
     s = r[0] * p[0] + r[1] * p[1] + r[2] * p[2]
+    # The three derivatives of f = mu q^(-1/2) by q, and those of oblateness q^(-3/2).
     inverse = 1.0 / q
     f = mu * np.sqrt(inverse)
     f1 = -0.5 * f * inverse
@@ -132,6 +133,7 @@ def _subtract_axial(
     """Subtract the derivatives of z^2 f, f = 3 oblateness q^(-5/2)."""
     z = r[2]
     square = r[2] * r[2]
+    # With the three derivatives by q.
     f = 3.0 * oblateness / (q * q * np.sqrt(q))
     f1 = -2.5 * f / q
     f2 = 8.75 * f / (q * q)
@@ -335,6 +337,8 @@ def flow_back(
         # The estimated error is of order eight. Below 1e-10 its root exceeds the largest factor.
         factor = _MAX_FACTOR if error < 1e-10 else _SAFETY * error**-0.125
         step = abs(h) * min(max(factor, _MIN_FACTOR), _MAX_FACTOR)
+        # A step of the rounding of the time, which a state near the centre can need. A span below
+        # a thousandth counts as a thousandth; chosen.
         if step < 1e-13 * max(span, 1e-3):
             return False
     return False
@@ -418,8 +422,7 @@ def invert(matrix: Floats, inverse: Floats) -> float:
     """Fill the inverse of a matrix, shape (n, n), and return its determinant.
 
     The determinant is 0 if the matrix is singular or not finite, and `inverse` then has no meaning.
-    Gauss and Jordan's elimination
-    with partial pivoting; the matrix is overwritten.
+    Gauss and Jordan's elimination with partial pivoting; the matrix is overwritten.
     """
     count = len(matrix)
     determinant = 1.0

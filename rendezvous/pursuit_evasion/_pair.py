@@ -292,6 +292,7 @@ class Pair:
             if linear is None:
                 return None
 
+            # New derivatives of the same tolerance contain the correction.
             if fresh and tolerance >= linear_tolerance:
                 rho = np.array([linear.pursuer.rho, linear.evader.rho])
             else:
@@ -303,6 +304,7 @@ class Pair:
                     return None
                 rho = np.array([p, e])
 
+            # A correction above four times the one before diverges; chosen.
             change, correction = linear.step(rho, state)
             if not correction < min(_FARTHEST, 4.0 * before):
                 return None
@@ -341,7 +343,7 @@ class Pair:
         """
         duration = min(_FIRST_DURATION, 0.5 * latest)
         while duration > _MIN_OF_FIRST:
-            # The line of sight of coasting craft.
+            # The line of sight of coasting craft: a direction of zero is no thrust.
             coasting = np.zeros(3)
             pursuer = self.pursuer.ballistic(duration, coasting)
             evader = self.evader.ballistic(duration, coasting)
@@ -358,5 +360,5 @@ class Pair:
             close = node is not None and float(np.abs(node.vector - guess).max()) < _NEAR
             if node is not None and close and node.is_saddle and node.distance > radius:
                 return node
-            duration *= 0.25
+            duration *= 0.25  # chosen
         return None

@@ -157,7 +157,10 @@ def _fan(side: Side, state: Floats, nu: Floats, grid: Floats, duration: float) -
 
 
 def _turn(side: Side, seed: End, toward: Floats, duration: float) -> End | None:
-    """Turn an extremal into a direction in one step or, if that fails, in four equal parts."""
+    """Turn an extremal into a direction in one step or, if that fails, in four.
+
+    The four parts of the chord from `seed.nu` to `toward` are equal, not those of the angle.
+    """
     parts = 1
     while parts <= _MAX_PARTS:
         here = seed
@@ -186,6 +189,7 @@ def end_along(side: Side, state: Floats, nu: Floats, duration: float) -> End | N
         response = side.respond(state, nu, plane, duration, COARSE)
         if response is None:
             return None
+        # A correction that more than doubles diverges; chosen.
         correction = float(np.abs(response.rho).max())
         if not correction < min(_FARTHEST, 2.0 * before):
             return None
@@ -218,6 +222,7 @@ def _climb(pair: Pair, pursuer: End, evader: End, duration: float) -> Node | Non
     for _ in range(_MAX_CLIMBING):
         rise = (evader.state - pursuer.state)[:3]
         value = float(evader.nu @ rise)
+        # The error that remains is about the square of the last correction: far below `_GAIN`.
         peak = pair.solve(
             np.concatenate([pursuer.state, evader.state, evader.nu]),
             duration,

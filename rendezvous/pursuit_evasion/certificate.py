@@ -238,6 +238,7 @@ def certify(solution: CaptureSolution, *, all_directions: bool = False) -> Certi
         alone_s = node.duration * units.time_s
 
     # The evader deviates, and the pursuer responds.
+    # One without thrust cannot.
     left = alone.work_left
     deviations: list[Deviation] = []
     for policy in Policy if evader.thrust > 0.0 else ():
@@ -335,6 +336,7 @@ def _along(paths: tuple[ExtremalPath, ExtremalPath], node: Node) -> tuple[float,
         mass = craft.mass - craft.flow * times
         size = np.linalg.norm(y[:, 9:], axis=1)
         rates = (size * craft.thrust / mass**2)[at_inner].reshape(_PANELS, _POINTS)
+        # The integral from each edge to the end.
         lost = np.append(np.cumsum((rates @ weights * 0.5 * width)[::-1])[::-1], 0.0)
         e = y[at_edges]
         gravity = np.array([_gravity(r, craft) for r in e[:, :3]])
@@ -376,6 +378,7 @@ def _forward_rates(time: float, y: Floats, craft: ExtremalCraft) -> Floats:
     """
     out = np.empty(12)
     p = y[9:]
+    # p_v may be zero at the end: 1e-300 only avoids a division by zero.
     size = float(np.linalg.norm(p))
     out[:3] = y[3:6]
     push = craft.thrust / (craft.mass - craft.flow * time)

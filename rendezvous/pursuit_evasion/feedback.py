@@ -184,13 +184,15 @@ class _Pursuit:
     def run(self, plan: Node, leg: float) -> PursuitFlight:
         """Fly legs of a duration `leg`, each with a new plan, until the flight ends.
 
-        `plan` is the pursuer's plan, from what it observes; `own` is the evader's, from the exact
-        states, which it needs if it is optimal and the observation is not exact.
+        `plan` is the pursuer's plan of the first leg, then of each one, from what it observes;
+        `own` is the evader's, from the exact states, which it needs if it is optimal and the
+        observation is not exact.
         """
         own = plan
         while len(self._log) < _MAX_PLANS:
             apart = self._evader.start[:3] - self._pursuer.start[:3]
             self._log.append((self._time, self._time + plan.duration, apart))
+            # In the last leg the plan predicts the capture; `spell` is the duration of this leg.
             last = plan.duration <= leg
             spell = min(leg, plan.duration * _PAST) if last else leg
             if spell > _lasts(self._pursuer, self._dry[0]):
@@ -224,8 +226,9 @@ class _Pursuit:
     def _plan(self, before: Node, spell: float, evader: ExtremalCraft) -> Node | None:
         """Solve the game from the current states, from the previous plan or from scratch.
 
-        `spell` is the duration of the leg that was flown. An evader whose propellant does not last
-        another such leg coasts. The result is None if there is no plan.
+        `before` is the plan of the leg that was flown, from its start, `spell` the duration of this
+        leg, and `evader` the evader now, as its planner knows it. An evader whose propellant does
+        not last another such leg coasts. The result is None if there is no plan.
         """
         if _lasts(evader, self._dry[1]) < spell:
             evader = replace(evader, thrust=0.0, flow=0.0)
@@ -245,6 +248,7 @@ class _Pursuit:
             )
             if node is not None and node.is_saddle and node.closing > 0.0:
                 return node
+        # No game begins within the radius, where errors of observation can show the evader.
         if float(np.linalg.norm(evader.start[:3] - self._pursuer.start[:3])) <= self._radius:
             return kept
 
@@ -273,6 +277,7 @@ class _Pursuit:
         begin = self._time
         steering = self._steering
         scale = np.repeat([units.length_m, units.speed_m_s], 3)
+        # An evader whose propellant does not last the leg coasts in all of it.
         spent = self._evader.mass <= self._dry[1] + self._evader.flow * spell
 
         def direction(time: float, state: Floats) -> Floats:
@@ -285,11 +290,15 @@ class _Pursuit:
         return (lambda time: np.asarray(steered.solution(time)[:6])), mass
 
     def _seen(self, plan: Node) -> ExtremalCraft:
-        """Return the evader as the pursuer observes it."""
+        """Return the evader as the pursuer observes it now, at the end of a leg.
+
+        `plan` is the pursuer's plan of this leg.
+        """
         seen = self._observation
         if seen.is_exact:
             return self._evader
 
+        # Before the start the evader was not observed.
         delay = min(seen.delay_s / self._units.time_s, self._time)
         state = self._evader.start
         if delay > 0.0:
@@ -302,7 +311,9 @@ class _Pursuit:
         errors = np.repeat([position_error, velocity_error], 3)
         state = state + errors * self._random.standard_normal(6)
         if delay > 0.0:
-            # As in the plan: full thrust in its current direction, which turns slowly.
+            # Since the observation the pursuer believes in full thrust in one direction, that at
+            # the start of the leg in its plan: it turns slowly. A plan that was kept has that of an
+            # earlier start.
             believed = plan.costates[1][3:]
             delayed = replace(self._evader, start=state)
             since = steered_path(delayed, lambda _time, _state: believed, delay)

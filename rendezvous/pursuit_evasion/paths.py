@@ -211,6 +211,7 @@ def _sampled(path: ExtremalPath, times: Floats, units: Units) -> PlayerHistory:
     craft = path.craft
     mass = craft.mass - craft.flow * times
     size = np.linalg.norm(y[:, 9:], axis=1)
+    # p_v is zero at the end, where the thrust is along nu: 1e-300 only avoids a division by zero.
     along_costate = y[:, 9:] / np.maximum(size, 1e-300)[:, None]
     direction = np.where(size[:, None] > 0.0, along_costate, path.nu)
 

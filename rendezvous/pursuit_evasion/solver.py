@@ -58,11 +58,13 @@ def solve(
     changes = 0
     work = branch.work
     while branch.ending in (Ending.CAPTURE, Ending.FOLD) and changes < _MAX_BRANCHES:
+        # A search at a fold and one at a capture have each their option.
         if not (change_branch if branch.ending is Ending.FOLD else all_directions):
             break
         better = greater(pair, branch.last)
         if better is None:
             break
+        # A capture from which a better branch goes on is not part of the curve.
         nodes += branch.nodes if branch.ending is Ending.FOLD else branch.nodes[:-1]
         branch = follow(pair, better, radius, latest, MAX_WORK - work)
         changes += 1
