@@ -83,6 +83,7 @@ def draw_path(report: MultipointReport) -> Figure:
             label="start of the chaser",
             **_POINT,
         )
+        # Orbits have equal scales in the plane of x and y, in which the centre is marked.
         if not report.hill and plane[1] == 1:
             panel.plot(
                 0.0,
@@ -130,7 +131,7 @@ def _mark_visits(panel: Axes, report: MultipointReport, visits: Floats) -> None:
 @style()
 def draw_control(report: MultipointReport) -> Figure:
     """Draw the components and the magnitude of the control against time, with a bound."""
-    control = report.path.control(report.times) * 1e3
+    control = report.path.control(report.times) * 1e3  # mm/s^2
     figure, (above, below) = _over_time(report)
     for title, look, component in zip(report.axis_titles, LINE_LOOKS, control.T, strict=False):
         _line(above, report, component, label=title, **look | {"marker": "none"})
@@ -156,6 +157,7 @@ def _over_time(report: MultipointReport) -> tuple[Figure, list[Axes]]:
     for panel in grid.flat:
         for time in arrive:
             panel.axvline(time, zorder=0, label="visit", **EVENT)
+        # The stay with the last target is after the end of the path.
         for begin, end in zip(arrive[:-1], leave[:-1], strict=True):
             if end > begin:
                 panel.axvspan(begin, end, facecolor=SET_FILL, linewidth=0.0, zorder=0, label="stay")
@@ -168,7 +170,10 @@ def _over_time(report: MultipointReport) -> tuple[Figure, list[Axes]]:
 
 
 def _line(panel: Axes, report: MultipointReport, values: Floats, **look: Any) -> None:
-    """Draw a line with breaks where the chaser arrives at a target or leaves it."""
+    """Draw a line with breaks where the chaser arrives at a target or leaves it.
+
+    `report.times` has a time just before each arrival, at which the line ends.
+    """
     _, per_s = report.time_unit
     arrive = report.path.nodes.arrive_s[:-1]
     leave = report.path.nodes.leave_s[:-1]

@@ -118,6 +118,7 @@ class MultipointProblem:
             raise ValueError("eccentricity: belongs to the reference orbit of Hill's axes")
         for key, body in bodies.items():
             if mu is not None:
+                # From its epoch a body moves back to t = 0, and on to the last visit.
                 with np.errstate(all="ignore"):  # elements of any size are refused here
                     before_s = max(body.epoch_s, 0.0)
                     after_s = max(self.last_s - body.epoch_s, 0.0)
@@ -145,6 +146,7 @@ class MultipointProblem:
         times = [target.time_s for target in self.target if target.time_s is not None]
         if self.latest_s is not None:
             times.append(self.latest_s)
+        # With a price of time alone, or without a time of each target, the visits can be later.
         elif self.times is not None or len(times) < len(self.target):
             return np.inf
         return max(times, default=np.inf)

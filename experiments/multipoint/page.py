@@ -46,10 +46,12 @@ def _views(report: MultipointReport, time_s: Floats) -> list[View]:
     positions = report.path.state(time_s)[:, :3]
     tracks = [Track("chaser", 0, positions)]
     for visit, target in enumerate(report.names):
+        # The stay with the last target is after the end of the path.
         until_s = nodes.leave_s[visit] if visit < len(report.best.order) - 1 else report.end_s
         tracks.append(
             Track(target, 1 + visit, report.target_path(visit, time_s[time_s <= until_s]))
         )
+    # The legend has one entry for all visits.
     marks = [
         Mark("" if visit else "visit", state[:3], "diamond")
         for visit, state in enumerate(report.path.arrival_states)

@@ -22,7 +22,8 @@ _POINTS = 1601
 _ENOUGH_A_REVOLUTION = 20.0
 """Times of a grid in a revolution below which a note says that it is coarse.
 
-With fewer times its lowest costs may be in other valleys than the minima.
+With fewer times its lowest costs may be in other valleys than the minima. Chosen: the grid has 25
+unless their number is limited. Within a revolution there is no note: a grid has at least 32 times.
 """
 
 

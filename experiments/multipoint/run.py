@@ -129,7 +129,8 @@ def _best(
         return best_order(tour, problem.limits(), guesses, progress=progress)
     price_per_s = 0.0 if problem.times is None else problem.times.price_per_s
     if order_is_free:
-        # The times are given, and with them the price: it does not change the best order.
+        # The times are given, and with them the price: it does not change the best order. `solve`
+        # has checked that there are times.
         best = best_order_of_slots(tour, guesses[0], progress=progress)
         return replace(best, objective=best.objective + price_per_s * float(guesses[0][-1]))
     if times_are_free:

@@ -71,6 +71,7 @@ def simulate(problem: ObserverProblem, errors: Errors, seed: int) -> Data:
     c = np.array(system.C)
     inputs = _padded(problem.inputs, problem.simulation.steps, system.inputs)
     states = [_point(problem.initial.shape, errors, generator)]
+    # The last inputs act after the last measurement: no state follows.
     for step, u in enumerate(inputs[:-1], start=1):
         w = _point(problem.disturbance_set, errors, generator)
         states.append(a @ states[-1] + b @ u + (system.c or 0.0) + w)
@@ -80,6 +81,7 @@ def simulate(problem: ObserverProblem, errors: Errors, seed: int) -> Data:
     noise = _signs(errors, (len(true), len(c)), generator) * problem.noise.half_width
     measured = true @ c.T + noise
     origin = f"simulated, {errors.value} errors, seed {seed}"
+    # Numbers beyond the last step mean no step.
     missing = [step for step in problem.simulation.missing if step < len(measured)]
     if problem.wrong_measurements is not None:
         sizes = _wrong_errors(problem.wrong_measurements, missing, measured.shape, seed)
@@ -102,12 +104,13 @@ def _wrong_errors(
     and the other errors do not depend on the table.
     """
     first, last = (0, shape[0] - 1) if wrong.steps is None else wrong.steps
+    # A number where a measurement can be wrong, NaN elsewhere, as `draw_wrong_measurements` needs.
     places = np.full(shape[0], np.nan)
     places[first : last + 1] = 0.0
     places[missing] = np.nan
     generator = np.random.default_rng([seed, _WRONG_STREAM])
-    images = WrongMeasurements(wrong.number, wrong.size)
-    return draw_wrong_measurements(images, places, shape[1], generator).T
+    drawn = WrongMeasurements(wrong.number, wrong.size)
+    return draw_wrong_measurements(drawn, places, shape[1], generator).T
 
 
 def steps_text(steps: list[int]) -> str:
@@ -187,6 +190,7 @@ def read_csv(file: Path, problem: ObserverProblem, columns: str) -> Data:
     rows = []
     for line, cells in enumerate(table, start=2):
         full = cells or [""]  # a file of one column has empty lines
+        # A row without the number of cells of the header, or with a text, is empty: refused below.
         try:
             row = [
                 float(full[place].strip() or "nan") for place in places if len(full) == len(header)

@@ -47,12 +47,13 @@ def draw_bounds(report: ObserverReport) -> Figure:
     The true state of a simulation is added.
     """
     names = report.problem.names
+    # Heights in mm: 38 for a row, and 30 for the title of the time and the legend; chosen.
     figure, grid = subplots(30.0 + 38.0 * len(names), len(names), 2, sharex=True)
     time, title = times(report)
     lower, upper = bounds_of(report.estimates).swapaxes(0, 1)
     smoothed = report.smoothed
     dashed: dict[str, Any] = {"color": MEASURED, "linewidth": 0.9, "linestyle": (0, (4, 1.5))}
-    missing = np.isnan(report.data.measured).all(axis=1)
+    missing = np.isnan(report.data.measured).all(axis=1)  # of all outputs
     for index, (name, (panel, width)) in enumerate(zip(map(plain, names), grid, strict=True)):
         panel.fill_between(
             time, lower[:, index], upper[:, index], color=SET_FILL, label="possible states"
@@ -121,6 +122,7 @@ def draw_sets(report: ObserverReport) -> Figure:
     """Draw the sets of two states, the first ones light and the last ones dark, at most 60."""
     figure, ((panel,),) = subplots(115.0)
     shown = [estimate for estimate in report.estimates if not estimate.is_empty]
+    # Every n-th one, with n rounded up.
     shown = shown[:: -(-len(shown) // _MAX_OUTLINES)] if shown else []
     # Lighter greys than 0.3 could not be seen, and darker ones not be told from black.
     shades = mpl.colormaps["Greys"](np.linspace(0.3, 0.9, len(shown)))

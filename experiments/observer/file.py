@@ -73,6 +73,7 @@ class SetTable:
     @cached_property
     def shape(self) -> Set:
         """The set."""
+        # Which keys are given, in the order of the fields.
         match [bool(values) for values in vars(self).values()]:
             case [True, True, False, False, False]:
                 return Zonotope.box(self.lower, self.upper)
@@ -193,6 +194,7 @@ class ObserverProblem:
     @cached_property
     def measured(self) -> Floats | None:
         """Measurements of the file, shape (N, q), NaN if missing; None if there are none."""
+        # An empty row stands for no measurement.
         missing = (np.nan,) * len(self.system.C)
         return _series(
             "measurements.y", [row or missing for row in self.measurements.y], len(missing)

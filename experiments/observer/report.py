@@ -64,6 +64,8 @@ class ObserverReport:
     def suspected_steps(self) -> list[int]:
         """Steps of the measurements one of which is proved to be wrong; none without a proof."""
         suspected = self.detection.suspected
+        # The measurements, without the missing ones, are dealt into the classes in turn. Those
+        # after the proof are not suspected.
         is_measured = ~np.isnan(self.data.measured).all(axis=1)
         numbers = np.cumsum(is_measured) - 1
         is_suspected = is_measured & suspected[numbers % len(suspected)]
@@ -105,7 +107,7 @@ def report_json(report: ObserverReport) -> dict[str, object]:
         where = report.inconsistency
         inconsistency = {
             "k": int(where.step),
-            "output": int(where.output) + 1,
+            "output": int(where.output) + 1,  # from 1, as in the columns of a file
             "excess": float(where.excess),
         }
     wrong: dict[str, object] | None = None
@@ -145,6 +147,7 @@ def report_csv(report: ObserverReport) -> str:
     columns = []
     blocks = []
     for kind, estimates in sets.items():
+        # Both bounds of the first state, then those of the next one.
         columns += [f"x{state}_{kind}{end}" for state in states for end in ("lower", "upper")]
         blocks.append(bounds_of(estimates).swapaxes(1, 2).reshape(len(estimates), -1))
     if report.data.states is not None:
@@ -187,6 +190,7 @@ def shown_bounds(estimates: Sequence[Estimate]) -> Floats:
 def _bounds_table(names: Sequence[str], estimates: Sequence[Estimate]) -> Table:
     """Return a table of the bounds of the last steps."""
     table = number_table("step", *(f"{name}\n{end}" for name in names for end in ("from", "to")))
+    # The rounding is that of all steps, also if only the last ones are shown.
     bounds = shown_bounds(estimates)
     for estimate, ends in zip(estimates[-_SHOWN_STEPS:], bounds[-_SHOWN_STEPS:], strict=True):
         cells = ("empty" if np.isnan(end) else f"{end:.6g}" for end in ends.T.ravel())

@@ -163,13 +163,15 @@ def _draw_set(
     axes: Axes, solution: EncounterSolution, points: Floats, selections: Mapping[str, Floats]
 ) -> None:
     """Draw the set against the first two free components, or against the only one."""
+    # Names of positions have one letter, those of velocities two.
     free = [component.name.lower() for component in solution.encounter.free]
     labels = [f"{name} of the meeting, {'m' if len(name) == 1 else 'm/s'}" for name in free]
-    flat = len(free) == 1
+    flat = len(free) == 1  # the set is a line
 
     def position(point: Floats) -> tuple[float, float]:
         return float(point[0]), 0.0 if flat else float(point[1])
 
+    # An area as a polygon or, with different M, as points; that of two craft is a curve.
     positions = np.array([position(point) for point in points])
     if len(solution.costs) > 2 and not flat and (corners := _hull(solution)) is not None:
         axes.fill(corners[:, 0], corners[:, 1], zorder=1, **SET)

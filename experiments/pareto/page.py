@@ -84,6 +84,7 @@ def _views(solution: EncounterSolution, paths: list[_Path]) -> list[View]:
 
 def _own_data(report: ParetoReport, paths: list[_Path]) -> dict[str, object]:
     """Return the data of `page.js`, which computes costs and trajectories of other meetings."""
+    # Names of positions have one letter, those of velocities two.
     solution = report.solution
     encounter = solution.encounter
     free = [component.name.lower() for component in encounter.free]

@@ -26,6 +26,7 @@ _CONTROLS, _LAWS = "u in section 3", "x(t) in section 3"
 _CRAFT = ("first", "second", "third")
 _COMPONENTS = {"u_1": 0, "u_2": 1, "u_3": 2, "x_1": 0, "x_3": 1, "x_5": 2}
 _TIMES_S = (10.0, 20.0, 30.0)
+"""Times of the printed positions."""
 
 
 def compute(_progress: Progress) -> dict[str, Sequence[float]]:

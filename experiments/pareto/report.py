@@ -133,6 +133,7 @@ def report_json(report: ParetoReport) -> dict[str, object]:
         "craft": [_craft_json(report, index) for index in range(len(solution.costs))],
         "group_loss_m2_s3": report.group_loss,
         "imposed_bound": _imposed_json(report),
+        # One matrix if all craft have the same.
         "matrix": [cost.matrix for cost in solution.costs[: 1 if same_matrix else None]],
     }
     if same_matrix:
@@ -270,6 +271,7 @@ def report_lines(report: ParetoReport) -> Iterator[Part]:
     if report.imposed is not None:
         yield imposed_text(report, report.imposed)
 
+    # Names of positions have one letter, those of velocities two.
     free = [component.name.lower() for component in encounter.free]
     titles = [f"{name}, {'m' if len(name) == 1 else 'm/s'}" for name in free]
     chosen = number_table("choice", *titles, "group loss\nm^2/s^3")

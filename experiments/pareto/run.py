@@ -47,6 +47,7 @@ def solve(problem: ParetoProblem, options: Pareto, begin: BeginProgress) -> Pare
     """Return the meetings, their costs, the coalitions and the costs of other durations."""
     preferred = None if options.prefer is None else _preferred(options.prefer, problem)
     encounter = problem.encounter
+    # The shares of the progress are chosen.
     progress = begin("meetings and coalitions")
     solution = solve_encounter(encounter)
     selections = {

@@ -113,6 +113,7 @@ def draw_relative(sampled: CaptureHistory) -> Figure:
     offset = offset * per_m
     relative = relative * per_m
     figure, (panels,) = subplots(75.0, 1, 3)
+    # The first two of three panels: radial and normal against along-track.
     for axes, column in zip(panels, (0, 2), strict=False):
         axes.plot(relative[:, 1], relative[:, column], **PURSUER)
         axes.plot(relative[0, 1], relative[0, column], color=TRUTH, **_START)
@@ -139,6 +140,7 @@ def draw_control(sampled: CaptureHistory) -> Figure:
                 panels, (in_plane, out_of_plane, player.switching), strict=True
             ):
                 axes.plot(time, values, **look)
+    # Steps that divide a right angle.
     panels[0].yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1.0, 1.5, 3.0, 4.5, 9.0, 10.0]))
     panels[2].set_ylim(bottom=0.0)
     labels = (
@@ -222,7 +224,7 @@ def draw_feedback(solution: CaptureSolution, flights: Sequence[PursuitFlight]) -
             )
         right.set(
             xlabel=f"capture time, {unit}", ylabel="share of simulations captured", ylim=(0.0, 1.02)
-        )
+        )  # a share of 1 is below the frame
         title = f"{len(times)} of {len(flights)} captured"
     letters(panels, ["predictions", title])
     legend_below(figure, 1)

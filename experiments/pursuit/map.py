@@ -134,8 +134,9 @@ def game_at(problem: PursuitProblem, values: Mapping[str, float]) -> Game:
     if "phase_deg" in values:
         assert pursuer.orbit is not None
         assert evader.orbit is not None
-        lead_rad = _true_longitude_rad(pursuer.orbit) - _true_longitude_rad(evader.orbit)
-        anomaly_rad = evader.orbit.true_anomaly_rad + lead_rad + math.radians(values["phase_deg"])
+        # With a phase of zero both players have the same true longitude.
+        apart_rad = _true_longitude_rad(pursuer.orbit) - _true_longitude_rad(evader.orbit)
+        anomaly_rad = evader.orbit.true_anomaly_rad + apart_rad + math.radians(values["phase_deg"])
         evader = replace(evader, orbit=replace(evader.orbit, true_anomaly_rad=anomaly_rad))
     if "thrust_ratio" in values:
         evader = replace(evader, thrust_N=values["thrust_ratio"] * pursuer.thrust_N)

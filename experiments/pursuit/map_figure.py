@@ -43,6 +43,7 @@ def draw_map(report: MapReport) -> Figure:
     if hours.count():
         mesh = axes.pcolormesh(x, y, hours, cmap="Blues", shading="nearest", rasterized=True)
         figure.colorbar(mesh, ax=axes, label="capture time, h")
+        # A contour line needs a cell, of four points, and times that differ.
         if hours.count() > 3 and float(np.ptp(hours.compressed())) > 0.0:
             # No contour lines in cells with a corner that has no capture time.
             lines = axes.contour(

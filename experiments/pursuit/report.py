@@ -50,7 +50,12 @@ class PursuitReport:
 
 
 def report_json(report: PursuitReport) -> dict[str, object]:
-    """Return the results for `to_json`; keys are the names of the solution's fields."""
+    """Return the results for `infoset.experiments.common.output.to_json`.
+
+    Keys are mostly names of fields of the solution, its parts, the certificate and the feedback:
+    renaming a field renames a key. The extremal, nondimensional and only an initial guess, is left
+    out.
+    """
     solution = report.solution
     values: dict[str, object] = {
         "axes": INERTIAL_AXES,
@@ -179,6 +184,7 @@ def verdict_text(solution: CaptureSolution) -> str:
         )
 
     looked_at_s = solution.looked_at_s
+    # Below a second a decimal digit would say little.
     until = f"{looked_at_s:.1f} s" if looked_at_s >= 1.0 else f"{looked_at_s:.3g} s"
     if solution.verdict is CertificateVerdict.PROPELLANT_EXHAUSTED:
         return (

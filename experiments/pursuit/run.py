@@ -54,7 +54,7 @@ def solve_pursuit(problem: PursuitProblem, options: Pursuit, begin: BeginProgres
         choice(
             "--feedback", options.feedback, [OPTIMAL, RANDOM, *(policy.value for policy in Policy)]
         )
-    progress = begin("solve")
+    progress = begin("solve")  # its shares are chosen
     solution = solve(problem.game, all_directions=options.certify)
     progress(0.5)
     certificate = None
@@ -76,6 +76,7 @@ def _fly(
         say("no feedback: there is no capture, and so no plan to start from", options.quiet)
         return None
     game_s = solution.capture.time_s
+    # The option is at least 1 s, never zero.
     replan_s = options.replan_s or max(min(REPLAN_S, game_s / MIN_PLANS), game_s / MAX_PLANS)
     observation = Observation(options.delay_s, options.position_noise_m, options.velocity_noise_m_s)
 
@@ -84,6 +85,7 @@ def _fly(
             return RandomSteering(options.seed, run, replan_s)
         return None if policy == OPTIMAL else Policy(policy).direction
 
+    # The errors have the streams (run, 0) of the seed, `RandomSteering` those of (run, 1, draw).
     flights = []
     progress = begin("feedback")
     for run in range(options.runs):

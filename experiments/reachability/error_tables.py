@@ -119,6 +119,7 @@ def check_starts(problem: ReachabilityProblem, error: Floats) -> None:
     normals, offsets = problem.further
     spread = np.concatenate([error, np.abs(normals) @ error])
     states = np.concatenate([np.abs(problem.initial), normals @ problem.initial])
+    # The first offsets are those of t = 0.
     over = states + spread - np.concatenate([problem.state_bounds, offsets[0]])
     # The start itself was checked, to rounding.
     broken = np.flatnonzero((spread > 0.0) & (over > 0.0)).tolist()

@@ -44,6 +44,9 @@ COLOUR_RANGE = (0.1, 0.95)
 
 The colours differ in hue and in brightness.
 """
+NEAR_LIMIT = 0.7
+"""Part of a limit from which it is drawn: one far from all controls would only make them small.
+Chosen."""
 _NAMES = {
     "energy": "minimum energy",
     "l1": "minimum L1",
@@ -159,6 +162,8 @@ def _draw_motion(
         )
         marks = {**look, "linestyle": "none", "markersize": 3.5, "zorder": 6}
         axes.plot(*(member.linear[:, states] * factors).T, label=f"{name}, linear", **marks)
+    # At the start, and at the end of all optimal trajectories, the tube is one state: its lower and
+    # upper bounds are equal up to rounding.
     for t, mark in ((0, _START), (-1, _END)):
         point = report.tube[t, states].mean(axis=1) * factors
         axes.plot(*point[:, None], color=INK, linestyle="none", zorder=7, **mark)
@@ -170,6 +175,7 @@ def draw_set(axes: Any, points: Floats, colour: Any, label: str) -> None:
 
     A hull without area or volume is drawn as its points on a line.
     """
+    # Equal points are divided by 1: they have no hull.
     try:
         hull = ConvexHull(points / (np.ptp(points, axis=0).max() or 1.0))
     except QhullError:
@@ -206,6 +212,7 @@ def draw_controls(report: ReachabilityReport) -> Figure:
     rendezvous = report.rendezvous
     periods = report.solution.problem.periods
     bounds = report.solution.problem.control_bounds
+    # An impulse is in the middle of its bar, held thrust acts from the start to the end of it.
     unit = ", m/s"
     first = -0.5
     if not rendezvous.has_impulses:
@@ -229,8 +236,7 @@ def draw_controls(report: ReachabilityReport) -> Figure:
                 axes.plot(times, values, linestyle="none", **_STEM_END, color=look["color"])
             else:
                 axes.stairs(values, np.arange(periods + 1), baseline=None, label=name, **line)
-        # A bound far from all controls would only make them small; chosen.
-        if max(float(np.abs(report.ranges[:, j]).max()), 1e-9) > 0.7 * bounds[j]:
+        if np.abs(report.ranges[:, j]).max() > NEAR_LIMIT * bounds[j]:
             for sign in (-1.0, 1.0):
                 axes.axhline(sign * bounds[j], label="bound", **BOUND)
         axes.set_xlabel(f"time, periods of {rendezvous.period_s:g} s")

@@ -49,9 +49,10 @@ from infoset.rendezvous.two_body import OrbitalElements
 
 STATE_NAMES = ("x", "y", "z", "vx", "vy", "vz")
 _MAX_REACH = 1e4
-"""Largest change of a state by full control over a period, as a multiple of its bound."""
+"""Largest change of a state by full control over a period, as a multiple of its bound; beyond it
+rounding decides the result. Chosen."""
 _INSTANTS = 12
-"""Instants within a period at which selected controls are checked."""
+"""Instants within a period at which selected controls are checked; chosen."""
 
 
 class Engine(Enum):
@@ -139,8 +140,10 @@ class Cone:
     def half_spaces(self) -> tuple[Floats, Floats]:
         """Outward normals, (faces, 6), and offsets of the pyramid, whose edges lie on the cone."""
         along = np.array(self.axis) / np.linalg.norm(self.axis)
+        # Two directions across the axis and each other.
         across = np.linalg.svd(along[None, :])[2][1:]
         turns = 2.0 * np.pi * np.arange(self.faces) / self.faces
+        # The middle of a face is nearer to the axis than the edges, which are on the cone.
         slope = np.tan(self.half_angle_rad) * np.cos(np.pi / self.faces)
         rows = (
             np.outer(np.cos(turns), across[0]) + np.outer(np.sin(turns), across[1]) - slope * along
@@ -462,6 +465,7 @@ class Rendezvous:
         """
         if self.disturbance is None:
             return None
+        # The effect of 1 m/s^2.
         _, held = discretised(self.motion, self.periods, self.period_s, 1.0)
         return np.asarray(held * self.disturbance.acceleration_m_s2)
 
@@ -544,6 +548,7 @@ class Rendezvous:
             if self.passive_safety.until_period is not None:
                 impulses = self.passive_safety.until_period + 1
         ellipse = self.ellipse
+        # The rate of the orbit at the perigee.
         fastest_rad_s = ellipse.semi_latus_rate_rad_s * (1.0 + ellipse.eccentricity) ** 2
         instants = math.ceil(self.period_s * fastest_rad_s / _MAX_ANGLE_RAD)
         acceleration_m_s2 = 0.0
@@ -576,6 +581,7 @@ class Rendezvous:
         )
         problem = self.problem
         normals, offsets = problem.further
+        # For each period: upper and lower bounds of states, and the offsets that hold at its start.
         bounds = np.tile(problem.state_bounds, (self.periods, 2))
         unit = np.eye(problem.states)
         return PathLimits(
@@ -620,6 +626,7 @@ class Rendezvous:
         times = np.arange(periods)[:, None]
         for each in self.control_limits:
             normals = np.vstack([normals, each.normals])
+            # At other times the offset is infinite: no constraint.
             holds = (times >= each.from_period) & (times <= each.until_period)
             offsets = np.hstack([offsets, np.where(holds, each.offsets, np.inf)])
         return normals, offsets
@@ -639,6 +646,7 @@ class Rendezvous:
         for name, region in regions:
             rows, offsets_m = region.half_spaces
             normals = np.vstack([normals, rows])
+            # At other times the offset is infinite: no constraint.
             holds = (times >= region.from_period) & (times <= region.until_period)
             offsets = np.hstack([offsets, np.where(holds, offsets_m, np.inf)])
             names += [name.format(row) for row in range(1, len(rows) + 1)]

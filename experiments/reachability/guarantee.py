@@ -121,6 +121,7 @@ class GuaranteeReport:
         """The faces that replace a limit of thrust in norm; None if it is one of each axis."""
         if self.rendezvous.thrust is ThrustShape.BOX:
             return None
+        # Of one acting control the limit in norm is that of its axis.
         acting = acting_controls(self.rendezvous.output_problem)
         return norm_faces(len(acting)) if len(acting) > 1 else None
 
@@ -146,6 +147,7 @@ class GuaranteeReport:
     def path_times_s(self) -> Floats:
         """The times of `path`: that of each control twice, then times within its period."""
         periods = self.plan.problem.periods
+        # Without the end of the period, which is the start of the next one.
         inner = np.linspace(0.0, 1.0, self.rendezvous.instants.shape[1] + 2)[:-1]
         times = np.arange(periods)[:, None] + np.concatenate([[0.0], inner])
         return self.rendezvous.period_s * np.concatenate([times.ravel(), [periods]])
@@ -172,6 +174,7 @@ def solve_guarantee(
 ) -> GuaranteeReport:
     """Return the certified plans, the bounds of all strategies, and the simulated flights."""
     _check_options(rendezvous, options)
+    # The shares of the progress are chosen.
     progress = begin(rendezvous.name)
     problem = rendezvous.output_problem
     open_loop = None
@@ -192,6 +195,7 @@ def solve_guarantee(
             raise _refusal(rendezvous, error, progress) from None
         progress(0.3)
         if _bound_refusal(rendezvous) is None:
+            # Parts at rest, on which no error acts, are left out: they end at their target.
             parts = [part.problem for part in independent_parts(problem)]
             bound = max((lower_bound(part).value for part in parts), default=0.0)
             radius = max((information_radius(part).value for part in parts), default=0.0)
@@ -248,7 +252,7 @@ def _checked_plan(
     programs = itertools.count(1)
 
     def after_program() -> None:
-        # From 60 % to 90 %: how many programs there will be is not known.
+        # From 60 % to 90 %, a tenth of the rest each: how many programs will follow is not known.
         progress(0.9 - 0.3 * 0.9 ** next(programs))
 
     def solve(problem: OutputProblem) -> AffinePlan:
@@ -266,8 +270,9 @@ def _checked_plan(
         return _sighted(rendezvous, problem, lambda each: _within(rendezvous, each, safe))
 
     problem = rendezvous.output_problem
+    # Plans with lines of sight have outputs of their own, which depend on the plan.
     if rendezvous.sight is None:
-        # With the constraints that the plan needed already.
+        # With the constraints that the plan needed already, but not with its caps.
         problem = replace(plan.problem, caps=None)
     found = None
     try:
@@ -295,12 +300,13 @@ def _unsafe(rendezvous: Rendezvous, error: UnsafeDriftsError) -> InputError:
     certificate = error.certificate
     is_safe = certificate.distances >= safety.keep_out_m
     changes = []
-    # Three digits, below the certain distance.
+    # Three digits, below the certain distance; 1e-3 only avoids the logarithm of zero.
     digits = 10.0 ** (math.floor(math.log10(max(certificate.least_distance, 1e-3))) - 2)
     distance_m = digits * math.floor(certificate.least_distance / digits)
     if distance_m > 0.0:
         changes.append(f"keep_out_m = {distance_m:g}")
     instants = certificate.tube.coasting.instants
+    # The first period, and the first impulse, that are not safe: those before them are.
     by_period = is_safe.reshape(len(is_safe), -1, instants).all(axis=(0, 2))
     periods = int(by_period.argmin())
     if periods:
@@ -336,6 +342,7 @@ def _parts_in_flight(rendezvous: Rendezvous, problem: OutputProblem) -> tuple[Pr
     limits = rendezvous.path_limits
     if limits is None:
         return parts
+    # Apart are parts if no constraint acts on two of them.
     acting = [limits.normals[:, part.states].any(axis=1) for part in parts]
     are_apart = (np.sum(acting, axis=0) <= 1).all()
     return parts if are_apart else whole
@@ -401,7 +408,7 @@ def _sighted(
     sight = rendezvous.sight
     if sight is None or not rendezvous.has_feedback:
         return solve(problem)
-    return sighted_plan(problem, sight, 3, solve)
+    return sighted_plan(problem, sight, 3, solve)  # three components of a position
 
 
 def _within(
@@ -483,6 +490,7 @@ def _refusal(
 
 def _conflict(rendezvous: Rendezvous, progress: Callable[[float], None]) -> InputError:
     """Return the error of a rendezvous whose constraints no plan keeps, with what to change."""
+    # The progress moves by half of the rest: how many constraints there are is not counted.
     found = []
     for done, (name, relaxed) in enumerate(_relaxations(rendezvous)):
         try:
@@ -623,6 +631,7 @@ def flight_lines(report: GuaranteeReport) -> Iterator[str]:
     flights = report.flights
     name = _plan_name(report.rendezvous)
     if len(flights.distances):
+        # A guarantee of zero has no shares.
         share = flights.distances.max() / report.plan.guarantee if report.plan.guarantee else 0.0
         yield (
             f"{len(flights.distances)} flights of {name}{motion}, {bounds}: "

@@ -33,14 +33,12 @@ from infoset.experiments.common.figure_style import (
 )
 from infoset.experiments.common.hill_axes import AXIS_TITLES, component_titles
 from infoset.experiments.common.units import length_unit, time_unit
-from infoset.experiments.reachability.figures import COLOUR_RANGE, draw_set
+from infoset.experiments.reachability.figures import COLOUR_RANGE, NEAR_LIMIT, draw_set
 from infoset.experiments.reachability.guarantee import GuaranteeReport
 from infoset.rendezvous.reachability import AffinePlan
 
 _PLANES = ((1, 0), (1, 2), (4, 3), (4, 5))
 _AXES = (*AXIS_TITLES, *component_titles("v"))
-_NEAR_LIMIT = 0.7
-"""Part of a limit from which it is drawn, as in the figures without errors."""
 
 
 def draw_all(report: GuaranteeReport) -> Iterator[Figure]:
@@ -147,7 +145,8 @@ def draw_planes(report: GuaranteeReport) -> Figure:
     """
     largest = report.plan.state_ranges.largest.max(axis=0)
     planes = [plane for plane in _PLANES if largest[plane[1]] > 0.0]
-    figure, grid = subplots(95.0 * ((len(planes) + 1) // 2), (len(planes) + 1) // 2, 2)
+    rows = (len(planes) + 1) // 2  # of two panels
+    figure, grid = subplots(95.0 * rows, rows, 2)
     panels = first_panels(grid, len(planes))
     for axes, plane in zip(panels, planes, strict=True):
         _draw_plane(axes, report, list(plane))
@@ -205,7 +204,7 @@ def draw_controls(report: GuaranteeReport) -> Figure:
         dots: dict[str, Any] = {"marker": "o", "markersize": 3.0, "linestyle": "none"}
         nominal = per_control * plan.nominal[:, j]
         axes.plot(times, nominal, label="without errors", color=TRUTH, **dots)
-        if max(np.abs(low).max(), np.abs(high).max()) > _NEAR_LIMIT * limits[j]:
+        if max(np.abs(low).max(), np.abs(high).max()) > NEAR_LIMIT * limits[j]:
             for sign in (-1.0, 1.0):
                 axes.axhline(sign * limits[j], label="limit", **BOUND)
         axes.set_xlabel(f"time, periods of {report.rendezvous.period_s:g} s")

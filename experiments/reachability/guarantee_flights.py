@@ -24,7 +24,7 @@ from infoset.rendezvous.reachability import (
 )
 
 FLIGHTS = 100
-"""Number of simulated flights without the option --flights."""
+"""Number of simulated flights without the option --flights; chosen."""
 REPLANNED_FLIGHTS = 10
 """Number of flights with --replan without the option --flights: one of six states takes about ten
 seconds."""
@@ -66,6 +66,7 @@ def motion_of_flights(rendezvous: Rendezvous) -> Move:
     acceleration_m_s2 = np.zeros(3)
     if rendezvous.disturbance is not None:
         acceleration_m_s2 = np.array(rendezvous.disturbance.acceleration_m_s2)
+    # The instants within a period at which constraints are checked, and its end.
     parts = 1 if problem.between is None else problem.between.shape[1] + 1
     since_start_s = rendezvous.period_s * np.arange(1, parts + 1) / parts
 

@@ -45,6 +45,7 @@ def guarantee_page(report: GuaranteeReport) -> str:
 def _view(report: GuaranteeReport, name: str, plane: tuple[int, int]) -> View:
     plan = report.plan
     times_s = report.path_times_s
+    # Each time shows the set of the nearest whole period.
     shown = np.rint(times_s / report.rendezvous.period_s).astype(int)
     faces = [[outline(report.tube(t, list(plane)))] for t in range(len(plan.nominal_states))]
     return View(
@@ -63,12 +64,14 @@ def _graph(report: GuaranteeReport, axis: int) -> Graph:
     """Return the graph of a component of the controls, an impulse as a stem of no duration."""
     rendezvous = report.rendezvous
     times_s = report.path_times_s
+    # The end belongs to the last period.
     last = rendezvous.periods - 1
     period_of = np.minimum((times_s / rendezvous.period_s).astype(int), last)
     acts = np.ones(len(times_s), dtype=bool)
     noun = "Control"
     if rendezvous.has_impulses:
         noun = "Impulse"
+        # The first of the two equal times of an impulse, see `path_times_s`.
         acts = np.diff(times_s, append=np.inf) == 0.0
     name, per_control = report.control_unit
     unit: Unit = (name.replace("^2", "²"), per_control)

@@ -169,6 +169,7 @@ def _component_table(report: GuaranteeReport) -> Table:
         f"largest\n{noun}, {unit}",
         f"limit\n{unit}",
     )
+    # Plus zero, which has no sign: -0 is printed as 0.
     lower, upper = plan.state_ranges.lower[-1] + 0.0, plan.state_ranges.upper[-1] + 0.0
     largest = per_control * plan.control_ranges.largest.max(axis=0)
     limits = per_control * report.rendezvous.control_bounds

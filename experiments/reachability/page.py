@@ -72,6 +72,7 @@ def _graphs(report: ReachabilityReport, time_s: Floats) -> list[Graph]:
     Thrust is constant over each period; an impulse is a stem, of no duration.
     """
     rendezvous = report.rendezvous
+    # The end belongs to the last period.
     last = rendezvous.problem.periods - 1
     period_of = np.minimum((time_s / rendezvous.period_s).astype(int), last)
     if rendezvous.has_impulses:
@@ -138,6 +139,8 @@ def _view(
         Track(member.name, look, path[:, states], look)
         for look, (member, path) in enumerate(report.shown)
     ]
+    # All optimal trajectories end in one state: the lower and upper bounds of the tube are equal
+    # there, up to rounding.
     end = Mark("end of the optimal trajectories", report.tube[-1, states].mean(axis=1))
     unit = report.length_unit if first == 0 else ("m/s", 1.0)
     names = AXIS_TITLES if first == 0 else _VELOCITY_TITLES

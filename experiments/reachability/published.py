@@ -102,6 +102,7 @@ def compute(progress: Progress) -> dict[str, Sequence[Ours]]:
         rendezvous, [each.name for each in own], flown, published_motion(rendezvous.ellipse)
     )
     # Added to the tolerance: the rounding of the printed numbers from which ours follow.
+    # The 60 numbers of the slices, and the norm.
     beyond = np.zeros((3, 61))
     beyond[1, _U] = _implied_rounding(problem).ravel()
     beyond[1:, 12:60] = np.tile(_state_rounding(problem).ravel(), 2)

@@ -27,7 +27,7 @@ from infoset.rendezvous.reachability import (
 
 IMPULSE_COLUMNS = ("impulse_x_m_s", "impulse_y_m_s", "impulse_z_m_s")
 POINTS = 24
-"""Points of a displayed trajectory per period."""
+"""Points of a displayed trajectory per period; chosen for smooth curves."""
 NORM = "(m, m/s)"
 """Unit of a norm of states."""
 _MAX_SHOWN = 5
@@ -152,6 +152,7 @@ def flown(rendezvous: Rendezvous, controls: Floats, truth: NonlinearMotion | Non
     motion = truth or rendezvous.truth
     start = rendezvous.problem.initial
     if rendezvous.has_impulses:
+        # Without the states just after the impulses, which are between the others.
         return motion.coast(start, controls, rendezvous.period_s)[:, ::2]
     return motion.fly(start, rendezvous.unit_m_s2 * controls, rendezvous.period_s)
 
@@ -223,6 +224,7 @@ def solution_json(
     """Return the keys of a solution; `sets` are the bounds of the forward sets and of the tube."""
 
     def set_json(kind: SetKind, time: int, bounds: Floats) -> dict[str, object]:
+        # None if the set is not known by its vertices: then its counts are null.
         counts = solution.sets.counts(kind, time)
         values: dict[str, object] = {"min": bounds[:, 0], "max": bounds[:, 1]}
         for key in ("vertices", "facets", "dimension"):
@@ -299,6 +301,7 @@ def report_lines(report: ReachabilityReport) -> Iterator[Part]:
 
 def _sets_table(name: str, bounds: Floats, first: int) -> Table:
     """Return the ranges of the positions in sets, from a period on."""
+    # Plus zero, which has no sign: -0 is printed as 0.
     table = number_table("period", *(f"{axis} of the {name}\nm" for axis in "xyz"))
     for t in range(first, len(bounds)):
         table.add_row(str(t), *(f"{low:.1f} .. {high:.1f}" for low, high in bounds[t, :3] + 0.0))

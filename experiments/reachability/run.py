@@ -51,7 +51,7 @@ from infoset.rendezvous.reachability import (
 )
 
 NOISY_FLIGHTS = 10
-"""Number of simulations in closed loop with navigation errors."""
+"""Number of simulations in closed loop with navigation errors; chosen."""
 
 
 def solve_rendezvous(
@@ -60,9 +60,10 @@ def solve_rendezvous(
     """Return the sets, the selected controls with trajectories, and the simulations."""
     select = options.select or DEFAULT_SELECTION[rendezvous.engine]
     selection(select)  # a mistake is found before anything is computed
-    progress = begin(rendezvous.name)
+    progress = begin(rendezvous.name)  # its shares are chosen
     solution = solve(rendezvous.problem)
     progress(0.2)
+    # If the norm is zero, fewer periods may be enough, else more may be.
     searched = rendezvous.problem if solution.optimal.miss == 0.0 else rendezvous.longer
     minimum = min_periods(searched)
     progress(0.3)
@@ -128,6 +129,7 @@ def _fly(rendezvous: Rendezvous, generator: np.random.Generator | None) -> Close
             state = state + IMPULSE @ control
         else:
             push = rendezvous.unit_m_s2 * control
+        # Of one craft at one time.
         return np.asarray(
             rendezvous.truth.paths(start_s, state, push, [start_s + rendezvous.period_s])[0, 0]
         )

@@ -70,7 +70,7 @@ def selection(text: str) -> tuple[list[str], int]:
 
 def _sample_count(digits: str, part: str) -> int:
     """Return the number of samples in a part of --select."""
-    # More digits than four are more than `MAX_SAMPLES`.
+    # More digits than four are more than `MAX_SAMPLES`, or begin with a zero.
     count = int(digits) if re.fullmatch("[0-9]{1,4}", digits) else 0
     if not 1 <= count <= MAX_SAMPLES:
         raise InputError(

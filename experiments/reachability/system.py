@@ -60,6 +60,7 @@ def solve_system(system: ReachableSystem, options: Reach, begin: BeginProgress) 
     solution = solve(problem)
     progress(0.5)
     controls = select_controls(solution, select, options.seed)
+    # The problem is in states relative to `path`: both bounds of a state are moved by it.
     forward, tube = (
         solution.sets.bounds(kind) + path[..., None] for kind in (SetKind.FORWARD, SetKind.TUBE)
     )

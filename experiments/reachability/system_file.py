@@ -102,6 +102,8 @@ class ReachableSystem:
         """The problem that is solved, in states relative to `path`."""
         n = len(self.names)
         bounds = np.array(self.bounds.states)
+        # The bounds about a path that is not zero differ from time to time: they are half-spaces,
+        # inside a box that contains them at all times.
         moving = bool(self.path.any())
         return ReachabilityProblem(
             np.array([self.system.A] * self.periods),
