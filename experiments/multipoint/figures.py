@@ -1,4 +1,7 @@
-"""Figures of visits: the path with the targets, and the control."""
+"""Figures of visits: the path with the targets, and the control.
+
+Heights of figures, mm, and sizes of lines, marks and letters are chosen by eye.
+"""
 
 from __future__ import annotations
 

@@ -43,6 +43,7 @@ class BodyTable:
 
     def state(self, mu_m3_s2: float | None) -> Floats:
         """Return the state at its epoch, shape (6,)."""
+        # `MultipointProblem` refuses elements without a gravitational parameter.
         if self.elements is not None and mu_m3_s2 is not None:
             return np.concatenate(self.elements.state(mu_m3_s2))
         return np.array([self.position_m, self.velocity_m_s]).ravel()

@@ -75,6 +75,7 @@ def _views(report: MultipointReport, time_s: Floats) -> list[View]:
 
 def _graphs(report: MultipointReport, control: Floats) -> list[Graph]:
     """Return the graphs of the control, shape (n, 3): magnitude with bound, components."""
+    # Small controls are shown in mm/s^2; the limit is chosen.
     magnitude = np.linalg.norm(control, axis=1)
     unit = ("mm/s²", 1e3) if magnitude.max() < 1.0 else ("m/s²", 1.0)
     components = [

@@ -1,4 +1,7 @@
-"""Figures of an observer: bounds of the states against time, and the sets of two states."""
+"""Figures of an observer: bounds of the states against time, and the sets of two states.
+
+Heights of figures, mm, and sizes of lines, marks and letters are chosen by eye.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +50,7 @@ def draw_bounds(report: ObserverReport) -> Figure:
     The true state of a simulation is added.
     """
     names = report.problem.names
-    # Heights in mm: 38 for a row, and 30 for the title of the time and the legend; chosen.
+    # 38 mm for a row, and 30 mm for the title of the time and the legend.
     figure, grid = subplots(30.0 + 38.0 * len(names), len(names), 2, sharex=True)
     time, title = times(report)
     lower, upper = bounds_of(report.estimates).swapaxes(0, 1)

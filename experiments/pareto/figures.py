@@ -1,4 +1,7 @@
-"""Figures of an encounter: trajectories (as in the paper), controls, Pareto set and front."""
+"""Figures of an encounter: trajectories (as in the paper), controls, Pareto set and front.
+
+Heights of figures, mm, and sizes of lines, marks and letters are chosen by eye.
+"""
 
 from __future__ import annotations
 

@@ -73,6 +73,7 @@ def _fitted(solution: EncounterSolution, numbers: Sequence[PrintedNumber]) -> li
     dependent, and their coefficients have no digits. The name of a number is ``CRAFT, QUANTITY,
     TERM``.
     """
+    # All craft have one motion. The number of times, chosen, is far above that of the terms.
     motion = solution.encounter.craft[0].motion
     assert isinstance(motion, ClohessyWiltshire)
     times = np.linspace(0.0, 4.0 * np.pi / motion.rate_rad_s, 200)

@@ -1,4 +1,7 @@
-"""Figures of the pursuit game: orbits, relative motion, thrust, distances and feedback."""
+"""Figures of the pursuit game: orbits, relative motion, thrust, distances and feedback.
+
+Heights of figures, mm, and sizes of lines, marks and letters are chosen by eye.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Figures of a rendezvous: the tube in space (as in the paper) and in planes, and controls."""
+"""Figures of a rendezvous: the tube in space (as in the paper) and in planes, and controls.
+
+Heights of figures, mm, and sizes of lines, marks and letters are chosen by eye.
+"""
 
 from __future__ import annotations
 
@@ -242,6 +245,7 @@ def draw_controls(report: ReachabilityReport) -> Figure:
         axes.set_xlabel(f"time, periods of {rendezvous.period_s:g} s")
         axes.set_ylabel(f"{component_titles('u')[j]}{unit}")
         axes.set_xlim(first, periods + first)
+        # The margin applies also at the ends of bars, which are sticky.
         axes.use_sticky_edges = False
         axes.margins(y=0.08)
         axes.xaxis.set_major_locator(MaxNLocator(8, integer=True))

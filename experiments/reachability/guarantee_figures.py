@@ -1,4 +1,7 @@
-"""Figures of a rendezvous with bounded errors: guarantees, the tube in planes, and controls."""
+"""Figures of a rendezvous with bounded errors: guarantees, the tube in planes, and controls.
+
+Heights of figures, mm, and sizes of lines, marks and letters are chosen by eye.
+"""
 
 from __future__ import annotations
 

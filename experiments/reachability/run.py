@@ -154,6 +154,7 @@ def _robustness(rendezvous: Rendezvous, disturbance: Floats) -> Robustness:
         fixed = optimal_controls(tightened(problem, disturbance)).miss
     except EmptyTubeError as error:
         conflict = str(error)
+    # ValueError: thrust in a ball, too many periods, or constraints within periods.
     try:
         plan = feedback_plan(problem, disturbance)
     except (NoRobustPlanError, ValueError) as error:

@@ -1,4 +1,7 @@
-"""Figures of a linear system: the bounds of its states and of its controls against the period."""
+"""Figures of a linear system: the bounds of its states and of its controls against the period.
+
+Heights of figures, mm, and sizes of lines, marks and letters are chosen by eye.
+"""
 
 from __future__ import annotations
 

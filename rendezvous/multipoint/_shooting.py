@@ -64,7 +64,8 @@ def _rates(
 
     r' = v, v' = -r / |r|^3 + lambda_v, lambda_r' = lambda_v / |r|^3 - 3 (r . lambda_v) r / |r|^5,
     lambda_v' = -lambda_r, and the rate of the energy is |lambda_v|^2 / 2. The energy is not varied:
-    its row is not written in the other columns, and must be zero there.
+    its row is not written in the other columns, and must be zero there. Rows are those of
+    `propagate`; the factors 3 and 15 are of the derivatives of |r|^-3 and |r|^-5.
     """
     r0 = z[0, 0]
     r1 = z[1, 0]

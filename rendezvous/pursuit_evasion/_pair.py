@@ -133,7 +133,11 @@ class KnownPath:
     def respond(
         self, end_state: Floats, nu: Floats, plane: Floats, duration: float, tolerance: float
     ) -> Response | None:
-        """Return the state on the path, whatever nu is."""
+        """Return the state on the path, whatever nu is.
+
+        A given path has no conjugate point and no costate, and its end is no guess: `inverse` is
+        not used.
+        """
         state, acceleration_there = self.state_at(duration)
         by_time = np.concatenate([state[3:], acceleration_there])
         rho = state - end_state

@@ -116,11 +116,15 @@ class Certificate:
     evader_deviations : tuple of Deviation
         Deviations of the evader, with the best responses of the pursuer: each must capture until
         the capture time.
+    capture_s : float
+        The capture time of the game.
     directions_found, directions_tried : int
         Number of directions with a solution, and number of directions tried; zero without a scan.
     max_excess_m : float or None
         Maximum distance beyond the capture radius that some direction keeps, at the capture time;
         None without a scan, or if it found no direction.
+    unit_length_m : float
+        The unit of length in which some limits of the checks are.
     """
 
     residual: float

@@ -171,6 +171,8 @@ class CaptureHistory:
 def history(solution: CaptureSolution, count: int = 400) -> CaptureHistory:
     """Sample the capture of a `solution` at `count` equally spaced times from start to end.
 
+    The default is chosen for smooth curves.
+
     Raises
     ------
     ValueError

@@ -58,7 +58,7 @@ def solve(
     changes = 0
     work = branch.work
     while branch.ending in (Ending.CAPTURE, Ending.FOLD) and changes < _MAX_BRANCHES:
-        # A search at a fold and one at a capture have each their option.
+        # The search at a fold and that at a capture have an option each.
         if not (change_branch if branch.ending is Ending.FOLD else all_directions):
             break
         better = greater(pair, branch.last)
