@@ -213,14 +213,15 @@ class _Pursuit:
                 self._evader = replace(self._evader, thrust=0.0, flow=0.0)
 
             planned = self._plan(plan, spell, self._seen(plan))
-            known = plan
             if planned is None:
                 return self._end(Ended.NO_PLAN)
             plan = planned
             if self._steering is not None or self._observation.is_exact:
                 own = plan
             else:
-                own = self._plan(own, spell, self._evader) or known
+                # Without a new plan the evader goes on with its last one, if need be past its end.
+                going_on = replace(own, duration=own.duration - spell)
+                own = self._plan(own, spell, self._evader) or going_on
         return self._end(Ended.NO_PLAN)
 
     def _plan(self, before: Node, spell: float, evader: ExtremalCraft) -> Node | None:

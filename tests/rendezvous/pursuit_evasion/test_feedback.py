@@ -15,7 +15,7 @@ from infoset.rendezvous.pursuit_evasion import (
     fly,
     solve,
 )
-from infoset.rendezvous.pursuit_evasion._pair import Node
+from infoset.rendezvous.pursuit_evasion._pair import ExtremalCraft, Node
 
 from .conftest import MakeGame
 
@@ -90,5 +90,38 @@ def test_path_of_an_optimal_evader_without_propellant_is_continuous(
 
     monkeypatch.setattr(feedback._Pursuit, "_evader_path", recorded)
     fly(game, None, replan_s=1200.0, observation=Observation(300.0, 500.0, 0.05), seed=3)
+    # States of a plan agree with the start to its residual, some 1e-11 of 42 166 km.
+    assert max(gaps_m) < 0.1
+
+
+def test_path_of_an_optimal_evader_without_a_new_plan_is_continuous(
+    slides: MakeGame, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Formerly it followed the pursuer's plan of the leg before, from the start of that leg."""
+    solution = solve(slides(capture_radius_m=20e3))
+    gaps_m = []
+    path_of_leg = feedback._Pursuit._evader_path
+    plan_of_leg = feedback._Pursuit._plan
+
+    def recorded(
+        pursuit: feedback._Pursuit, own: Node, spell: float
+    ) -> tuple[feedback.PathNow, float]:
+        path, mass = path_of_leg(pursuit, own, spell)
+        gap = np.linalg.norm(path(0.0)[:3] - pursuit._evader.start[:3])
+        gaps_m.append(gap * solution.units.length_m)
+        return path, mass
+
+    def not_of_the_evader(
+        pursuit: feedback._Pursuit, before: Node, spell: float, evader: ExtremalCraft
+    ) -> Node | None:
+        if evader is pursuit._evader:
+            return None
+        return plan_of_leg(pursuit, before, spell, evader)
+
+    monkeypatch.setattr(feedback._Pursuit, "_evader_path", recorded)
+    monkeypatch.setattr(feedback._Pursuit, "_plan", not_of_the_evader)
+    observation = Observation(300.0, 500.0, 0.05)
+    flight = fly(solution.game, None, solution=solution, observation=observation, seed=3)
+    assert flight.ended is Ended.CAPTURED
     # States of a plan agree with the start to its residual, some 1e-11 of 42 166 km.
     assert max(gaps_m) < 0.1
