@@ -55,22 +55,21 @@ def _results_of_command(paper: Paper, progress: Progress) -> dict[str, list[floa
     for done, (source, numbers) in enumerate(paper.tables.items(), start=1):
         report = command.report(COMMANDS[paper.name](**paper.options[source]))
         results = json.loads(to_json(command.to_json(report)))
-        ours[source] = [_value(results, number.name) for number in numbers]
+        ours[source] = [result_at(results, number.name) for number in numbers]
         progress(done / len(paper.tables))
     return ours
 
 
-def _value(results: Any, key: str) -> float:
+def result_at(results: Any, key: str) -> float:
     """Return the number at a key such as `nodes.0.velocity_m_s.1`.
 
     NaN if the value, or one of the values that contain it, is None. A key that does not exist is a
     mistake in the file of the paper, and raises.
     """
     for part in key.split("."):
-        if isinstance(results, list):
-            results = results and results[int(part)]
-        else:
-            results = results and results[part]
+        if results is None:
+            return math.nan
+        results = results[int(part)] if isinstance(results, list) else results[part]
     if results is None:
         return math.nan
     return float(results)

@@ -1,4 +1,7 @@
-"""Figures of a campaign: distributions, convergence of quantiles, and miss over the start."""
+"""Figures of a campaign: distributions, convergence of quantiles, and miss over the start.
+
+Sizes and margins without a reason were chosen by eye (`figure_style`).
+"""
 
 from __future__ import annotations
 
@@ -258,6 +261,7 @@ def _note_beyond(axes: Axes, count: int) -> None:
 def _draw_bins(axes: Axes, start: Floats, miss_m: Floats) -> None:
     """Draw quantiles of the miss in bins of a component of the start."""
     bins = min(_BINS, miss_m.size // RUNS_A_BIN)
+    # One bin shows no dependence, and equal values have no bins.
     if bins < 2 or not np.ptp(start) > 0.0:
         return
     by_bin = pd.Series(miss_m).groupby(pd.cut(start, bins), observed=True)

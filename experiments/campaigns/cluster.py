@@ -46,7 +46,7 @@ def workers_of(
             yield executor, max(2 * threads, 16)
     elif workers > 1 and runs >= RUNS_OF_A_PROCESS * workers:
         with worker_processes(workers) as pool:
-            yield pool, 2 * workers
+            yield pool, 2 * workers  # two chunks for each, as above
     else:
         yield None, workers
 
@@ -78,6 +78,7 @@ def cluster(address: str, note: Callable[[str], None]) -> Iterator[tuple[Executo
         try:
             client = stack.enter_context(Client(address, timeout=PATIENCE_S, set_as_default=False))
         except Exception as error:  # another program sends anything; reading it fails in any way
+            # Of a reason of any length, two lines; chosen.
             raise InputError(
                 f"--dask: no Dask scheduler answers at {address} ({str(error)[:150]}); start one "
                 "with: dask scheduler, and check the address that it prints"

@@ -95,7 +95,7 @@ def fly(
             workers=workers,
             resume=options.resume,
             progress=begin("campaign"),
-            within_chunks=True,
+            within_chunks=True,  # the bar moves within chunks of threads, too
         )
 
     return folder, warnings, time.perf_counter() - began_s
@@ -144,6 +144,7 @@ def campaign_errors(resume_hint: str = "") -> Iterator[None]:
         is_of_cluster = type(error).__module__.startswith(("distributed.", "dask."))
         if not isinstance(error, CancelledError | BrokenExecutor) and not is_of_cluster:
             raise
+        # Of a reason of any length, some lines; chosen.
         reason = str(error)[:200] or type(error).__name__
         raise InputError(
             f"a worker process or the cluster has stopped ({reason}){resume_hint}"

@@ -36,6 +36,7 @@ def run(options: CampaignOptions) -> None:
             options = replace(options, runs=needed_runs(options, USUAL_REQUIREMENT))
         scenario, notes = scenario_of(options)
         if scenario.body is not None:
+            # The number of runs of each noise.
             notes += needed_notes(USUAL_REQUIREMENT, options.runs // noises_at_once(options))
         with input_errors("--until"):
             runs: int | RunsUntil = options.runs
@@ -58,6 +59,7 @@ def run(options: CampaignOptions) -> None:
         if warnings:
             results["warnings"] = warnings
         results["elapsed_s"] = elapsed_s
+        # A campaign has one cell, whose number says nothing.
         results["samples"] = records(table.drop(columns="cell"))
 
         flown = some_runs(stored.finished_runs)

@@ -42,6 +42,7 @@ def run(options: Options) -> None:
         scenario, notes = scenario_of(options)
         axes = sweep_axes(",".join(options.vary), scenario)
         cells = sweep_cells(scenario, axes)
+        # All cells have the same tables; the scenario may lack a table of which a key is varied.
         required = read_requirement(options.require, has_size=cells[0].body is not None)
         if options.runs == NEEDED:
             options = replace(options, runs=needed_runs(options, required))

@@ -48,8 +48,6 @@ WORST = 10
 """Number of the runs with the largest miss that are listed: they fit a screen."""
 OUTCOMES = {outcome.value.replace("-", "_"): outcome.value for outcome in Outcome}
 """Columns of the numbers of runs with each outcome."""
-
-
 _SIGNED_ONLY = ("start_x_m", "start_vx_m_s")
 """Components along the approach: the correlations of their moduli are not computed."""
 CI = ("95 % CI\nfrom", "\nto")
@@ -130,6 +128,7 @@ def _explained(name: str, runs: pd.DataFrame) -> dict[str, float]:
 
 
 def _redrawn_share(runs: pd.DataFrame) -> dict[str, float]:
+    """Return the share of all drawn starts that were drawn again; no key for uniform starts."""
     if not runs["redraws"].count():
         return {}
     redraws = runs["redraws"].sum()
@@ -225,6 +224,7 @@ def worst_runs(folder: CampaignFolder, scenario_file: Path) -> pd.DataFrame:
     """
     manifest = folder.manifest
     # The manifest's name of a strategy or a noise in a file: mine.py:Mine sha256:...
+    # A built-in strategy needs no option: it is in the scenario file.
     file, _, version = manifest.strategy.rpartition(" sha256:")
     strategy = ""
     if version and file:
@@ -256,6 +256,7 @@ def _rows_of_worst(folder: CampaignFolder) -> pd.DataFrame:
     numbers = []
     for file, position in zip(files, positions, strict=True):
         _, runs = chunks[file]
+        # The first run of the file is at the position `ends[file] - len(runs)`.
         numbers.append(runs[position - ends[file] + len(runs)])
 
     columns = ["run", "noise", "outcome", "hit", "cause", "miss_m", "impulse_m_s"]

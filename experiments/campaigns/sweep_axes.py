@@ -36,6 +36,7 @@ DRIFT = "drift_rad"
 """Key of an error bound without `error` in its name."""
 _ENDS = (".min", ".max")
 """Ends of the names of keys that are an end of an interval."""
+# More digits than these are taken for a mistake; chosen.
 _NUMBER = r"([+-]?(?:[0-9]{1,20}\.?[0-9]{0,20}|\.[0-9]{1,20})(?:[eE][+-]?[0-9]{1,4})?)"
 _RANGE = re.compile(rf"(log:)?\s*{_NUMBER}\s*:\s*{_NUMBER}\s*:\s*([0-9]{{1,9}})")
 
@@ -61,9 +62,12 @@ def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
     # A key may be varied once, also in another unit and by the factor of its sensor; an interval
     # not also by an end.
     bounds = _error_bounds(scenario)
+    # Of each value, the keys of --vary by which it is varied. A value is named by both ends of its
+    # key, so that an interval has a name in common with each of its ends.
     varied: dict[str, list[str]] = {}
     for axis in axes:
         for tied in tied_keys(axis.key):
+            # The numbers of both mappings are not used, only their keys.
             for key in bounds.get(tied, {field_key(Scenario, tied): 0.0}):
                 ends = [key] if key.endswith(_ENDS) else [key + end for end in _ENDS]
                 for end in ends:
@@ -206,7 +210,7 @@ def key_label(key: str, factor: str = "") -> str:
     for single in tied_keys(key):
         end = ""
         if single.endswith(_ENDS):
-            end = single[-4:]
+            end = single[-4:]  # both ends have four letters
         name = split_unit(single.removesuffix(end))[0] + end.replace(".", " ")
         names.append(name.replace(f".{SCALE}", ".factor of the error bounds").replace(".", ": "))
 

@@ -2,7 +2,7 @@
 
 The values of a key are drawn at the positions 0, 1, 2, ...: the values of `--vary` are equally
 spaced on its scale, linear or logarithmic. Lines between them interpolate on this scale, as
-`sweep_table.limits` does.
+`sweep_table.limits` does. Sizes and margins without a reason were chosen by eye (`figure_style`).
 """
 
 from __future__ import annotations
@@ -60,6 +60,10 @@ QUANTITY_NAMES = {
 }
 _PANEL_MM = 66.0
 """Height of a row of panels; chosen: a panel of two in a row is then about as high as wide."""
+_SINGLE_MM = 0.7 * WIDTH_MM
+"""Width of a figure with a single panel; chosen: the title of the legend is 105 mm long (measured),
+more than half of `WIDTH_MM`.
+"""
 _LEGEND_MM = 24.0
 """Height of the legend: up to three rows of entries and the title; chosen."""
 _TICK_LETTERS = 32
@@ -93,7 +97,7 @@ def _panels(count: int) -> tuple[Figure, Any]:
     rows = -(-count // 2)
     height_mm = rows * _PANEL_MM + _LEGEND_MM
     if count == 1:
-        figure, grid = subplots(height_mm, 1, 1, width_mm=0.7 * WIDTH_MM)
+        figure, grid = subplots(height_mm, 1, 1, width_mm=_SINGLE_MM)
     else:
         figure, grid = subplots(height_mm, rows, 2, width_mm=WIDTH_MM)
     return figure, first_panels(grid, count)
@@ -108,6 +112,7 @@ def _lines(table: SweepTable, cells: pd.DataFrame, shown: Sequence[QuantileName]
         for column, look in columns:
             _draw_estimates(axes, cells, column, look)
         if quantity in ("hit", "cause"):
+            # Probabilities: 0 and 1 are near the frame, and not on it.
             axes.set_ylim(-0.03, 1.03)
         elif spans_decades(cells[[column for column, _ in columns]].stack()):
             axes.set_yscale("log")
@@ -117,6 +122,7 @@ def _lines(table: SweepTable, cells: pd.DataFrame, shown: Sequence[QuantileName]
 
         _draw_requirement(axes, table.required, cells, quantity)
         _name_values(axes.xaxis, axis)
+        # Each value has the width of 1, which `_shade_decisions` fills.
         axes.set(xlim=(-0.5, len(axis.values) - 0.5), ylabel=QUANTITY_NAMES[quantity])
 
     letters(panels)
@@ -134,6 +140,7 @@ def _lines_by_quantity(
     levels = sorted({quantile.level for quantile in shown}, reverse=True)
     lines: dict[str, list[tuple[str, dict[str, Any]]]] = {required.quantity: []}
     if not isinstance(required, Requirement):
+        # A required probability is no quantile, so it is not among those shown.
         lines[required.quantity].append(("required_value", {"color": INK, "marker": "o"}))
     for quantile in shown:
         look = LINE_LOOKS[levels.index(quantile.level) % len(LINE_LOOKS)]
@@ -153,6 +160,7 @@ def _draw_requirement(
         _shade_decisions(axes, cells)
         label = f"required: {requirement_words(required)}"
         axes.axhline(required.bound, color=IMPULSE, linewidth=1.0, label=label)
+    # A radius that is varied has several values, and an unknown one (NaN) counts as none.
     is_one_radius = required.quantity == "hit" and cells["limit_bound"].nunique() == 1
     if quantity == "miss_m" and is_one_radius:
         radius_m = float(cells["limit_bound"].iloc[0])
@@ -170,6 +178,7 @@ def _draw_estimates(axes: Axes, cells: pd.DataFrame, column: str, look: dict[str
     at = np.arange(len(cells))
     colour = look["color"]
     axes.plot(at, value, markersize=3.5, zorder=3.0, **look)
+    # Without an upper end the bar ends at the greater of value and lower end; NaN is ignored.
     top = np.where(np.isnan(upper), np.fmax(value, lower), upper)
     axes.vlines(at, lower, top, color=colour, linewidth=0.8, zorder=2.0)
 
@@ -228,6 +237,7 @@ def _maps(table: SweepTable, cells: pd.DataFrame, shown: Sequence[QuantileName])
 
 def _draw_decisions(axes: Axes, table: SweepTable, cells: pd.DataFrame) -> None:
     """Draw decision and estimate of each cell, and the lines of the limits."""
+    # The codes 0, 1 and 2 are in the middle of the three equal parts from -0.5 to 2.5.
     codes = {decision.value: code for code, decision in enumerate(DECISION_COLOURS)}
     look = {"cmap": ListedColormap([*DECISION_COLOURS.values()]), "vmin": -0.5, "vmax": 2.5}
     _draw_cells(axes, _grid(table, cells["requirement"].map(codes)), **look)
@@ -310,6 +320,7 @@ def _write_numbers(axes: Axes, values: Floats, is_dark: Any, **look: Any) -> Non
 
 
 def _number(value: float) -> str:
+    """Return the text of a value in a cell: three digits, from 1000 on without an exponent."""
     if np.isnan(value):
         return _NO_VALUE
     if value < 1000.0:

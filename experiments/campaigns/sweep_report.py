@@ -226,11 +226,13 @@ class SweepReport:
         """Return lines about keys without an effect, and about the noises."""
         rows = self.table.rows
         keys = self.table.keys
+        # `limit_bound` is no result: it may be the radius of the body, which a key can vary.
         results = rows.columns[rows.columns.get_loc("noise") + 1 :].drop(["limit_bound"])
         lines = []
 
         for axis, key in zip(self.table.axes, keys, strict=True):
             others = [other for other in keys if other != key]
+            # Cells without runs would have the same results, all NaN: `all` excludes them.
             fixed = rows.groupby(["noise", *others])[[*results]]
             if rows["runs"].all() and (fixed.nunique(dropna=False) == 1).all(axis=None):
                 lines.append(

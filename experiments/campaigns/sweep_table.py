@@ -107,6 +107,8 @@ def _decision(
         # Numbers of runs count the runs of all noises, like --runs and --max-runs.
         row["runs_needed"] = len(noises_of(folder)) * or_nan(verdict.runs_needed)
 
+    # For hits: the quantile of the miss at the required share; at the limit it is the radius of the
+    # body. A probability of no miss by a cause has no such quantile.
     row["limit_quantile"] = math.nan
     if isinstance(required, Requirement):
         row["limit_quantile"] = row["required_value"]
@@ -116,6 +118,7 @@ def _decision(
 
 
 def _radii_m(folder: CampaignFolder, table: pd.DataFrame) -> Any:
+    """Return the radius of the body, m: one number, or a column if a key of the body is varied."""
     scenario = folder.manifest.scenario
     axes = folder.manifest.axes
     if not any("body." in axis.key for axis in axes):
@@ -181,6 +184,7 @@ def _limits_along(axis: Axis, cells: pd.DataFrame) -> Iterator[dict[str, float]]
         if met[left]:
             good, bad = left, right
 
+        # Only between neighbours, and only if the quantiles are on the sides of the decisions.
         interpolated = math.nan
         if right == left + 1 and above[good] < 0.0 <= above[bad]:
             share = above[left] / (above[left] - above[right])

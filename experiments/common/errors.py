@@ -64,5 +64,6 @@ def shown(value: object) -> str:
 
 def nearest(word: str, known: Sequence[str]) -> str | None:
     """Return the most similar known word; None if none is similar, or no word is known."""
+    # 0.6 is the default of difflib.
     similar = difflib.get_close_matches(word[:_LONGEST_WORD], known, n=1, cutoff=0.6)
     return next(iter(similar), None)

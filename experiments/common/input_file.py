@@ -362,6 +362,7 @@ class _Reading:
 
     def _invalid(self, details: Mapping[str, Any]) -> None:
         """Note an error of pydantic at its key."""
+        # The first part is 0: `made` validates a tuple of one dataclass.
         path = tuple(map(str, details["loc"][1:]))
         if details["type"] == "missing":
             if path in self._guessed:
@@ -460,6 +461,7 @@ def similar_key(key: str, known: Sequence[str]) -> str | None:
         for name in known
         if name.rsplit(".", 1)[-1] == last or si_factor(last, name.rsplit(".", 1)[-1])
     ]
+    # Three, chosen: they fit a line.
     return " or ".join(alike[:3]) or nearest(key, known)
 
 
@@ -511,6 +513,7 @@ def field_key(owner: type, key: str) -> str:
     if found is None:
         return key
     path = key.split(".")
+    # The name of an end, min or max, follows the name of the field.
     path[-1 if found.end is None else -2] = found.name
     return ".".join(path)
 
@@ -540,6 +543,7 @@ def _found(values: dict[str, Any], owner: type, key: str) -> _FoundKey | None:
 
     for part in path[:-1]:
         if isinstance(table, list):
+            # A file of `MAX_FILE_BYTES` has fewer than 100 000 tables.
             number = int(part) if part.isdecimal() and len(part) < 6 else 0
             if not 1 <= number <= len(table):
                 return None
@@ -639,9 +643,11 @@ def to_toml(value: Any) -> str:
 def _lines(value: Any, prefix: str) -> Iterator[str]:
     """Yield the lines of a table: its keys, then its tables with their headings."""
     tables = []
+    defaults = {field.name: field.default for field in fields(value)}
     for name, field in fields_of(value.__class__).items():
         inner = plain_number(getattr(value, name))
-        if inner in (None, (), MAXIMUM):  # a value or a limit that is not set
+        # TOML has no None. `MAXIMUM` is the default of `Thruster.max_impulse_m_s`: no limit.
+        if inner in (None, ()) or inner == MAXIMUM == defaults[name]:
             continue
         path = f"{prefix}{name}"
         if field.table is None:

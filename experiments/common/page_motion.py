@@ -146,6 +146,7 @@ def faces_of(points: Floats) -> list[Floats]:
     Points in a plane, or of a flat set, have their outline as the only face. There is at least one
     point; those of a flat set in space must be its vertices, see `outline`.
     """
+    # In space, fewer than four points are always flat.
     if points.shape[1] == 2 or len(points) < 4:
         return [outline(points)]
     try:
@@ -157,6 +158,7 @@ def faces_of(points: Floats) -> list[Floats]:
         return [outline(points)]
 
     # Triangles of one plane are one face: their normals are equal up to `_FLAT`.
+    # The first three numbers of the equation of a triangle are its normal of length 1, outward.
     faces: list[tuple[Floats, set[int]]] = []
     for simplex, equation in zip(hull.simplices, hull.equations, strict=True):
         mine = next((corners for normal, corners in faces if normal @ equation[:3] > _FLAT), None)
@@ -184,6 +186,7 @@ def outline(points: Floats) -> Floats:
             pass
 
     centred = points - points.mean(axis=0)
+    # The two directions in which the points extend most: those of their plane.
     across = np.linalg.svd(centred, full_matrices=False)[2][:2]
     if len(across) < 2:
         return points

@@ -139,6 +139,7 @@ def marks(scenario: Scenario) -> dict[str, float]:
     times = {}
     if sensor.first_image_s is not None and planned.images_s:
         times["first image"] = planned.images_s[0]
+    # 0, the default, leaves the last image open, as None does elsewhere.
     if sensor.last_image_s and planned.images_s:
         times["last image"] = planned.images_s[-1]
     if thruster.last_impulse_s is not None and planned.impulses_s:
@@ -160,6 +161,7 @@ def true_predicted_misses(record: Record) -> Floats:
     """
     slopes = np.tan(record.true_angle_rad)
     x_squared = record.true_range_m**2 / (1.0 + (slopes**2).sum(axis=1))
+    # The last component is along x; it is negative in an approach.
     speed = -float(record.result.velocity_m_s[0, -1])
     centre_m = record.true_rate_rad_s * x_squared[:, None] * (1.0 + slopes**2) / speed
     return np.asarray(centre_m + record.scenario.set_model.lateral_aim_m)
@@ -181,6 +183,7 @@ def complete_steps(record: Record) -> Integers:
         if nearest_m < min_range_m:
             end = step + 1
             break
+    # One number stands for all of a step: if a set is empty, all of them are NaN.
     return np.flatnonzero(np.isfinite(record.predicted_miss_m[:end, 0, 0]))
 
 
@@ -236,7 +239,8 @@ class Courses:
         if column == len(self.steps) or not len(impulse):
             return
 
-        # The maximum impulse of the steps since the step before in `steps`.
+        # The maximum impulse of the steps since the step before in `steps`. The batch may have more
+        # runs than are kept: only the first `count` are.
         count = len(impulse)
         np.maximum(impulse[:, column], modulus(step.impulse_m_s)[:count], out=impulse[:, column])
         if self.steps[column] != step.step:

@@ -51,6 +51,7 @@ def member_courses(record: Record) -> list[MemberCourse]:
     for number, information in enumerate(sets):
         if not isinstance(information, CoveredSetView):
             return []
+        # The sets before and after the measurement of a step follow each other.
         step, is_measured = divmod(number, 2)
         if not is_measured:
             continue
@@ -91,6 +92,7 @@ def _is_refuted(course: MemberCourse, member: int, information: CoveredSetView) 
     def leaves_out(step: int) -> bool:
         if course.group is not None:
             return step in course.group
+        # The images belong to the classes in turn.
         return bool(classes[(step // every) % len(classes)])
 
     return not any(all(leaves_out(step) for step in group) for group in groups.values())

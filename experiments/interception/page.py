@@ -59,6 +59,7 @@ def interception_page(records: Sequence[Record]) -> str:
     }
     scripts = ["sets.js", "interception.js"]
     if any(scenario.is_spatial for scenario in scenarios):
+        # Before the last script, which uses them.
         scripts[1:1] = ["b-plane.js", "projection.js"]
     return page(heading, scripts, data)
 
@@ -121,6 +122,7 @@ def _sets_of(
     of that step. `kept` rises.
     """
     sets = _Sets([], [])
+    # No step is before the first one: -2, because -1 would be the step before step 0.
     for previous, step in zip([-2, *kept], kept, strict=False):
         if step != previous + 1:
             sets.states.append(before[step])
@@ -206,6 +208,7 @@ def _step_data(record: Record, kept: Sequence[int]) -> dict[str, object]:
         "modulus_m_s": modulus_m_s[kept].tolist(),
         "fired_s": record.time_s[fired].tolist(),
         "fired_modulus_m_s": modulus_m_s[fired].tolist(),
+        # At least 0: the sum may exceed the budget by rounding errors.
         "budget_left_m_s": np.maximum(budget_left_m_s, 0.0)[kept].tolist(),
     }
 
@@ -322,6 +325,7 @@ def computed_again(
     for number, information in enumerate(sets):
         step, is_measured = divmod(number, 2)
         if is_measured and step in wanted:
+            # The set is of one run, with the index 0; sections that do not exist are left out.
             intervals = np.stack(information.predicted_miss_by_section_m(), axis=-1)
             misses_m[step] = intervals[:, 0, information.feasible[0]]
         elif not is_measured and {step - 1, step} & wanted:

@@ -268,6 +268,7 @@ def replayed(
 
     for step, impulse in enumerate(impulse_m_s):
         yield information
+        # The last axis is that of the runs, of which there is one; so is that of the impulse.
         values = {
             name: each[step, ..., None] for name, each in measured.items() if is_known[name][step]
         }
@@ -297,6 +298,7 @@ def _to_record(header: Header, arrays: Arrays) -> Record:
     }
 
     for name, column in _RESULT.items():
+        # Flags are stored as numbers too, because only these can be NaN.
         unknown = np.isnan(arrays[name])
         values: NDArray[Any] = np.where(unknown, 0.0, arrays[name]).astype(column.kind)
         if column.nullable:
@@ -312,6 +314,7 @@ def _to_record(header: Header, arrays: Arrays) -> Record:
         if number % 2 == 1:  # after a measurement
             sections.append(tuple(information.sections()))
 
+    # `information` is the last set of the loop: the set at the end of the engagement.
     known: dict[str, Any] = {name: getattr(header, name) for name in _OF_HEADER}
     return Record(
         **known | {name: arrays[name] for name in _OF_STEPS},

@@ -122,6 +122,7 @@ def _remedy(task: Task, results: Results, cause: MissCause, key: str) -> Remedy:
         changes = {name: old * value / now for name, old in values.items()}
         flown = changed(scenario, changes, f"{scenario.name} with {key} = {value:g}")
         flight = replace(task, scenario=flown, guarantee=False, progress=None, observe=None)
+        # One task for each core: a task is simulated by one thread.
         parts = [runs[first::cores] for first in range(min(len(runs), cores))]
         return join(simulate_all([replace(flight, runs=part) for part in parts]))
 

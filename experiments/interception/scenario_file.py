@@ -190,6 +190,7 @@ def _approach_warnings(scenario: Scenario) -> Iterator[str]:
     """Yield lines about a nominal speed and a nominal range outside the uncertainty."""
     uncertainty = scenario.set_model.bounds
     speed = scenario.set_model.closing_speed_m_s
+    # vx_m_s is negative in an approach, and the speed positive.
     outside = max(-uncertainty.vx_m_s[1] - speed, speed + uncertainty.vx_m_s[0])
     if outside > 0:
         yield (
@@ -443,6 +444,7 @@ def _burn_lines(scenario: Scenario) -> list[str]:
     bound_m = min(
         sensor.axis(axis).error_bound(last_m) * last_m for axis in scenario.set_model.axes
     )
+    # During a burn the mean speed given is half of the impulse.
     wrong_m = 0.5 * engine.burn_s(engine.max_impulse_m_s) * engine.max_impulse_m_s
     latest_s = latest_impulse_s(scenario)
     return [

@@ -382,6 +382,7 @@ def outlook_text(hits: HitEstimate | None) -> str:
     """
     if hits is None:
         return ""
+    # There is one: in no sample of at most ten million runs is the lower end above the last share.
     share = next(share for share in WANTED_SHARES if hits.lower < share)
     if hits.upper < share:
         return ""

@@ -68,5 +68,6 @@ def direction_of(sun: Sun | None) -> SunDirection | None:
     x = in_plane * math.cos(sun.direction_rad)
     y = math.sin(sun.elevation_rad)
     z = in_plane * math.sin(sun.direction_rad)
+    # Seen from the object, the spacecraft is toward -x: the phase angle is that from -x.
     phase_rad = math.atan2(math.hypot(y, z), -x)
     return SunDirection(math.degrees(phase_rad), math.degrees(math.atan2(z, y)))

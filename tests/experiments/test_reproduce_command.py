@@ -23,7 +23,7 @@ from infoset.experiments.common.printed_numbers import (
     read_paper,
 )
 from infoset.experiments.pareto.published import PROBLEM, STARTS, results
-from infoset.experiments.reproduced_numbers import PAPERS, reproduce_paper
+from infoset.experiments.reproduced_numbers import PAPERS, reproduce_paper, result_at
 from infoset.rendezvous.pareto import solve_encounter
 from tests.experiments.command_line import Command, strict
 
@@ -37,6 +37,21 @@ def silent(_done: float) -> None:
 def only(*numbers: NumberComparison) -> Callable[[Paper, Progress], tuple[NumberComparison, ...]]:
     """In place of the numbers of a paper: these."""
     return lambda _paper, _progress: numbers
+
+
+def test_a_result_is_unknown_if_it_or_a_value_around_it_is_none() -> None:
+    results = {"a": None, "b": [0.0, None], "c": 0.0}
+
+    assert math.isnan(result_at(results, "a"))
+    assert math.isnan(result_at(results, "a.b.0"))
+    assert math.isnan(result_at(results, "b.1"))
+    assert result_at(results, "b.0") == 0.0
+
+
+@pytest.mark.parametrize("key", ["c.d", "d", "b.2"])
+def test_a_key_that_no_result_has_is_an_error(key: str) -> None:
+    with pytest.raises((KeyError, IndexError, TypeError)):
+        result_at({"b": [0.0, None], "c": 0.0}, key)
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import numpy as np
 
 from infoset.arrays import Floats
 from infoset.experiments.common.ephemeris.epochs import (
+    LAST_OFFSET_S,
     Epoch,
     converted,
     is_guess,
@@ -139,6 +140,7 @@ def oem_craft(
     covariance_frame = ""
     if with_covariance and segment.covariances:
         given = _covariance_at(segment, where, seconds)
+        # The same axes for positions and velocities.
         axes = np.kron(np.eye(2), _axes_of(given, where, segment, frame, found.state))
         covariance = axes.T @ given.matrix @ axes
         covariance_frame = given.frame or f"{frame.name}, as the states"
@@ -169,7 +171,8 @@ def time_notes(epoch: Epoch, scale: str, wanted: Sequence[str]) -> list[str]:
     if not any(is_guess(epoch, scale, each) for each in wanted):
         return []
     return [
-        f"the leap seconds of {epoch.day} are not yet known: UTC is converted with TAI - UTC = 37 s"
+        f"the leap seconds of {epoch.day} are not yet known: UTC is converted with TAI - UTC = "
+        f"{LAST_OFFSET_S} s"
     ]
 
 
@@ -285,6 +288,7 @@ def _two_body_difference(found: Interpolated, parameter_m3_s2: float) -> float:
     """
     if not found.nearest_s:
         return 0.0
+    # `propagate` moves a pair of states; only the first one is wanted.
     pair = np.concatenate([found.nearest, np.zeros((2, 3))])
     try:
         moved, _ = propagate(pair, parameter_m3_s2, found.nearest_s)

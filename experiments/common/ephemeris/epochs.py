@@ -50,6 +50,8 @@ LEAP_DAYS = (
 """Days from which TAI - UTC is 10, 11, 12, ... s (IERS Bulletin C)."""
 FIRST_OFFSET_S = 10
 """TAI - UTC from the first of these days on, s."""
+LAST_OFFSET_S = FIRST_OFFSET_S + len(LEAP_DAYS) - 1
+"""TAI - UTC from the last of these days on, s."""
 LEAPS_KNOWN_UNTIL = date(2027, 6, 28)
 """Last day for which the IERS says that the table is complete."""
 
@@ -104,6 +106,7 @@ def parse_epoch(text: str) -> Epoch:
     year, month, day_of_month, day_of_year, hour, minute, second, suffix = match.groups()
     day = _day(int(year), month, day_of_month, day_of_year)
 
+    # A part that is not written is 0.
     minutes = 60 * int(hour or 0) + int(minute or 0)
     seconds = Fraction(second or 0)
     if int(hour or 0) > 23 or int(minute or 0) > 59 or seconds >= 61:
@@ -140,6 +143,7 @@ def seconds_in(epoch: Epoch, scale: str) -> Fraction:
         return seconds
     if epoch.day < LEAP_DAYS[0]:
         raise ValueError("is before 1972, and UTC then had no leap seconds; write it in TAI or TDB")
+    # `bisect_right` counts the leap days up to the epoch, of which the first has FIRST_OFFSET_S.
     return seconds + FIRST_OFFSET_S - 1 + bisect_right(LEAP_DAYS, epoch.day)
 
 
@@ -167,9 +171,7 @@ def tdb_drift_s(seconds: Fraction, scale: str) -> float:
     """
     if scale == "TDB":
         return 0.0
-    # `seconds_in` counts UTC as TAI.
-    counted = "TAI" if scale == "UTC" else scale
-    return float(_tdb_minus_tt(_to_tt(seconds, counted)))
+    return float(_tdb_minus_tt(_to_tt(seconds, scale)))
 
 
 def _day(year: int, month: str | None, day_of_month: str | None, day_of_year: str | None) -> date:
@@ -180,7 +182,8 @@ def _day(year: int, month: str | None, day_of_month: str | None, day_of_year: st
         except ValueError:
             raise ValueError("is a date that does not exist") from None
     number = int(day_of_year or 0)
-    if not 1 <= year <= 9998 or number < 1:
+    # `date` ends with the year 9999, and the day 366 may be in the next year.
+    if not 1 <= year <= 9998 or not 1 <= number <= 366:
         raise ValueError("is a date that does not exist")
 
     day = date(year, 1, 1) + timedelta(number - 1)
@@ -190,6 +193,7 @@ def _day(year: int, month: str | None, day_of_month: str | None, day_of_year: st
 
 
 def _to_tt(seconds: Fraction, scale: str) -> Fraction:
+    """Return seconds of a scale, as `seconds_in` counts them, in TT: UTC is counted as TAI."""
     if scale == "TT":
         return seconds
     if scale == "TDB":
@@ -201,6 +205,7 @@ def _to_tt(seconds: Fraction, scale: str) -> Fraction:
 
 
 def _from_tt(seconds: Fraction, scale: str) -> Fraction:
+    """Return seconds of TT in a scale; for UTC those of TAI, as `seconds_in` counts."""
     if scale == "TT":
         return seconds
     if scale == "TDB":
@@ -211,5 +216,6 @@ def _from_tt(seconds: Fraction, scale: str) -> Fraction:
 
 
 def _tdb_minus_tt(seconds: Fraction) -> Fraction:
+    """Return TDB - TT at a time of TT, s."""
     anomaly = _ANOMALY_RAD + _ANOMALY_RAD_S * float(seconds)
     return Fraction(_K_S * math.sin(anomaly + _ECCENTRICITY * math.sin(anomaly)))

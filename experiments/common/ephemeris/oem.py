@@ -110,6 +110,7 @@ def _text(content: bytes, source: str) -> str:
 
     Older programs write Latin-1 into comments.
     """
+    # 100 bytes: blanks may stand before the first tag; chosen.
     if content[:100].lstrip().startswith((b"<", b"\xef\xbb\xbf<")):
         raise InputError(
             f"{source}: is XML, and OEM files are read in keyword-value notation (KVN); export it "
@@ -120,6 +121,7 @@ def _text(content: bytes, source: str) -> str:
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError:
+        # A mark of UTF-8 at the start (BOM), which such a file can have too, is not text.
         return content.decode("latin-1").removeprefix("\u00ef\u00bb\u00bf")
 
 
@@ -290,6 +292,7 @@ class _Reading:
         segment = self._segments[-1]
         matrix = np.zeros((COMPONENTS, COMPONENTS))
         for index, row in enumerate(self._entries):
+            # The rows of the file are the lower triangle.
             matrix[index, : index + 1] = row
             matrix[: index + 1, index] = row
         segment.covariances.append(

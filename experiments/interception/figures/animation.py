@@ -1,4 +1,7 @@
-"""Animations of engagements: the sets step by step, above their predicted misses."""
+"""Animations of engagements: the sets step by step, above their predicted misses.
+
+Sizes and margins without a reason were chosen by eye (`figure_style`).
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The approach of single engagements: B-plane, possible misses and impulses."""
+"""The approach of single engagements: B-plane, possible misses and impulses.
+
+Sizes and margins without a reason were chosen by eye (`figure_style`).
+"""
 
 from __future__ import annotations
 
@@ -104,6 +107,7 @@ def _draw_possible(axes: Axes, record: Record) -> None:
     misses = record.predicted_miss_m[known]
     times = Clock(counts_down=True).at(record)
     maximum = modulus(np.abs(misses).max(axis=-1).T)
+    # The last axis is the minimum and the maximum of each lateral axis.
     centred = modulus(0.5 * (misses[..., 1] - misses[..., 0]).T)
     true = modulus(true_predicted_misses(record).T)
 
@@ -166,5 +170,6 @@ def _draw_b_plane(axes: Axes, record: Record) -> None:
     if body is not None and body.longest_m <= RADIUS_SHOWN * max(sizes):
         sizes.append(body.longest_m)
     axes.plot(*(true_predicted_misses(record) + aim_m).T, zorder=3.0, **_TRUE)
+    # Without any size, axes of 1 m.
     draw_body(axes, 1.15 * max(sizes) or 1.0, guaranteed, body)
     axes.plot(*end, zorder=4.0, label="closest approach", **_END)

@@ -1,4 +1,7 @@
-"""Misses across the approach: the B-plane, perpendicular to the nominal closing velocity."""
+"""Misses across the approach: the B-plane, perpendicular to the nominal closing velocity.
+
+Sizes and margins without a reason were chosen by eye (`figure_style`).
+"""
 
 from __future__ import annotations
 

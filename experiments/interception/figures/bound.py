@@ -1,4 +1,7 @@
-"""The lower bound of the miss: over the label, its pair, and strategies against it."""
+"""The lower bound of the miss: over the label, its pair, and strategies against it.
+
+Sizes and margins without a reason were chosen by eye (`figure_style`).
+"""
 
 from __future__ import annotations
 
@@ -116,6 +119,7 @@ def _draw_pair(axes: Axes, scenario: Scenario, lower: LowerBound) -> None:
     pair = lower.pair
     step_s = scenario.set_model.step_s
     if pair.is_single:
+        # No measurement matters: every impulse of the flight counts as a later one.
         alike_until = np.inf
         last_common_step = -1
         motions = [(1.0, "no impulses", _FIRST)]
@@ -130,6 +134,7 @@ def _draw_pair(axes: Axes, scenario: Scenario, lower: LowerBound) -> None:
         ]
         title = "offset from the midpoint, m"
 
+    # The offset of the first motion from the midpoint, or of a single motion from the x axis.
     half = _direction(pair) @ pair.track_m
     to_go = pair.arrival_s - pair.times_s
     shown = float(min(_SECONDS_SHOWN * alike_until + 2.0 * step_s, to_go[0]))

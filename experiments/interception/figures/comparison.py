@@ -1,4 +1,7 @@
-"""Comparison of strategies: distributions of miss and impulse with each noise."""
+"""Comparison of strategies: distributions of miss and impulse with each noise.
+
+Sizes and margins without a reason were chosen by eye (`figure_style`).
+"""
 
 from __future__ import annotations
 

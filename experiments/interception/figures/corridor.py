@@ -1,4 +1,7 @@
-"""The corridor of many runs: possible misses and impulses over the time before arrival."""
+"""The corridor of many runs: possible misses and impulses over the time before arrival.
+
+Sizes and margins without a reason were chosen by eye (`figure_style`).
+"""
 
 from __future__ import annotations
 

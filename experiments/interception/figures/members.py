@@ -1,4 +1,7 @@
-"""Members of a set that allows for wrong images, over time."""
+"""Members of a set that allows for wrong images, over time.
+
+Sizes and margins without a reason were chosen by eye (`figure_style`).
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Engagements over time: the paper's figure 2."""
+"""Engagements over time: the paper's figure 2.
+
+Sizes and margins without a reason were chosen by eye (`figure_style`).
+"""
 
 from __future__ import annotations
 
@@ -236,6 +239,7 @@ def _level_moduli(row: Sequence[Axes]) -> None:
             if line.get_transform() == axes.transData  # not the times of the schedule
         ]
     )
+    # If all moduli are 0, any axis will do.
     known = np.ones(1)
     if moduli.any():
         known = moduli[moduli > 0.0]

@@ -1,4 +1,7 @@
-"""Parts that figures of the interception share: lines of levels, and the time axis."""
+"""Parts that figures of the interception share: lines of levels, and the time axis.
+
+Sizes and margins without a reason were chosen by eye (`figure_style`).
+"""
 
 from __future__ import annotations
 
@@ -163,7 +166,7 @@ def ring(radius: float) -> Any:
 
 def draw_impulses(axes: Axes, times: Any, sizes: Any, **look: Any) -> None:
     """Draw the impulses that are not zero as bars."""
-    given = sizes != 0.0
+    given = sizes != 0.0  # also negative ones: `sizes` may be components
     axes.vlines(times[given], 0.0, sizes[given], rasterized=bool(given.sum() > MAX_VECTORS), **look)
 
 
@@ -197,8 +200,9 @@ def count_down(column: Sequence[Axes], scenario: Scenario) -> None:
 def name_events(axes: Axes, scenario: Scenario) -> None:
     """Write the names of the times of the schedule along their lines, below the upper frame.
 
-    The names are in turn to the left and to the right of their lines, so that those of two near
-    lines do not overlap.
+    The names are in turn to the right and to the left of their lines, counted from the last line,
+    so that those of the last two lines, often near each other, are apart. Those of the second and
+    the third line from the end stand between these lines, and overlap if they are near.
     """
     look: dict[str, Any] = {
         "xycoords": axes.get_xaxis_transform(),
@@ -209,8 +213,9 @@ def name_events(axes: Axes, scenario: Scenario) -> None:
         "path_effects": HALO,
         "zorder": 5.0,
     }
-    by_time = sorted(marks(scenario).items(), key=lambda item: -item[1])
-    for number, (name, time_s) in enumerate(by_time):
-        side, offset = (("right", -2.0), ("left", 2.0))[number % 2]
+    # The time before the arrival decreases to the right: the last line has the smallest.
+    from_last = sorted(marks(scenario).items(), key=lambda item: item[1])
+    for number, (name, time_s) in enumerate(from_last):
+        side, offset = (("left", 2.0), ("right", -2.0))[number % 2]
         text = f"{name}, {duration_text(time_s)}"
         axes.annotate(text, (time_s, 0.97), xytext=(offset, 0.0), ha=side, **look)

@@ -90,6 +90,7 @@ def _rows(scenario: Scenario, found: WorstEngagement) -> dict[str, str]:
     axes = [*scenario.set_model.axes, "x"]
     position = ", ".join(axes)
     velocity = ", ".join(f"V_{axis}" for axis in axes)
+    # The lateral axes are all but the last one, x.
     return {
         "maximum miss of any state of the set, m": number(found.any_state_miss_m),
         "miss of the simulated truth, m": number(found.miss_m),

@@ -179,6 +179,7 @@ def _simulate(
 
     searched = WorstMisses(None, None)
     if options.budget > 0:
+        # One or two searches report to the same bar.
         searched = find_worst_misses(
             flown, own, budget=options.budget, seed=options.seed, begin=lambda _name: report
         )
@@ -199,6 +200,7 @@ def _nominal(scenario: Scenario) -> TruthPair:
     """
     box = scenario.set_model.bounds
     label_m = float(np.clip(scenario.nominal_range_m, *box.x_m))
+    # vx_m_s is negative in an approach, and the closing speed positive.
     vx_m_s = float(np.clip(-scenario.set_model.closing_speed_m_s, *box.vx_m_s))
     return pair_at(scenario, label_m, vx_m_s)
 
@@ -278,6 +280,7 @@ def _where(pair: TruthPair, scenario: Scenario) -> dict[str, object]:
         "wrong_images_before_arrival_s": [
             _before_arrival_s(pair, steps, scenario).tolist() for steps in pair.wrong_steps
         ],
+        # The last time is that of the arrival at x = 0 without impulses.
         **_by_axis("apart", np.abs(pair.difference_m[:, -1]), scenario),
     }
 

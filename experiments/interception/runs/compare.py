@@ -76,6 +76,7 @@ def run(options: Compare) -> None:
     with work_of(options, scenario, ["results.csv", *figure_files(*figures)], notes=notes) as work:
         wanted = compared_scenarios(scenario, strategies, noises)
         # Each strategy has a progress bar, of which its scenarios are equal parts.
+        # All strategies have the same number of scenarios, in the order of the strategies.
         count = len(wanted) // len(strategies)
         reports = [report for name in strategies for report in parts_of(work.begin(name), count)]
         tasks = [

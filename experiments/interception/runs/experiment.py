@@ -197,7 +197,7 @@ def _flights(
             flown,
             range(options.runs),
             options.seed,
-            noise=None if is_game else noise.own,
+            noise=None if is_game else noise.own,  # None is the noise of the scenario
             strategy=own,
             progress=work.begin(title),
             observe=course.observe if options.out is not None else None,

@@ -289,6 +289,14 @@ def test_numbers_of_numpy_are_written_as_numbers(name: str) -> None:
     assert read_text(type(value), to_toml(same), name) == value
 
 
+def test_the_largest_number_is_written_where_it_is_not_the_default() -> None:
+    scenario = load_scenario("dart-2022")
+    thruster = dataclasses.replace(scenario.thruster, budget_m_s=1e60)
+    large = dataclasses.replace(scenario, thruster=thruster)
+
+    assert read_text(Scenario, to_toml(large), "file") == large
+
+
 def test_numpy_numbers_become_python_numbers_in_a_scenario() -> None:
     scenario = with_numpy_numbers(load_scenario("dart-2022"))
 

@@ -67,6 +67,7 @@ def test_epoch_is_read_with_all_its_digits(
         "2029-366T00:00:00",
         "2029-000T00:00:00",
         "0000-001T00:00:00",
+        "9998-999T00:00:00",  # beyond the last day that a date can be
         "2029-03-01T24:00:00",
         "2029-03-01T00:60:00",
         "2029-03-01T00:00:61",
