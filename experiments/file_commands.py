@@ -1,6 +1,6 @@
 """The commands `infoset scenarios` and `infoset problems`.
 
-They list, show, copy and check files.
+They list, show, copy and check files. The limits of the numbers of their options are chosen.
 """
 
 from __future__ import annotations

@@ -70,6 +70,7 @@ def _figures(folder: CampaignFolder) -> Sequence[str]:
 
 
 def _read(options: ReportOptions) -> CampaignFolder:
+    """Return the folder of a campaign or a sweep; `InputError` if it has no runs."""
     path = options.folder
     if not path.is_dir():
         raise InputError(
@@ -94,6 +95,10 @@ def _read(options: ReportOptions) -> CampaignFolder:
 def _report_sweep(
     folder: CampaignFolder, options: ReportOptions, written: Output
 ) -> Iterator[Part]:
+    """Write the files of a sweep, and return the parts for the screen.
+
+    The body has a size if of any run it is known whether it hit: cells can differ in their bodies.
+    """
     scenario = folder.manifest.scenario
     sized = bool(folder.runs(["hit"])["hit"].count())
     required = read_requirement(options.require or folder.manifest.require, has_size=sized)

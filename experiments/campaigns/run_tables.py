@@ -87,6 +87,10 @@ def summary(
 
 
 def _counts(runs: pd.DataFrame) -> dict[str, Any]:
+    """Return the numbers of runs by outcome, set and bound Phi, and the hits.
+
+    `phi_known` is the number of runs with a bound, among which `phi_held` are counted.
+    """
     row: dict[str, Any] = {"runs": len(runs)}
     for name, outcome in OUTCOMES.items():
         row[name] = int((runs["outcome"] == outcome).sum())
@@ -314,6 +318,7 @@ def summary_parts(folder: CampaignFolder, table: pd.DataFrame) -> Iterator[Part]
     yield from set_warnings(manifest.scenario.information_set, sets)
     yield from campaign_notes(folder)
     if manifest.stopped_after is not None:
+        # The same numbers are in docs/campaigns.md.
         yield (
             "the intervals are computed with 95 % confidence for a fixed number of runs; the "
             "campaign stopped when an interval was narrow, so their confidence is about 92 to 95 %"

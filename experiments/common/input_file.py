@@ -236,6 +236,7 @@ class _Reading:
                 self._faults[here] = f"is written again, as {key}"
                 continue
             self._written[here] = key, value
+            # It is not None, because the field was found by it.
             factor = si_factor(key, name) or Decimal(1)
             values[name] = self._value_in_si(value, known[name], here, factor)
 
@@ -420,12 +421,14 @@ def fields_of(owner: type) -> Mapping[str, KeyField]:
 
 
 def _key_field(hint: Any) -> KeyField:
+    """Return the kind of value of a type hint, without None and without annotations."""
     if get_origin(hint) in (Union, types.UnionType):
         hint = next(kind for kind in get_args(hint) if kind is not types.NoneType)
     if get_origin(hint) is Annotated:
         hint = get_args(hint)[0]
 
     inner = get_args(hint)
+    # tuple[Table, ...] is an array of tables.
     many = get_origin(hint) is tuple and inner[1:] == (...,) and is_dataclass(inner[0])
     table = inner[0] if many else hint
     if not isinstance(table, type) or not is_dataclass(table):
@@ -565,6 +568,7 @@ def _found(values: dict[str, Any], owner: type, key: str) -> _FoundKey | None:
 
 def _value(literal: str) -> Any:
     """Return a TOML value; any other text is a number such as ``.5``, or text without quotes."""
+    # As in `parse`: the parser would take too long.
     if _line_of_long_key(literal) is not None:
         return literal
     try:
@@ -662,6 +666,7 @@ def _lines(value: Any, prefix: str) -> Iterator[str]:
 
 
 def _literal(value: Any) -> str:
+    """Return a value as TOML: JSON has the same texts and flags, `repr` all digits of a float."""
     if isinstance(value, Enum):
         value = value.value
     if isinstance(value, tuple):

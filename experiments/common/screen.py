@@ -274,6 +274,7 @@ def quantile_notes(runs: int, levels: Sequence[float], noises: int = 1) -> list[
         return []
     verb = "is" if runs == 1 else "are"
     names = ", ".join(map(level_name, hidden))
+    # By `shows`, one run is expected beyond a quantile; the extremes (0 and 1) are never hidden.
     needed = max(round(1.0 / min(level, 1.0 - level)) for level in hidden)
     enough = f"{needed} runs"
     if noises > 1:

@@ -1,4 +1,7 @@
-"""Options of `infoset experiment`, `engage`, `compare`, `bound`, `adversary` and `replay`."""
+"""Options of `infoset experiment`, `engage`, `compare`, `bound`, `adversary` and `replay`.
+
+The default numbers of runs and of engagements are chosen.
+"""
 
 from __future__ import annotations
 

@@ -310,6 +310,7 @@ def outcome_title(record: Record) -> str:
 
 
 def _shown(metres: float) -> str:
+    """Return a length for a title: two decimals below 100 m, none from there on."""
     if metres < 100.0:
         return f"{metres:.2f}"
     return f"{metres:,.0f}".replace(",", "\N{NARROW NO-BREAK SPACE}")

@@ -65,6 +65,7 @@ def member_courses(record: Record) -> list[MemberCourse]:
             course = before.get(member)
             if course is None or course.group != group:
                 course = MemberCourse(step, group)
+            # The index 0 is that of the only run.
             course.intervals_m.append(np.stack([lower[:, 0, member], upper[:, 0, member]], -1))
             present[member] = course
 

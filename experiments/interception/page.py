@@ -358,6 +358,7 @@ def packed_outlines(outlines: Sequence[Floats], tolerance: float = 0.0) -> dict[
         closed = np.insert(share, np.cumsum(counts), share[starts], axis=0)
         lines = shapely.linestrings(closed, indices=np.repeat(np.arange(len(counts)), counts + 1))
         share, line = shapely.get_coordinates(shapely.simplify(lines, tolerance), return_index=True)
+        # A vertex is the last one of its line if the next one is of another line, or there is none.
         share = share[np.append(line[1:] == line[:-1], False)]
         counts = np.bincount(line) - 1
 

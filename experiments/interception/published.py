@@ -72,6 +72,7 @@ def compute(progress: Progress) -> dict[str, Sequence[Ours | float]]:
 
 def printed_single_runs() -> dict[str, tuple[float, float]]:
     """Return the printed miss (m) and impulse (m/s) by noise."""
+    # In the file: miss and impulse with random errors, then with the game noise.
     values = [number.value for number in read_paper(PAPER).tables[ONE_RUN]]
     return {"random": (values[0], values[1]), "game": (values[2], values[3])}
 

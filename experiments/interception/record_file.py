@@ -100,7 +100,7 @@ class Header:
     scenario: Scenario
     versions: Mapping[str, str]
     seed: Annotated[int, Field(ge=0)]
-    run: Annotated[int, Field(ge=0, lt=2**63)]
+    run: Annotated[int, Field(ge=0, lt=2**63)]  # `Results.runs` has integers of 64 bits
     strategy: str
     noise: str | None
     inconsistency: RecordedInconsistency | None
@@ -161,6 +161,7 @@ def load_record(path: str | os.PathLike[str]) -> Record:
 
 
 def _to_arrays(record: Record) -> Arrays:
+    """Return the members of a record but the header; NaN is a value that is not known."""
     arrays: dict[str, Any] = {name: getattr(record, name) for name in _OF_STEPS}
     unknown = np.full((record.steps, len(record.scenario.set_model.axes)), np.nan)
     for name, kind in _MEASURED.items():

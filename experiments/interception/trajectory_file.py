@@ -31,7 +31,9 @@ from infoset.sim.gravity import on_board_model
 from infoset.sim.scenario import Scenario
 
 _Text = Line(longest=1000)
-"""Names and paths: one line, because messages and comments of the scenario repeat them."""
+"""Names and paths: one line, because messages and comments of the scenario repeat them. The maximum
+length is chosen.
+"""
 KERNEL_SCALE = "TDB"
 """Time scale of SPICE."""
 
@@ -234,6 +236,7 @@ def _scenario(
         disturbance_m_s2=target.disturbance_m_s2 or 0.0,
         disturbance_y_m_s2=None,
     )
+    # The state of the approach is (y, z, x), and then the speeds along y, z and x.
     return replace(
         like,
         name=trajectory.name,
@@ -314,6 +317,7 @@ def _text(
     ]
     comments = _comments(like, sigmas, direction_of(found.sun))
     lines = []
+    # Each row of a matrix has its own line.
     for line in to_toml(scenario).replace("], [", "],\n    [").splitlines():
         comment = comments.get(line)
         lines.append(f"{line}  # {comment}" if comment else line)
@@ -476,6 +480,7 @@ def _check_accuracy(pair: _Pair, source: str) -> None:
     """Refuse states whose interpolation has greater errors than the covariance claims."""
     errors = pair.spacecraft.error + pair.object.error
     variances = pair.covariance.diagonal()
+    # The first three are of the position, the others of the velocity.
     claimed = np.sqrt([variances[:3].sum(), variances[3:].sum()])
     if (errors <= claimed).all():
         return

@@ -113,6 +113,7 @@ def parse_epoch(text: str) -> Epoch:
         raise ValueError("has an hour, minute or second that does not exist")
     # Second 60 exists only at the end of a day before a leap day; in UTC only, but the scale of an
     # epoch may be written elsewhere.
+    # The first of `LEAP_DAYS` only begins the table: no leap second is before it.
     leap_ends = [leap - timedelta(1) for leap in LEAP_DAYS[1:]]
     if seconds >= 60 and (minutes != 60 * 24 - 1 or day not in leap_ends):
         raise ValueError("has a second 60, and there is no leap second at this time")

@@ -211,6 +211,7 @@ def _window(times: Sequence[Fraction], after: int, wanted: int) -> list[int]:
 def _check_gap(times: Sequence[Fraction], after: int) -> None:
     """Raise a ValueError if the interval that ends at row `after` is a gap."""
     step = times[after] - times[after - 1]
+    # A step is named by the row at its end.
     neighbours = [
         times[row] - times[row - 1] for row in (after - 1, after + 1) if 0 < row < len(times)
     ]

@@ -164,6 +164,7 @@ class _Reading:
         return InputError(f"{self._source}: line {self._line}: {text}")
 
     def _version(self, line: str) -> None:
+        """Take the first line."""
         match = _PAIR.fullmatch(line)
         if match is None or match[1] != "CCSDS_OEM_VERS":
             raise self._fault("is not an OEM file: the first keyword must be CCSDS_OEM_VERS")
@@ -180,6 +181,7 @@ class _Reading:
             self._keep_pair(line, self._header, "the header")
 
     def _metadata(self, line: str) -> None:
+        """Take a line of the metadata; the last one, META_STOP, checks them."""
         segment = self._segments[-1]
         if line != "META_STOP":
             self._keep_pair(line, segment.metadata, "the metadata")
@@ -200,6 +202,7 @@ class _Reading:
         self._section = self._data
 
     def _interpolation(self, metadata: dict[str, str]) -> tuple[str, int]:
+        """Return method and degree; without them Hermite's, and the default degree."""
         method = metadata.get("INTERPOLATION", METHODS[0]).upper()
         if method not in METHODS:
             raise self._fault(f"INTERPOLATION {shown(method)} is not one of {', '.join(METHODS)}")
@@ -215,6 +218,7 @@ class _Reading:
         return method, int(degree)
 
     def _data(self, line: str) -> None:
+        """Take a state, or the line that begins covariances or the next segment."""
         if line == "META_START":
             self._end_segment()
             self._begin_segment()
@@ -241,6 +245,7 @@ class _Reading:
         self._rows.append(self._numbers(words[1 : 1 + COMPONENTS]))
 
     def _covariances(self, line: str) -> None:
+        """Take a line of the covariances: keywords, and then rows of one, two, ... six numbers."""
         if line == "COVARIANCE_STOP":
             if self._covariance or self._entries:
                 raise self._fault(
@@ -276,6 +281,7 @@ class _Reading:
         self._section = self._metadata
 
     def _end_segment(self) -> None:
+        """Store the states of the last segment, and the time span in which they may be used."""
         self._need_states()
         segment = self._segments[-1]
         segment.states = METRES_PER_KM * np.array(self._rows).reshape(-1, 2, 3)
@@ -339,6 +345,7 @@ class _Reading:
     def _keep_pair(
         self, line: str, pairs: dict[str, str], where: str, known: tuple[str, ...] = ()
     ) -> None:
+        """Store KEYWORD = VALUE of a line; with `known`, other keywords are refused."""
         match = _PAIR.fullmatch(line)
         if match is None or (known and match[1] not in known):
             raise self._fault(f"must be KEYWORD = VALUE in {where}, found {shown(line)}")

@@ -29,6 +29,7 @@ from infoset.experiments.common.figure_style import (
     subplots,
 )
 from infoset.experiments.common.screen import number, some_runs
+from infoset.experiments.common.units import length_unit
 from infoset.experiments.interception.figures.distributions import axis_limit
 from infoset.experiments.interception.figures.shared import (
     MAX_VECTORS,
@@ -140,6 +141,7 @@ def ellipse(across_m: Floats, level: float, within_m: float = np.inf) -> Floats 
     if len(across_m) <= 2:
         return None
     variances, axes = np.linalg.eigh(np.cov(across_m.T))
+    # The variances rise: the first one is that across the ellipse.
     if variances[0] <= _FLAT * variances[1]:
         return None
 
@@ -225,7 +227,9 @@ def _draw_cloud(axes: Axes, each: Cloud, half: float, body: Body | None) -> list
     known = _draw_points(axes, each, aim_in_plane(body, each.t_rad))
     draw_body(axes, half, each.guaranteed_m, body, each.t_rad)
     if each.t_rad is not None:
-        axes.set(xlabel=r"$B\cdot T$, m", ylabel=r"$B\cdot R$, m", ylim=(half, -half))
+        # The unit of the ticks of `draw_body`; R is downward.
+        unit, _ = length_unit(half)
+        axes.set(xlabel=rf"$B\cdot T$, {unit}", ylabel=rf"$B\cdot R$, {unit}", ylim=(half, -half))
     outside = int((np.abs(each.across_m) > half).any(axis=1).sum())
 
     if outside:

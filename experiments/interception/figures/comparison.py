@@ -75,6 +75,7 @@ def draw_comparison(compared: Sequence[Comparison], body: Body | None = None) ->
 
     for axes, label in zip(grid[-1], ("miss, m", "impulse spent, m/s"), strict=True):
         axes.set_xlabel(label)
+    # The first strategy is on top: the axis points downward.
     bottom = len(names) - 1 + _BELOW
     grid[0, 0].set(ylim=(bottom, -_ABOVE), yticks=range(len(names)), yticklabels=names)
     letters([*grid.flat], [title for title in noises.values() for _ in range(2)])
@@ -105,6 +106,7 @@ def _draw_strategy(axes: Axes, place: int, sample: Floats, edges: Floats) -> Non
     edge are drawn at it.
     """
     counts, _ = np.histogram(np.clip(sample, edges[0], edges[-1]), bins=edges)
+    # The axis points downward (`draw_comparison`): histograms rise toward smaller numbers.
     heights = place - _HILL * counts / counts.max()
     label = f"histogram of {some_runs(len(sample))}"
     axes.stairs(heights, edges, baseline=place, fill=True, label=label, **SET | {"linewidth": 0.5})

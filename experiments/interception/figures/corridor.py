@@ -65,6 +65,7 @@ def draw_corridor(curves: Sequence[Curve], courses: Sequence[Courses]) -> Figure
     figure, grid = subplots(
         20.0 + 75.0 * rows, 2 * rows, columns, sharex=True, height_ratios=[2.4, 1.0] * rows
     )
+    # Rows of possible misses alternate with rows of impulses.
     above, below = (first_panels(part, len(curves)) for part in (grid[::2], grid[1::2]))
     titles = []
 

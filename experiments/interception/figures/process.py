@@ -109,7 +109,7 @@ def draw_process(records: Sequence[Record]) -> Figure:
 def _draw_column(column: Sequence[Axes], trace: Trace, clock: Clock, impulse_m_s: float) -> None:
     """Draw the four panels of an engagement along one lateral axis."""
     angle, rate, impulse, miss = column
-    rate.axhline(0.0, **_ZERO)
+    rate.axhline(0.0, **_ZERO)  # not seen on the logarithmic axis of moduli
     if clock.counts_down:
         _draw_angle_error(angle, trace, clock)
         _draw_sight(rate, trace, clock, "rate", is_modulus=True)

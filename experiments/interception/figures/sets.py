@@ -222,6 +222,7 @@ def draw_plane(axes: Axes, plane: Plane) -> None:
     """
     ranges_m, places = np.unique([section.range_m for section in plane.chosen], return_inverse=True)
     colours = mpl.colormaps["Blues_r"](np.linspace(0.0, 0.55, len(ranges_m)))
+    # The nearer a section is, the higher it lies: its outline is seen over those of the others.
     for outline, place in zip(plane.outlines, places.tolist(), strict=True):
         _draw_outline(axes, outline, colours[place], zorder=3.0 - 0.01 * place)
     axes.plot(*plane.true, zorder=6, label=TRUTH_MARK, path_effects=HALO, **_TRUTH)

@@ -213,9 +213,11 @@ def name_events(axes: Axes, scenario: Scenario) -> None:
         "path_effects": HALO,
         "zorder": 5.0,
     }
-    # The time before the arrival decreases to the right: the last line has the smallest.
-    from_last = sorted(marks(scenario).items(), key=lambda item: item[1])
-    for number, (name, time_s) in enumerate(from_last):
-        side, offset = (("left", 2.0), ("right", -2.0))[number % 2]
+    # From left to right, in which direction the time before the arrival decreases.
+    by_time = sorted(marks(scenario).items(), key=lambda item: -item[1])
+    for place, (name, time_s) in enumerate(by_time):
+        lines_after = len(by_time) - 1 - place
+        # "left" is the end of the text that is at the line: the text is to the right of it.
+        side, offset = (("left", 2.0), ("right", -2.0))[lines_after % 2]
         text = f"{name}, {duration_text(time_s)}"
         axes.annotate(text, (time_s, 0.97), xytext=(offset, 0.0), ha=side, **look)

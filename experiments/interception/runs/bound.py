@@ -271,6 +271,10 @@ def _strategy_json(
 
 
 def _where(pair: TruthPair, scenario: Scenario) -> dict[str, object]:
+    """Return in JSON where and how long the motions of a pair are alike.
+
+    The closing speed is positive, and `vx_m_s` negative.
+    """
     return {
         "label_m": pair.label_m,
         "closing_speed_m_s": -pair.vx_m_s,

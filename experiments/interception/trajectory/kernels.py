@@ -64,12 +64,14 @@ def kernel_state(spice: Any, body: str, time_s: float, frame: str, centre: str) 
             f"frame: {frame} is not an inertial frame of SPICE; use J2000 or ECLIPJ2000"
         )
     state, _ = spice.spkezr(body, time_s, frame, "NONE", centre)
+    # SPICE is in kilometres.
     return np.asarray(1e3 * np.reshape(state, (2, 3)))
 
 
 def _is_binary(file: Path) -> bool:
     try:
         with file.open("rb") as stream:
+            # As many bytes as the longest of `BINARY` has.
             return stream.read(8).startswith(BINARY)
     except OSError as error:
         raise InputError(f"{file}: cannot be read: {error.strerror}") from None

@@ -243,6 +243,16 @@ def test_approach_shows_possible_misses_and_the_schedule(records: list[Record]) 
     assert len(draw_approach(records).axes) == 6
 
 
+def test_the_axes_of_the_b_plane_name_the_unit_of_their_ticks() -> None:
+    across_m = np.array([[4e3, 0.0], [0.0, -8e3], [-6e3, 1e3]])
+    far = Cloud("far", across_m, np.hypot(*across_m.T), t_rad=0.0)
+    (axes,) = draw_b_plane([far]).axes
+
+    assert axes.get_xlabel() == r"$B\cdot T$, km"
+    assert axes.get_ylabel() == r"$B\cdot R$, km"
+    assert axes.xaxis.get_major_formatter()(5e3) == "5"
+
+
 @pytest.mark.parametrize("name", ["asteroid-1997", "asteroid-1997-space"])
 def test_courses_equal_the_records_of_single_engagements(
     name: str, monkeypatch: pytest.MonkeyPatch
