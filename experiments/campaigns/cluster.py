@@ -76,6 +76,7 @@ def cluster(address: str, note: Callable[[str], None]) -> Iterator[tuple[Executo
 
     with contextlib.ExitStack() as stack:
         try:
+            # Not the default client: Dask elsewhere in this process would use it.
             client = stack.enter_context(Client(address, timeout=PATIENCE_S, set_as_default=False))
         except Exception as error:  # another program sends anything; reading it fails in any way
             # Of a reason of any length, two lines; chosen.

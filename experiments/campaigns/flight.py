@@ -65,6 +65,7 @@ def noises_at_once(options: FlightOptions) -> int:
 
 def needed_runs(options: FlightOptions, required: AnyRequirement) -> int:
     """Return the least number of runs that can decide a requirement with each noise."""
+    # `watched`: a campaign can be looked at and extended before it decides.
     return noises_at_once(options) * least_runs(required.share, watched=True)
 
 
@@ -112,6 +113,7 @@ def _warnings(campaign: Campaign) -> list[str]:
     warnings = [*dict.fromkeys(lines)]
     # Every axis rises: the cells of the smallest and of the largest values.
     corners = dict.fromkeys((campaign.cells[0], campaign.cells[-1]))
+    # Of two equal cells `fromkeys` keeps one.
     for name, cell in zip(("first", "last"), corners, strict=False):
         warnings += [f"{name} cell: {line}" for line in feasibility_warnings(cell)]
     return warnings

@@ -265,6 +265,7 @@ def _rows_of_worst(folder: CampaignFolder) -> pd.DataFrame:
 
     columns = ["run", "noise", "outcome", "hit", "cause", "miss_m", "impulse_m_s"]
     read = folder.read_chunks([chunks[file] for file in np.unique(files)], columns)
+    # In the order of the misses, not of the files.
     return read.set_index("run", drop=False).loc[numbers]
 
 

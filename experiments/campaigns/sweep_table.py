@@ -83,6 +83,7 @@ def sweep_table(folder: CampaignFolder, required: AnyRequirement) -> SweepTable:
         rows["limit_bound"] = _radii_m(folder, rows)
     if required.quantity == "guaranteed_miss_m" and folder.manifest.scenario.camera is not None:
         # The rows of a cell follow each other, one for each noise.
+        # The closed form does not depend on the noise.
         rows["closed_form_m"] = np.repeat(_closed_forms(folder), len(noises))
     return SweepTable(folder.manifest.axes, tuple(noises), required, rows)
 

@@ -115,6 +115,7 @@ def first_panels(grid: NDArray[Any], count: int) -> list[Axes]:
 def label_axes(axes: Any, titles: Sequence[str]) -> None:
     """Write the titles of two or three axes, with few ticks and room around the drawing."""
     in_space = len(titles) > 2
+    # In a plane there are two titles.
     for name, title in zip("xyz", titles, strict=False):
         getattr(axes, f"set_{name}label")(title, labelpad=-2.0 if in_space else None)
     axes.locator_params(nbins=5)

@@ -50,6 +50,7 @@ def compute(progress: Progress) -> dict[str, Sequence[Ours | float]]:
     curves += [each for each in curve_scenarios(lost) if each[1].range_sensor is not None]
 
     runs = [(single, RUNS), *((game, 1) for game in games), *((flown, RUNS) for _, flown in curves)]
+    # Without Phi, which is not compared; seed 0.
     tasks = [
         Task(scenario, range(count), 0, guarantee=False, progress=report)
         for (scenario, count), report in zip(runs, parts_of(progress, len(runs)), strict=True)

@@ -261,6 +261,7 @@ def replayed(
     from measurements and impulses, arrays as in `Record`, and equals the set of the engagement bit
     for bit if the versions of the packages are the same.
     """
+    # Without Phi, which takes time and is in the result of the record.
     information = information_set(on_board_model(scenario), guarantee=False)
     is_known = {
         name: np.asarray(~np.isnan(values.reshape(len(values), -1)).any(axis=1))

@@ -121,6 +121,7 @@ def _remedy(task: Task, results: Results, cause: MissCause, key: str) -> Remedy:
     def simulated(value: float, runs: Sequence[int] = task.runs) -> Results:
         changes = {name: old * value / now for name, old in values.items()}
         flown = changed(scenario, changes, f"{scenario.name} with {key} = {value:g}")
+        # Neither Phi nor courses are needed, and `find_remedies` reports the progress.
         flight = replace(task, scenario=flown, guarantee=False, progress=None, observe=None)
         # One task for each core: a task is simulated by one thread.
         parts = [runs[first::cores] for first in range(min(len(runs), cores))]

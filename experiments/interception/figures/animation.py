@@ -100,7 +100,7 @@ def animate(
         save_all=True,
         append_images=frames[1:],
         duration=frame_ms,
-        loop=0,
+        loop=0,  # without end
         optimize=True,
     )
     return content.getvalue()

@@ -85,6 +85,7 @@ def draw_bound(
 
 def _draw_labels(axes: Axes, lower: LowerBound) -> None:
     """Draw the bound over the label, for each closing speed, and mark its maximum."""
+    # Up to three speeds: the ends of the interval of V_x and the nominal one.
     for look, speed in zip(_LOOKS, lower.speeds_m_s, strict=False):
         labels_m, bounds_m = lower.curve(speed)
         # No lines: the bound ripples over the distance of one step, and only some stretches of

@@ -90,6 +90,7 @@ class _ChosenNoise(NamedTuple):
 def run(options: Experiment) -> None:
     """Simulate the curves, write the files and print the table."""
     if options.runs == NEEDED:
+        # `watched`: as in `needed_notes`, enough also if runs are added after a look at results.
         options = replace(options, runs=least_runs(USUAL_REQUIREMENT.share, watched=True))
     scenario = scenario_with(options)
     own = own_strategy(options.strategy)
