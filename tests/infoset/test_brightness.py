@@ -59,6 +59,23 @@ def test_offsets_of_the_table(
     assert found == pytest.approx([lambert, lommel_seeliger, binary], abs=5e-5)
 
 
+@pytest.mark.parametrize("phase_deg", [1.0, 30.0, 60.0, 90.0, 150.0])
+def test_offsets_are_the_factors_of_other_flight_software(phase_deg: float) -> None:
+    """Basilisk's `cobConverter` has them for Lambert's law, after Bhaskaran and others (1998), and
+    for binary images.
+    """
+    phase_rad = math.radians(phase_deg)
+    sine = math.sin(phase_rad)
+    cosine = math.cos(phase_rad)
+    lambert = 3.0 * math.pi / 16.0 * (cosine + 1.0) * sine
+    lambert /= sine + (math.pi - phase_rad) * cosine
+    binary = 4.0 / (3.0 * math.pi) * (1.0 - cosine)
+
+    assert offset_share(phase_rad, Brightness.LAMBERT) == pytest.approx(lambert, rel=1e-12)
+    # 1 - cos(phase) loses four digits at 1 degree.
+    assert offset_share(phase_rad, Brightness.BINARY) == pytest.approx(binary, rel=1e-11)
+
+
 def test_mean_covers_both_laws_with_six_percent_at_every_phase() -> None:
     for phase_rad in np.radians(np.linspace(0.5, 170.0, 200)).tolist():
         mean = offset_share(phase_rad, Brightness.MEAN)
