@@ -85,7 +85,7 @@ class Constructions:
     at_every_step : ndarray of bool, shape (n,)
         Whether the extreme is kept at every step, and not only at ties.
     shift_side : ndarray, shape (n,)
-        Side to which a shift moves the true state, 1 or -1; 0 if the errors are not shifted.
+        Side to which a shift moves the true state, 1 or -1; 0 if the rule for ties has no shift.
     """
 
     choices: Floats
@@ -119,9 +119,11 @@ class _ConstructedNoise(GameNoise):
 
     @property
     def truth_side(self) -> Floats:
-        """Side to which the shift moves the true state, shape (B,) or (C, B); 0 for no shift.
+        """Side to which a shift moves the true state, shape (B,) or (C, B); 0 for the constructions
+        without one.
 
-        If the target keeps its side, it is that side instead of `shift_side`.
+        If the target keeps its side, it is that side instead of `shift_side`. Unlike that of
+        `GameNoise` it is not 0 if `shift_m` is None: then nothing is shifted, and nothing reads it.
         """
         if self.target_side is None:
             return self.shift_side

@@ -125,8 +125,8 @@ def possible_miss(scenario: Scenario) -> PossibleMiss | None:
 
 
 def _limiting_images_s(scenario: Scenario) -> Floats:
-    """Return the times before the arrival, s, of the images that limit the miss after the last
-    decision: all before it except the last 2q.
+    """Return the times before the nominal arrival, s, decreasing, of the images that limit the miss
+    after the last decision: all until it, one in its step included, except the last 2q.
 
     If q images may be wrong, two motions agree with the same measurements although they differ at
     2q images; it is worst if these are the last ones (Lemma 20b of docs/guarantee-bound.md).

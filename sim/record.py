@@ -156,7 +156,8 @@ def fly_one(
     target_m_s2 : ndarray, shape (C, 1, steps), or None
         Accelerations of the target, m/s^2; None is the scenario's target.
     progress : callable or None
-        Called with the fraction done, from 0 to 1.
+        Called after each step with its number as a share of the steps for which errors are drawn;
+        a flight usually ends before the last one.
 
     Raises
     ------
@@ -182,7 +183,7 @@ def fly_one(
     while flight.flying:
         flight.advance(record)
         if progress is not None:
-            progress(min(1.0, flight.step / draws.steps))
+            progress(flight.step / draws.steps)
 
     def rows(value: Callable[[Step], Any]) -> Floats:
         return np.array([value(step) for step in steps], dtype=np.float64)

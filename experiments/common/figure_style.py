@@ -181,8 +181,9 @@ def figure_bytes(figure: Figure) -> list[tuple[str, bytes]]:
     The same figure gives the same bytes.
     """
     files = []
-    for kind, undated in (("pdf", "CreationDate"), ("png", "Software")):
+    # The date, and the version of Matplotlib.
+    for kind, changing in (("pdf", "CreationDate"), ("png", "Software")):
         content = io.BytesIO()
-        figure.savefig(content, format=kind, metadata={undated: None})
+        figure.savefig(content, format=kind, metadata={changing: None})
         files.append((kind, content.getvalue()))
     return files

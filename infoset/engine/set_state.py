@@ -572,8 +572,11 @@ class SetState:
         self._spare = spare - chains.MAX_ADDED
 
     def _room(self, active: Flags, widen: bool) -> tuple[int, int]:
-        """Return the floats of the rings that are missing, and the vertices that every section may
-        gain; `widen` the rings.
+        """Return the floats by which the rings of the feasible sections are too small for
+        `ROOM_AHEAD` more vertices, and the vertices that each of them can gain now.
+
+        With `widen`, enlarge the rings, for which `_add_room` has allocated, and reduce the crowded
+        sections of the `active` engagements, whose emptiness is then unproved.
         """
         points = chain_storage.working_room()
         added = chain_storage.ROOM_AHEAD

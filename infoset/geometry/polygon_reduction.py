@@ -105,8 +105,9 @@ def cheapest_edge(points: Points, count: int) -> CheapestEdge:
 def removed_edge(points: Points, before: int, i: int, j: int, after: int) -> Removal:
     """Return the area that the removal of the edge from vertex i to j adds, twice.
 
-    It is infinite if the edge cannot be removed, and -1 if the path does not turn left at vertex i.
-    `before` and `after` are the vertices next to the edge.
+    It is infinite if the edge cannot be removed, -1 if the path does not turn left at vertex i, and
+    may be negative if it turns right at j: callers use only the sign of such areas. `before` and
+    `after` are the vertices next to the edge.
     """
     from_x = points[i, 0] - points[before, 0]
     from_y = points[i, 1] - points[before, 1]
@@ -127,9 +128,11 @@ def removed_edge(points: Points, before: int, i: int, j: int, after: int) -> Rem
     reach = cross(edge_x, edge_y, to_x, to_y) / turn
     x = points[i, 0] + reach * from_x
     y = points[i, 1] + reach * from_y
-    # The new vertex must not be before the far end of the edge: that would cut off a sharp tip.
-    is_beyond = (points[j, 0] - x) * to_x + (points[j, 1] - y) * to_y >= 0.0
-    return Removal(reach * bend if is_beyond else np.inf, x, y)
+    # The new vertex is on the line of the next edge, behind j: without rounding always, as `bend` and
+    # `turn` are positive. If rounding puts it in front of j, at a sharp tip, it would cut off the
+    # tip.
+    is_behind = (points[j, 0] - x) * to_x + (points[j, 1] - y) * to_y >= 0.0
+    return Removal(reach * bend if is_behind else np.inf, x, y)
 
 
 @allocation_free

@@ -104,8 +104,7 @@ def best_order(
     Raises
     ------
     ValueError
-        If there are more than 9 targets, or nothing limits the last time but its price and there
-        are no guesses.
+        If there are more than 9 targets, or there is neither a latest time nor a guess.
     NotSettledError
         If no order fits before the latest time, or no path is found for any order.
     """
@@ -137,7 +136,10 @@ def best_order(
             if np.isfinite(search.best_objective):
                 enough = search.best_objective
         effort = Effort.BOUND if warm and not careful else Effort.RUGGED
-        begins = [*warm, *guesses] if complete else warm
+        begins = list(warm)
+        if complete or horizon is None:
+            # Without a latest time, the search of a partial order needs times too: the first ones.
+            begins += [guess[: len(order)] for guess in guesses]
         times = optimise_times(
             tour.flyer(order),
             tour.start_s,

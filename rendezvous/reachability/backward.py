@@ -26,7 +26,9 @@ def backward_bounds(optimal: OptimalControls) -> Floats:
 
 
 def _bounds(optimum: BlockOptimum) -> Floats:
-    """Return the bounds of a block, divided by those of its states."""
+    """Return the minimum and maximum of each state of a block at t = 0..T, divided by the bounds of
+    its states, shape (T + 1, n, 2). At t = T they are the terminal state.
+    """
     block = optimum.block
     result = np.zeros((block.periods + 1, block.size, 2))
     result[-1] = optimum.terminal[:, None]

@@ -153,12 +153,15 @@ def _straight(position_m: Floats, velocity_m_s: Floats, step_s: float) -> Coasti
     transition = np.tile(np.eye(2 * axes), (len(times_s), 1, 1))
     transition[:, :axes, axes:] = time * np.eye(axes)
     lateral = np.eye(axes)[:, :-1]
+    # The change of the state at t = 0 with the effect of a constant acceleration a: the integral of
+    # (-t a, a) over time, which carries each velocity change back to t = 0.
     pushed = np.concatenate([-0.5 * time**2 * lateral, time * lateral], axis=1)
 
     speeds = np.repeat(velocity_m_s[:, None], len(times_s), axis=1)
     states = np.vstack([position_m[:, None] + speeds * times_s, speeds])
+    # The range is zero at the arrival, without its rounding error.
     states[axes - 1, -1] = 0.0
-    return Coasting(times_s, states, transition, pushed, np.inf, 0.0)
+    return Coasting(times_s, states, transition, pushed, nearest_m=np.inf, speed_m_s=0.0)
 
 
 class _KeplerFlight(NamedTuple):

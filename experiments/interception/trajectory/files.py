@@ -36,4 +36,5 @@ def named_file(name: str, folder: Path, allowed: Sequence[Path]) -> Path:
         raise InputError(
             f"{shown(name)}: is not a regular file, but a folder, pipe or device; give a file"
         )
+    # As named, so that later messages show the path that the user wrote.
     return file

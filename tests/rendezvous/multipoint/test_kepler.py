@@ -18,7 +18,10 @@ from infoset.rendezvous.multipoint import (
     Meet,
     NotSettledError,
     Path,
+    TimeLimits,
     TourTarget,
+    best_order,
+    best_times,
 )
 from infoset.rendezvous.multipoint._shooting import propagate
 from infoset.rendezvous.two_body import coast
@@ -280,3 +283,16 @@ def test_coasting_keeps_energy_and_momentum_and_comes_back(
         energy, rel=1e-10
     )
     np.testing.assert_allclose(coast(moved, -duration, 1.0), state, atol=1e-8)
+
+
+def test_best_order_with_a_price_of_time_alone_begins_at_the_guess() -> None:
+    """Formerly a partial order had no times to start from, and was refused."""
+    limits = TimeLimits(price_per_s=1e-6)
+    guess = np.array([1.0, 2.0])
+
+    found = best_order(tour(), limits, [guess])
+
+    costs = [best_times(tour(), order, limits, [guess]).objective for order in ((0, 1), (1, 0))]
+    assert found.order == ((0, 1), (1, 0))[int(np.argmin(costs))]
+    # Both searches end at the same minimum, to their relative accuracy.
+    assert found.objective == pytest.approx(min(costs), rel=1e-6)

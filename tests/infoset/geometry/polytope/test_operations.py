@@ -201,6 +201,53 @@ def test_measures_satisfy_their_identities(seed: int, space: int, kind: str) -> 
         )
 
 
+def half_spaces_of(one: Polytope) -> list[tuple[list[Fraction], Fraction]]:
+    """Return the half-spaces (a, b), a . x <= b, of the facets in rational numbers."""
+    found = []
+    for *row, limit in one.facets.tolist():
+        normal = [
+            Fraction(entry) / Fraction(scale)
+            for entry, scale in zip(row, one.scale.tolist(), strict=True)
+        ]
+        centre = [Fraction(value) for value in one.centre.tolist()]
+        found.append((normal, Fraction(limit) + dot(normal, centre)))
+    return found
+
+
+def dot(one: list[Fraction], other: list[Fraction]) -> Fraction:
+    return sum((a * b for a, b in zip(one, other, strict=True)), Fraction(0))
+
+
+def corners_of(half_planes: list[tuple[list[Fraction], Fraction]]) -> list[list[Fraction]]:
+    """Return the points of two of the lines that are in all half-planes."""
+    corners = []
+    for (one, limit), (other, other_limit) in itertools.combinations(half_planes, 2):
+        det = one[0] * other[1] - one[1] * other[0]
+        if det == 0:
+            continue
+        corner = [
+            (limit * other[1] - one[1] * other_limit) / det,
+            (one[0] * other_limit - limit * other[0]) / det,
+        ]
+        if all(dot(normal, corner) <= bound for normal, bound in half_planes):
+            corners.append(corner)
+    return corners
+
+
+@pytest.mark.parametrize("factor", [1.0, 2.0])
+def test_preimage_of_a_set_far_from_the_origin_contains_the_exact_one(factor: float) -> None:
+    """The rows are exact, but the limits are moved by the centre, which rounds them."""
+    random = np.random.default_rng(3)
+    for _ in range(20):
+        one = Polytope.from_vertices(random.uniform(-1.0, 1.0, (6, 2)) + 500.0)
+        half_planes = half_spaces_of(one.preimage(factor * np.eye(2)))
+        corners = corners_of(half_spaces_of(one))
+        assert len(corners) >= 3
+        for corner in corners:
+            x = [value / Fraction(factor) for value in corner]
+            assert all(dot(normal, x) <= limit for normal, limit in half_planes)
+
+
 @pytest.mark.parametrize("space", [1, 2, 3, 5])
 def test_boxes_are_exact(space: int) -> None:
     """Formerly [0, 0] .. [1, 2] reached to -2.2e-16, and vertices had a positive excess."""
