@@ -125,8 +125,8 @@ def unavoidable_m(situation: Situation) -> Floats:
         box = model.seen_bounds
         h = model.angle_sensor.error_bound
         apart_m = e * to_go_s * (h(e * to_go_s) + h(x0)) / (1.0 - e * to_go_s / x0)
-        # Half of the most that they can arrive apart: the lesser of what the first image and what the
-        # box of positions allow, plus what the velocities allow.
+        # Half of the most that they can arrive apart: the lesser of what the first image and what
+        # the box of positions allow, plus what the velocities allow.
         widest_m = 0.5 * (min(np.ptp(box.z_m), 2.0 * h(x0) * x0) + np.ptp(box.vz_m_s) * x0 / e)
         reference_m[axis] = (np.minimum(apart_m, widest_m) - correctable_m).max(initial=0.0)
     return reference_m

@@ -128,9 +128,9 @@ def removed_edge(points: Points, before: int, i: int, j: int, after: int) -> Rem
     reach = cross(edge_x, edge_y, to_x, to_y) / turn
     x = points[i, 0] + reach * from_x
     y = points[i, 1] + reach * from_y
-    # The new vertex is on the line of the next edge, behind j: without rounding always, as `bend` and
-    # `turn` are positive. If rounding puts it in front of j, at a sharp tip, it would cut off the
-    # tip.
+    # The new vertex is on the line of the next edge, behind j: without rounding always, as `bend`
+    # and `turn` are positive. If rounding puts it in front of j, at a sharp tip, it would cut off
+    # the tip.
     is_behind = (points[j, 0] - x) * to_x + (points[j, 1] - y) * to_y >= 0.0
     return Removal(reach * bend if is_behind else np.inf, x, y)
 

@@ -309,8 +309,8 @@ class Polytope(PolytopeArrays, ConvexSet):
         is_zero = np.abs(mapped) <= UNSURE * (self.space + 2) * (np.abs(rows) @ np.abs(factor))
         mapped[is_zero.all(axis=1)] = 0.0
         found = self._of(construction.of_half_spaces(mapped, limits))
-        # A flat set stays flat: enlarged it would be thick. Without a centre and an offset the limits
-        # are not moved, and so not rounded.
+        # A flat set stays flat: enlarged it would be thick. Without a centre and an offset the
+        # limits are not moved, and so not rounded.
         is_exact = not (rounded.any() or moved.any() or self.centre.any())
         if found.dimension < found.space or is_exact:
             return found
