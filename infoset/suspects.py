@@ -46,10 +46,11 @@ class Suspects:
         self._groups: dict[int, dict[int, tuple[int, ...]]] = {}
 
     def copy(self) -> Suspects:
-        """Return an independent copy."""
+        """Return an independent copy; `_left_out`, which never changes, is shared."""
         twin = copy.copy(self)
         for name, value in vars(self).items():
             if name != "_left_out":
+                # Shallow: what the lists and dictionaries contain is replaced, never changed.
                 setattr(twin, name, value.copy())
         return twin
 

@@ -244,6 +244,7 @@ class ConvexPolygons(ConvexSet):
             raise ValueError(f"zonotope must be in R^2: got {zonotope!r}")
 
         centre = cls.unchecked(zonotope.centre[None], np.ones((), dtype=np.int64))
+        # A copy is contiguous and writeable: kernels are compiled once, for such arrays.
         halves = zonotope.generators[None].copy()
         return centre._make(2 * len(zonotope.generators), kernels.add_segments, halves)
 

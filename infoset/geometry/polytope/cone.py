@@ -85,7 +85,7 @@ def vertices_of(rows: list[Rationals], limits: Rationals) -> Vertices:
 
 
 def null_space(matrix: list[Rationals]) -> list[Row]:
-    """Return a basis of {x: matrix x = 0}."""
+    """Return a basis of {x: matrix x = 0}, of any signs and lengths; the matrix has a row."""
     basis = _unit_vectors(len(matrix[0]))
     for row in map(whole, matrix):
         heights = [dot(row, line) for line in basis]
