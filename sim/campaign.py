@@ -328,10 +328,7 @@ class _Progress:
 
         def report(share: float) -> None:
             self._running[cell, runs.start] = share * len(runs)
-            # A list, because other threads change the dictionary.
-            running = sum([*self._running.values()])
-            # A chunk that is being finished may count twice for a moment.
-            self._report(min(1.0, (self._done + running) / self._total))
+            self._report_all()
 
         return report
 
@@ -339,4 +336,11 @@ class _Progress:
         """Report that a chunk is stored."""
         self._done += len(runs)
         self._running.pop((cell, runs[0]), None)
-        self._report(self._done / self._total)
+        self._report_all()
+
+    def _report_all(self) -> None:
+        """Report the runs that are stored and those of the running chunks."""
+        # A list, because other threads change the dictionary.
+        running = sum([*self._running.values()])
+        # A chunk that is being finished may count twice for a moment.
+        self._report(min(1.0, (self._done + running) / self._total))

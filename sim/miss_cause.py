@@ -229,8 +229,8 @@ def count_causes(
 
     `needed_m` and `corrected_m` are the maximum miss without impulses and the maximum correction of
     the misses by the engine; `possible_m` is the maximum radius of the possible misses of the
-    misses by knowledge. They are None without such misses. The arguments are columns of results,
-    shape (N,).
+    misses by knowledge. They are None without a known value of such misses. The arguments are
+    columns of results, shape (N,).
     """
     columns = {
         "unguided_miss_m": unguided_m,

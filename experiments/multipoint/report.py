@@ -176,6 +176,9 @@ class MultipointReport:
         return grid.times / self._revolutions_until(grid.until_s)
 
     def _revolutions_until(self, time_s: float) -> float:
+        """Return the revolutions from the start to a time; in inertial axes those of the circular
+        orbit at the distance of the start.
+        """
         problem = self.problem
         rate_rad_s = problem.orbit_rate_rad_s
         if rate_rad_s is None:

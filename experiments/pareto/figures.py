@@ -215,7 +215,8 @@ def _hull(solution: EncounterSolution) -> Floats | None:
 def _draw_excesses(
     axes: Axes, solution: EncounterSolution, excess: Floats, selections: Mapping[str, Floats]
 ) -> None:
-    """Draw the front of two or three craft, the third as a colour.
+    """Draw the front of two craft, or of three: the two least correlated excesses as axes, and the
+    third as a colour.
 
     For other numbers of craft, draw the ranges of the excesses.
     """
@@ -229,7 +230,7 @@ def _draw_excesses(
         axes.set_xticks(columns, names, rotation=90)
         axes.set_ylabel(f"excess, {_COST}")
         return
-    shown = _widest_pair(excess)
+    shown = _least_correlated_pair(excess)
     if len(names) == 3:
         (third,) = {0, 1, 2} - set(shown)
         shade = axes.scatter(
@@ -239,7 +240,7 @@ def _draw_excesses(
             shade, ax=axes, location="top", label=f"$e$ of {names[third]}, {_COST}"
         )
     else:
-        axes.plot(excess[:, 0], excess[:, 1], color=SET_EDGE)
+        axes.plot(*excess[:, list(shown)].T, color=SET_EDGE)
     for choice, values in chosen.items():
         axes.plot(*values[list(shown)], marker=_MARKERS[choice], markersize=7.0, **_HOLLOW)
     label_axes(
@@ -247,8 +248,8 @@ def _draw_excesses(
     )
 
 
-def _widest_pair(excess: Floats) -> tuple[int, int]:
-    """Return the two craft of three whose excesses are least correlated.
+def _least_correlated_pair(excess: Floats) -> tuple[int, int]:
+    """Return the two craft of two or three whose excesses are least correlated, in their order.
 
     Over a strongly correlated pair the front would look like a line.
     """

@@ -201,7 +201,8 @@ def replay_rates(
         kind = past.log.kinds[i]
         event = AxisEvent(kind, values[law.channel, i], across_of(values, i, law), errors[i])
         is_measurement = kind in (ANGLE, RATE)
-        # Measurements that have cut, enlargements, burns, and the prediction after a burn.
+        # Measurements that have cut and enlargements (both in `cuts`), burns, and the prediction
+        # after a burn.
         is_single = cuts[i] or starts_burn(kind, law) or stretch.began == IN_BURN
         is_left_out = past.thinned and not is_single
         # A rate does not change the last angle, so that this may be before its cut.

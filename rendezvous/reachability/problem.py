@@ -376,7 +376,9 @@ class StateBlock:
         )
 
     def rest(self, start: int) -> StateBlock:
-        """Return the block that begins at time `start`, from 0 to T - 1, in the same state."""
+        """Return the block that begins at time `start`, from 0 to T - 1; its `initial` state is that
+        of this block.
+        """
         return replace(
             self,
             transition=self.transition[start:],

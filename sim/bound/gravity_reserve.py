@@ -265,7 +265,8 @@ def _corollary(
     if minimum <= 0.0 or to_pass > domain.gap_s * minimum:
         return None
 
-    # tau and zeta of equation (25).
+    # tau and zeta of equation (25) of docs/guarantee-bound.md. The rate is doubled because (25) has
+    # that of the whole difference.
     late = (nearer_end + 0.5 * changes.position_m) / minimum
     acceleration = half.disturbance_m_s2 + 4.0 * domain.gradient_per_s2 * domain.size_m
     drift = late * (2.0 * float(half.rate_m_s[-1]) + changes.speed_m_s + acceleration * late)

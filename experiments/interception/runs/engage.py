@@ -81,7 +81,11 @@ def _noises_of(options: Engage, scenario: Scenario) -> dict[str, NoiseSource | s
 
 
 def _record_files(options: Engage, noises: Sequence[str]) -> dict[str, Path | None]:
-    """Return the files of ``--record``; two engagements have their noises in the names."""
+    """Return the files of ``--record`` by the names of outputs under which `run` saves them, one for
+    each noise; the files of two engagements have their noises in their names too.
+
+    A record that `run` saves under another name would not be written.
+    """
     file = options.record
     if len(noises) == 1 or file is None:
         return {f"--record of {noise}": file for noise in noises}
