@@ -118,7 +118,7 @@ class Covariance:
         """Standard deviations, m and m/s, shape (n,)."""
         if not self.matrix_m2:
             return np.array([*self.position_sigma_m, *self.velocity_sigma_m_s])
-        # A negative variance is refused by its correlation of -1; until then it must not become NaN.
+        # A negative variance is refused by its correlation of -1; it must not become NaN before.
         return np.asarray(np.sqrt(np.abs(_symmetric("matrix_m2", self.matrix_m2).diagonal())))
 
     @cached_property

@@ -376,9 +376,7 @@ class StateBlock:
         )
 
     def rest(self, start: int) -> StateBlock:
-        """Return the block that begins at time `start`, from 0 to T - 1; its `initial` state is that
-        of this block.
-        """
+        """Return the block that begins at time `start`, from 0 to T - 1; `initial` is unchanged."""
         return replace(
             self,
             transition=self.transition[start:],

@@ -81,8 +81,8 @@ def _noises_of(options: Engage, scenario: Scenario) -> dict[str, NoiseSource | s
 
 
 def _record_files(options: Engage, noises: Sequence[str]) -> dict[str, Path | None]:
-    """Return the files of ``--record`` by the names of outputs under which `run` saves them, one for
-    each noise; the files of two engagements have their noises in their names too.
+    """Return the files of ``--record`` by the names of outputs under which `run` saves them, one
+    for each noise; the files of two engagements have their noises in their names too.
 
     A record that `run` saves under another name would not be written.
     """
