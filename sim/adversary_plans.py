@@ -122,12 +122,13 @@ class _ConstructedNoise(GameNoise):
         """Side to which a shift moves the true state, shape (B,) or (C, B); 0 for the constructions
         without one.
 
-        If the target keeps its side, it is that side instead of `shift_side`. Unlike that of
-        `GameNoise` it is not 0 if `shift_m` is None: then nothing is shifted, and nothing reads it.
+        It is 0 too if `shift_m` is None. If the target keeps its side, it is that side instead of
+        `shift_side`.
         """
+        side = np.zeros_like(self.shift_side) if self.shift_m is None else self.shift_side
         if self.target_side is None:
-            return self.shift_side
-        return np.where(self.shift_side == 0.0, 0.0, self.target_side)
+            return side
+        return np.where(side == 0.0, 0.0, self.target_side)
 
     def _upper_is_worse(self, miss: PredictedMiss, step: int) -> Flags:
         chosen = draws_of_step("choices", self.tie_draws, step, miss.upper_m.shape) >= 0.0

@@ -102,7 +102,8 @@ def with_gravity(model: SetModel, sun: Sun | None, impulses_m_s: float) -> SetMo
     )
     *along_y, along_z = (_max(each) for each in tide + scale)
 
-    # Change of the closing speed until the end of each step, as a share of the lowest one.
+    # Change of the closing speed until the end of each interval of `times_s`, as a share of the
+    # lowest speed.
     slowest_m_s = min(m, model.closing_speed_m_s)
     changes = np.cumsum(greater_of_neighbours(pull)) * flight.times_s[1] / slowest_m_s
     # The guaranteed model needs a `speed_error` below 1, of which the closing speeds of the start

@@ -304,10 +304,11 @@ def make_room_all(
     """Compute the room that the feasible sections need; with `widen`, enlarge their rings.
 
     Every section must be able to gain `added` vertices, up to `CAPACITY`. Return the number of
-    floats by which the rings are too small, for which memory must be allocated before a call with
-    `widen`, and the number of vertices that every section may gain now. With rings that are large
-    enough it is less than `MAX_ADDED` only if a section must be reduced first; with `widen`, the
-    sections of the active engagements are reduced. `points` is a working array.
+    floats of the new rings of sections that have no room, whole rings, for which memory must be
+    allocated before a call with `widen` (then it is 0), and the number of vertices that every
+    section may gain now. With rings that are large enough it is less than `MAX_ADDED` only if a
+    section must be reduced first; with `widen`, the sections of the active engagements are reduced.
+    `points` is a working array.
     """
     slots = sections.slots
     used = sections.used

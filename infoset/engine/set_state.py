@@ -572,8 +572,9 @@ class SetState:
         self._spare = spare - chains.MAX_ADDED
 
     def _room(self, active: Flags, widen: bool) -> tuple[int, int]:
-        """Return the floats by which the rings of the feasible sections are too small for
-        `ROOM_AHEAD` more vertices, and the vertices that each of them can gain now.
+        """Return the floats of the new rings of feasible sections without room for `ROOM_AHEAD`
+        more vertices (whole rings: the old ones are not used again), and the vertices that every
+        section can gain now.
 
         With `widen`, enlarge the rings, for which `_add_room` has allocated, and reduce the crowded
         sections of the `active` engagements, whose emptiness is then unproved.

@@ -18,8 +18,8 @@ _ATTEMPTS = tuple(SolverSettings(constant, False) for constant in (1e-7, 3e-8, 1
 Programs of plans have more degenerate rows than the others: with 3e-8 alone the factorisation fails
 for approach-cone with feedback, with 1e-7 it fails in no program of the tests. The other two are
 reserves, one smaller and one greater, for rounding that differs between machines; both are chosen.
-In 323 programs of the tests of plans each of them alone is enough; 1e-6, which is last, is less
-accurate in three (measured)."""
+In the 323 other programs of the tests of plans each of them alone is enough; 1e-6, which is last,
+is less accurate in three (measured)."""
 _SOLVED = (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved)
 """Statuses with a point. One that is less accurate is used too: certificates do not depend on
 it."""

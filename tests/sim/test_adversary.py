@@ -14,6 +14,7 @@ from infoset.guidance import GameNoise, NoiseKind, Situation, TieRule
 from infoset.guidance.scripted_noise import ScriptedNoise
 from infoset.sim import Outcome, Scenario
 from infoset.sim.adversary import NothingCountsError, Objective, WorstEngagement, find_worst
+from infoset.sim.adversary_plans import Constructions
 from infoset.sim.closed_form import worst_shift_m
 from infoset.sim.draws import draw
 from infoset.sim.engagement import Engagements
@@ -221,3 +222,15 @@ def test_with_a_cut_off_the_search_begins_with_game_noise_and_its_shift(coarse: 
     shifted = GameNoise(TieRule.UPPER, np.ones((1, 1, 1)), worst_shift_m(game), side)
     assert first.miss_m == pytest.approx(miss_m(shifted), rel=1e-9)
     assert first.miss_m > 1.05 * miss_m(GameNoise(TieRule.UPPER, np.ones((1, 1, 1))))
+
+
+def test_side_of_the_true_state_is_zero_without_a_shift() -> None:
+    """Formerly a target that moves against the guidance took this side, although no angle was
+    shifted.
+    """
+    plans = Constructions(np.ones((2, 1, 3)), np.array([False, False]), np.array([1.0, -1.0]))
+    shift_m = np.array([5.0])
+
+    assert plans.noise(None, None).truth_side.tolist() == [0.0, 0.0]
+    assert plans.noise(shift_m, None).truth_side.tolist() == [1.0, -1.0]
+    assert plans.noise(None, np.array([[1.0, 1.0]])).truth_side.tolist() == [[0.0, 0.0]]

@@ -165,10 +165,11 @@ def is_guess(epoch: Epoch, scale: str, wanted: str) -> bool:
 
 
 def tdb_drift_s(seconds: Fraction, scale: str) -> float:
-    """Return the variable part of TDB less a scale at a time of this scale, s.
+    """Return TDB - TT at a time of a scale, s: less than 2 ms, and 0 for TDB.
 
-    Velocities are derivatives with respect to TDB, in which orbits around the Sun are computed. The
-    drift is up to 3.3e-10 s/s: 1e-5 m/s at 30 km/s, or 9 m in ten days.
+    The other scales differ from TT by a constant; UTC is counted as TAI. Velocities are derivatives
+    with respect to TDB, in which orbits around the Sun are computed. The difference changes by up
+    to 3.3e-10 s/s: 1e-5 m/s at 30 km/s, or 9 m in ten days.
     """
     if scale == "TDB":
         return 0.0
