@@ -175,6 +175,8 @@ def _facts(record: Record, kept: Sequence[int]) -> dict[str, object]:
         "max_impulse_m_s": scenario.engine.max_impulse_m_s,
         "budget_m_s": scenario.thruster.budget_m_s,
         "radius_m": scenario.certain_radius_m,
+        # Otherwise the radius is that of the circle around the aim point inside the body.
+        "is_sphere": scenario.body is not None and scenario.body.is_sphere_around_aim,
     }
 
 

@@ -22,7 +22,7 @@ class BPlane {
         ["true predicted miss", mark("cross", "ink")],
         ["centre of the body", mark("plus", "quiet")],
         ["impulse", mark("dot", "impulse")],
-        ...(record.radius_m === null ? [] : [["disc of the body", (context) => {
+        ...(record.radius_m === null ? [] : [[record.is_sphere ? "disc of the body" : "circle inside the body", (context) => {
           swatches.fill("quiet", 0.15)(context);
           stroke("quiet", { dash: [2, 2] })(context);
         }]]),

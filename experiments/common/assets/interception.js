@@ -461,7 +461,7 @@ class Engagement {
         ["after an impulse that centres the set", stroke("set", { dash: [6, 3] })],
         ["miss of the true state", stroke("ink", { width: 1.2 })],
         ...(record.guaranteed_miss_m === null ? [] : [["guaranteed miss \u03a6", stroke("extra", { dash: [8, 3] })]]),
-        ...(record.radius_m === null ? [] : [["radius of the body", stroke("quiet", { dash: [2, 2] })]]),
+        ...(record.radius_m === null ? [] : [[record.is_sphere ? "radius of the body" : "circle inside the body", stroke("quiet", { dash: [2, 2] })]]),
       ], (chart) => this.drawCorridor(chart), (step) => this.corridorLines(step), 0.3),
       ...(spatial ? [overTime("Impulse modulus", "Modulus of the impulse against time",
         [["modulus of the impulse vector", stroke("impulse")], ["limit of an impulse", stroke("line", { dash: [5, 3] })]],

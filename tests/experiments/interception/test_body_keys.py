@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +47,15 @@ def test_ellipse_has_its_lines_and_columns(infoset: Command, own: Path) -> None:
     assert "mean probability of a hit for all directions of the ellipse: 100 %" in out
     header = Path("runs.csv").read_text().splitlines()[0].split(",")
     assert {"certain_hit", "hit_probability"} <= set(header)
+
+
+def test_page_knows_whether_the_radius_is_that_of_a_sphere(infoset: Command, own: Path) -> None:
+    for name, scenario, is_sphere in (("own", own, "false"), ("given", "haiv-2013", "true")):
+        record = f"{name}.npz"
+        page = f"{name}.html"
+        assert infoset("engage", scenario, *QUICK, "--record", record)[0] == 0
+        assert infoset("replay", record, "--html", page)[0] == 0
+        assert re.findall(r'"is_sphere": ?(\w+)', Path(page).read_text()) == [is_sphere]
 
 
 def test_aim_point_outside_is_refused_with_its_key(infoset: Command, own: Path) -> None:
